@@ -1,0 +1,234 @@
+"""Correctly rounded arithmetic on Python integers: any base, any precision, unbounded exponent.
+
+A number is a pair ``(m, e)`` and means ``m * base**e``. Zero is ``(0, 0)``; any other number is
+normalized, ``base**(t-1) <= abs(m) < base**t``, so that equal numbers are equal pairs.
+Every function rounds once, from the exact result.
+"""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from fractions import Fraction
+from functools import lru_cache
+from math import isqrt, log2
+
+Pair = tuple[int, int]
+
+ZERO: Pair = (0, 0)
+LARGEST_BITS = 10_000_000  # integers beyond this would take minutes or all memory
+_LARGEST_POWER_OF_TEN = int(LARGEST_BITS / log2(10))
+
+
+def integer_text(n: int) -> str:
+    """The decimal digits of an integer of any length; ``str`` refuses more than 4300."""
+    return str(Decimal(n))
+
+
+class ExactKernel:
+    """Scalar operations of one format.
+
+    Parameters
+    ----------
+    base : number base, at least 2.
+    precision : digits of the significand, t in the documents, at least 1.
+    nearest : round to nearest, half away from zero (hung1984, II (3)); else chop (II (9)).
+    """
+
+    def __init__(self, base: int, precision: int, nearest: bool) -> None:
+        self.base = base
+        self.precision = precision
+        self.nearest = nearest
+        self._bits = log2(base)
+        self._smallest = base ** (precision - 1)
+        self._limit = base**precision
+        self._largest_exponent = int(LARGEST_BITS / self._bits)
+        # What the operations need; of very long significands the powers are made when needed.
+        self._powers = [base**k for k in range(min(2 * precision + 8, 512))]
+
+    # -- from exact values ---------------------------------------------------------------------
+
+    def from_ratio(self, p: int, q: int, e: int = 0) -> Pair:
+        """Round ``p / q * base**e``; ``q`` is positive."""
+        if p == 0:
+            return ZERO
+        if q == 1:
+            return self._round_integer(p, e)
+        return self._round_quotient(p, q, e)
+
+    def from_decimal(self, p: int, q: int, k: int) -> Pair:
+        """Round ``p / q * 10**k``; ``q`` is positive.
+
+        Raises
+        ------
+        OverflowError : the base is not 10 and ``10**k`` is too long an integer to write out.
+        """
+        if k == 0 or self.base == 10:
+            return self.from_ratio(p, q, k)
+        if p == 0:
+            return ZERO
+        if abs(k) > _LARGEST_POWER_OF_TEN:
+            raise OverflowError(
+                f"got a decimal exponent of {integer_text(k)}; needed at most {_LARGEST_POWER_OF_TEN} "
+                f"in size to convert to base {self.base}; use base 10, or scale the number"
+            )
+        return self.from_ratio(p * 10**k, q) if k > 0 else self.from_ratio(p, q * 10**-k)
+
+    def is_exactly(self, pair: Pair, p: int, q: int, k: int) -> bool:
+        """Whether ``pair``, just rounded from ``p / q * 10**k``, equals it."""
+        m, e = pair
+        if m == 0:
+            return p == 0  # no other number rounds to zero
+        if self.base == 10:
+            e, k = e - k, 0
+        numerator = m * q * self.base ** max(e, 0) * 10 ** max(-k, 0)
+        return numerator == p * 10 ** max(k, 0) * self.base ** max(-e, 0)
+
+    # -- operations ----------------------------------------------------------------------------
+
+    def add(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        if m1 == 0:
+            return m2, e2
+        if m2 == 0:
+            return m1, e1
+        if e1 < e2:
+            m1, e1, m2, e2 = m2, e2, m1, e1
+        if e1 - e2 > self.precision + 2:
+            # Far below the last digit only the sign of the smaller operand matters.
+            m2, e2 = (1 if m2 > 0 else -1), e1 - 3
+        n = m1 * self._power(e1 - e2) + m2
+        return self._round_integer(n, e2) if n else ZERO
+
+    def subtract(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        return self.add(m1, e1, -m2, e2)
+
+    def multiply(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        n = m1 * m2
+        return self._round_integer(n, e1 + e2) if n else ZERO
+
+    def divide(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        """The caller has excluded ``m2 == 0``."""
+        if m1 == 0:
+            return ZERO
+        return self._round_quotient(m1 if m2 > 0 else -m1, abs(m2), e1 - e2)
+
+    def sqrt(self, m: int, e: int) -> Pair:
+        """The caller has excluded ``m < 0``."""
+        if m == 0:
+            return ZERO
+        # With 2t - 1 or 2t digits and an even exponent, the root has exactly t digits.
+        shift = self.precision if (e - self.precision) % 2 == 0 else self.precision - 1
+        n = m * self._power(shift)
+        root = isqrt(n)
+        # n >= (root + 1/2)**2 in integers: n - root**2 > root. An exact tie cannot occur, nor a carry:
+        # n <= (b**t - 1) * b**t, whose root is below b**t - 1/2.
+        if self.nearest and n - root * root > root:
+            root += 1
+        return root, (e - shift) // 2
+
+    def negative(self, m: int, e: int) -> Pair:
+        return -m, e
+
+    def absolute(self, m: int, e: int) -> Pair:
+        return abs(m), e
+
+    def compare(self, m1: int, e1: int, m2: int, e2: int) -> int:
+        """-1, 0 or 1 as the first number is less than, equal to or greater than the second."""
+        if m1 == 0 or m2 == 0 or (m1 < 0) != (m2 < 0):
+            return (m1 > m2) - (m1 < m2)
+        larger = (e1, abs(m1)) > (e2, abs(m2))
+        smaller = (e1, abs(m1)) < (e2, abs(m2))
+        return larger - smaller if m1 > 0 else smaller - larger
+
+    # -- to other number types -----------------------------------------------------------------
+
+    def to_fraction(self, m: int, e: int) -> Fraction:
+        """The exact value.
+
+        Raises
+        ------
+        OverflowError : the value is too long an integer to write out.
+        """
+        if abs(e) > self._largest_exponent:
+            raise OverflowError(
+                f"got a number of about {self._about(e)}; needed an exponent of at most "
+                f"{self._largest_exponent} in size to write it as a Fraction; scale the numbers"
+            )
+        return Fraction(m * self.base**e) if e >= 0 else Fraction(m, self.base**-e)
+
+    def to_float(self, m: int, e: int) -> float:
+        """The nearest float64; halfway between two, the one with even significand.
+
+        Raises
+        ------
+        OverflowError : the result would be infinite, or zero for a number that is not.
+        """
+        if m == 0:
+            return 0.0
+        if abs(e) <= self._largest_exponent + self.precision and abs(e * self._bits + m.bit_length()) < 1200:
+            try:
+                # Python rounds the quotient of two integers correctly.
+                value = (m * self.base**e) / 1 if e >= 0 else m / self.base**-e
+            except OverflowError:
+                value = 0.0
+            if value != 0.0:
+                return value
+        raise OverflowError(
+            f"got a number of about {self._about(e)}; needed one within the range of float64, "
+            "2**-1074 to 2**1024; scale it, or use to_fractions()"
+        )
+
+    def _about(self, e: int) -> str:
+        return f"{integer_text(self.base)}**{integer_text(e + self.precision - 1)}"
+
+    # -- rounding ------------------------------------------------------------------------------
+
+    def _power(self, k: int) -> int:
+        return self._powers[k] if k < len(self._powers) else self.base**k
+
+    def _digits(self, n: int) -> int:
+        """Number of base-b digits of ``n > 0``."""
+        if self.base == 2:
+            return n.bit_length()
+        count = int((n.bit_length() - 1) / self._bits) + 1  # within one or two; then exactly:
+        while self._power(count) <= n:
+            count += 1
+        while self._power(count - 1) > n:
+            count -= 1
+        return count
+
+    def _carry(self, m: int, e: int) -> Pair:
+        """Normalize a positive significand that rounding may have carried to t + 1 digits."""
+        return (self._smallest, e + 1) if m == self._limit else (m, e)
+
+    def _round_integer(self, n: int, e: int) -> Pair:
+        """Round ``n * base**e``, ``n`` not zero."""
+        a = abs(n)
+        drop = self._digits(a) - self.precision
+        if drop <= 0:
+            return n * self._power(-drop), e + drop
+        unit = self._power(drop)
+        m, rest = divmod(a, unit)
+        if self.nearest and 2 * rest >= unit:
+            m += 1
+        m, e = self._carry(m, e + drop)
+        return (m if n > 0 else -m), e
+
+    def _round_quotient(self, p: int, q: int, e: int) -> Pair:
+        """Round ``p / q * base**e``, ``p`` not zero, ``q`` positive."""
+        a = abs(p)
+        shift = self.precision - self._digits(a) + self._digits(q)
+        numerator, denominator = (a * self._power(shift), q) if shift >= 0 else (a, q * self._power(-shift))
+        if numerator >= denominator * self._limit:  # t + 1 digits, not t
+            denominator *= self.base
+            shift -= 1
+        m, rest = divmod(numerator, denominator)
+        if self.nearest and 2 * rest >= denominator:
+            m += 1
+        m, e = self._carry(m, e - shift)
+        return (m if p > 0 else -m), e
+
+
+@lru_cache(maxsize=256)
+def kernel(base: int, precision: int, nearest: bool) -> ExactKernel:
+    """The kernel of a format, made once."""
+    return ExactKernel(base, precision, nearest)

@@ -1,0 +1,116 @@
+"""Norms and error constants that every bound is made of; exact for exact input.
+
+Entries may be Fractions, ints, floats (taken at their exact binary value) or a FloatArray.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def exact(values: Any) -> NDArray[Any]:
+    """Entries as exact Fractions, in an object array of the same shape.
+
+    Raises
+    ------
+    ValueError : an entry is NaN or infinite.
+    TypeError : an entry is not a number.
+    """
+    if hasattr(values, "to_fractions"):
+        values = values.to_fractions()
+    entries: NDArray[Any] = np.asarray(values, dtype=object)
+    fractions = np.empty(entries.shape, object)
+    for index in np.ndindex(entries.shape):
+        try:
+            entry: Any = entries[index]
+            fractions[index] = Fraction(entry)
+        except (ValueError, OverflowError) as error:
+            raise ValueError(f"got {entry!r}; needed a finite number") from error
+    return fractions
+
+
+def max_norm(x: Any) -> Fraction:
+    r"""Largest size of an entry of a vector, :math:`\max_j |x_j|`; hung1984, ch. II, (21)."""
+    entries = abs(exact(x))
+    if entries.ndim != 1:
+        raise ValueError(f"got shape {entries.shape}; needed a vector (n,)")
+    return max(entries, default=Fraction(0))
+
+
+def column_sum_norm(a: Any) -> Fraction:
+    r"""Largest column sum, :math:`\max_j \sum_i |a_{ij}|`, of a matrix; hung1984, ch. II, (22)."""
+    return max(_sizes(a).sum(axis=0), default=Fraction(0))
+
+
+def row_sum_norm(a: Any) -> Fraction:
+    r"""Largest row sum, :math:`\max_i \sum_j |a_{ij}|`: the matrix norm that belongs to (21)."""
+    return max(_sizes(a).sum(axis=1), default=Fraction(0))
+
+
+def _sizes(a: Any) -> NDArray[Any]:
+    entries = abs(exact(a))
+    if entries.ndim != 2:
+        raise ValueError(f"got shape {entries.shape}; needed a matrix (m, n)")
+    return entries
+
+
+def gamma(n: int, unit_roundoff: Fraction) -> Fraction:
+    r"""Bound of the relative error of n roundings on top of each other, to every order.
+
+    .. math:: \Bigl|\prod_{i=1}^n (1+\epsilon_i)^{\pm1} - 1\Bigr| \le \gamma_n
+        = \frac{n\beta}{1 - n\beta}, \qquad |\epsilon_i| \le \beta,\ n\beta < 1
+
+    Parameters
+    ----------
+    n : number of roundings, at least 0.
+    unit_roundoff : β, exact.
+
+    Raises
+    ------
+    ValueError : nβ ≥ 1; so many roundings in so few digits have no such bound.
+
+    References
+    ----------
+    Higham 2002, Lemma 3.1.
+    """
+    if n < 0 or unit_roundoff < 0:
+        raise ValueError(f"got n = {n}, unit roundoff {unit_roundoff}; needed both at least 0")
+    product = n * Fraction(unit_roundoff)
+    if product >= 1:
+        raise ValueError(
+            f"got {n} roundings with unit roundoff {float(unit_roundoff):.3g}, a product of "
+            f"{float(product):.3g}; needed less than 1; use more digits or fewer operations"
+        )
+    return product / (1 - product)
+
+
+def gamma_probabilistic(n: int, unit_roundoff: Fraction, failure: float = 1e-2) -> float:
+    r"""As :func:`gamma`, but exceeded with at most the probability `failure`: of size √n β.
+
+    .. math:: \tilde\gamma_n(\lambda) = \exp\Bigl(\lambda\sqrt n\,\beta
+        + \frac{n\beta^2}{1-\beta}\Bigr) - 1, \qquad
+        \text{failure} = 2\exp\Bigl(-\frac{\lambda^2(1-\beta)^2}{2}\Bigr)
+
+    It rests on roundings that are independent with mean zero: a fair model of rounding to nearest
+    of data that have many digits, and wrong for chopping.
+
+    Raises
+    ------
+    ValueError : `failure` outside (0, 1), or β ≥ 1.
+
+    References
+    ----------
+    Higham & Mary 2019, Theorem 2.4.
+    """
+    u = float(unit_roundoff)
+    if not 0 < failure < 1:
+        raise ValueError(f"got failure = {failure}; needed a probability between 0 and 1")
+    if n < 0 or not 0 <= u < 1:
+        raise ValueError(f"got n = {n}, unit roundoff {u}; needed n >= 0 and 0 <= u < 1")
+    spread = math.sqrt(2 * math.log(2 / failure)) / (1 - u)
+    return math.expm1(spread * math.sqrt(n) * u + n * u * u / (1 - u))

@@ -1,0 +1,97 @@
+"""Steps of a derivation that check themselves, and first-order error algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import sympy as sp
+
+_ORDER = sp.Symbol("h")
+
+
+def errors(count: int, letter: str = "epsilon") -> tuple[sp.Symbol, ...]:
+    """Symbols of relative rounding errors, ε_1 … ε_count."""
+    return tuple(sp.symbols(f"{letter}_1:{count + 1}"))
+
+
+def first_order(expression: sp.Expr, eps: Sequence[sp.Symbol]) -> sp.Expr:
+    """The part of `expression` linear in the rounding errors `eps`."""
+    scaled = expression.subs({e: _ORDER * e for e in eps}, simultaneous=True)
+    return sp.expand(sp.diff(scaled, _ORDER).subs(_ORDER, 0))
+
+
+def held(expression: sp.Expr) -> sp.Expr:
+    """Keep a factor together, so that a step shows where it comes from."""
+    return sp.UnevaluatedExpr(expression)
+
+
+def together(*terms: sp.Expr) -> sp.Expr:
+    """A sum whose terms stay apart, so that a step shows where they come from."""
+    return sp.Add(*terms, evaluate=False)
+
+
+def over(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
+    """A quotient that is not simplified."""
+    return sp.Mul(numerator, sp.Pow(denominator, -1, evaluate=False), evaluate=False)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step, ``left = right``; or ``left = right + rest >= right``.
+
+    Parameters
+    ----------
+    name : what the step shows, a few words; ``$...$`` is typeset.
+    left, right : sympy expressions; what is held back from evaluation (UnevaluatedExpr, Sum,
+        Limit) is shown so, and evaluated for the check.
+    rest : an expression that is seen to be nonnegative under the assumptions of its symbols.
+    """
+
+    name: str
+    left: sp.Expr
+    right: sp.Expr
+    rest: sp.Expr = sp.S.Zero
+
+    @property
+    def holds(self) -> bool:
+        """Whether sympy finds both sides equal, and `rest` nonnegative."""
+        difference = (self.left - self.right - self.rest).doit().expand().simplify()
+        return bool(difference == 0 and (self.rest == 0 or self.rest.is_nonnegative is True))
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.left} = {self.right}" + (f" + [{self.rest} >= 0]" if self.rest != 0 else "")
+
+    def latex(self) -> str:
+        """The formula of the step."""
+        left, right = _latex(self.left), _latex(self.right)
+        if self.rest == 0:
+            return rf"{left} \;=\; {right}"
+        return rf"{left} \;=\; {right} + \underbrace{{{_latex(self.rest)}}}_{{\ge\,0}}"
+
+
+@dataclass(frozen=True)
+class Derivation:
+    """Steps in order; shown as a list with typeset formulas."""
+
+    steps: tuple[Step, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every step holds."""
+        return all(step.holds for step in self.steps)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{_mark(step)} {step}" for step in self.steps)
+
+    def _repr_markdown_(self) -> str:
+        return "\n".join(f"- {_mark(step)} {step.name}\n\n  $$\n  {step.latex()}\n  $$" for step in self.steps)
+
+
+def _latex(expression: sp.Expr) -> str:
+    # Rising powers read better for 1 - kβ, falling ones for n - 1: the shorter is the better.
+    return min((str(sp.latex(expression, order=order)) for order in ("lex", "rev-lex")), key=len)
+
+
+def _mark(step: Step) -> str:
+    return "✓" if step.holds else "✗"

@@ -1,0 +1,107 @@
+"""The command ``python -m gpbnb.ledger``."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import traceback
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, examine, load_checks
+from gpbnb.ledger.inventory import Entry, load_inventory, select
+from gpbnb.ledger.render import FORMATS, describe
+
+COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # 2 is argparse's, for misuse
+_EPILOG = (
+    "exit status: 0, every entry of the selection has its finding; 1, some lack their check; 2, bad arguments, or the "
+    "ledger or the output file cannot be used; 3, a check raised an exception (the other rows are written all the same)"
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit status.
+
+    Raises
+    ------
+    SystemExit : with status 2 for bad arguments, 0 after ``--help``.
+    """
+    parser = argparse.ArgumentParser(
+        prog="python -m gpbnb.ledger",
+        description="Check everything printed in the three documents, and write what became of it.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
+    parser.add_argument("--document", help="hung1984, hung1982 or savage2016; default: all")
+    parser.add_argument("--chapter", help="as numbered in the document, as in II; default: all")
+    parser.add_argument("--section", nargs="+", metavar="S", help="one or more; 9 takes 9.1 and 9.2 too; default: all")
+    parser.add_argument("--output", type=Path, metavar="FILE", help="a file, replaced as a whole; default: stdout")
+    arguments = parser.parse_args(argv)
+    try:
+        inventory = load_inventory()
+        chosen = select(inventory, arguments.document, arguments.chapter, arguments.section)
+        _check_output(arguments.output)
+        checks = load_checks(inventory)
+    except (ImportError, OSError, ValueError) as error:
+        parser.error(str(error))
+    rows = examine(chosen, checks, _progress)
+    content = FORMATS[arguments.format](rows).encode()
+    try:
+        if arguments.output is not None:
+            _replace(arguments.output, content)
+        else:
+            sys.stdout.buffer.write(content)
+            sys.stdout.buffer.flush()
+        _report(rows)
+    except BrokenPipeError:
+        # The reader of the pipe has what it wanted; what the interpreter flushes at exit goes nowhere.
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, sys.stdout.fileno())
+    except OSError as error:
+        parser.error(f"the ledger cannot be written: {error}")
+    outcomes = counts(rows)
+    return BROKEN if FAILED in outcomes else INCOMPLETE if MISSING in outcomes else COMPLETE
+
+
+def _progress(entries: Sequence[Entry]) -> Iterable[Entry]:
+    if not sys.stderr.isatty():
+        return entries
+    from tqdm import tqdm  # type: ignore[import-untyped]
+
+    bar: Iterable[Entry] = tqdm(entries, desc="checks", unit="entry", leave=False, file=sys.stderr)
+    return bar
+
+
+def _report(rows: Sequence[Row]) -> None:
+    for row in rows:
+        if row.error is not None:
+            frame = traceback.extract_tb(row.error.__traceback__)[-1]
+            cause = "".join(traceback.format_exception_only(row.error)).strip()
+            print(f"the check of {row.entry.id} failed: {cause} ({frame.filename}:{frame.lineno})", file=sys.stderr)
+    outcomes = counts(rows)
+    print(f"{len(rows)} entries: {describe(outcomes)}", file=sys.stderr)
+    print(f"{outcomes.get(MISSING, 0)} lack their check", file=sys.stderr)
+
+
+def _check_output(path: Path | None) -> None:
+    if path is None:
+        return
+    if path.exists() and not path.is_file():
+        raise ValueError(f"--output {path} is not a regular file; name a file, or leave --output out for stdout")
+    if not path.parent.is_dir():
+        raise ValueError(f"--output {path}: there is no directory {path.parent}; make it first")
+
+
+def _replace(path: Path, content: bytes) -> None:
+    path = path.resolve()
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        draft.write_bytes(content)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,113 @@
+"""Write the ledger out: CSV, JSON, plain text, and Markdown tables for notebooks."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterable
+
+from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order, summary
+from gpbnb.ledger.inventory import Entry
+from gpbnb.tables import Table, one_line
+
+COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
+_AGREES = {True: "true", False: "false", None: ""}
+_OUTCOMES = {MISSING: "no check", FAILED: "check failed"}
+
+
+def to_csv(rows: Iterable[Row]) -> str:
+    """Write `rows` as RFC 4180 CSV with the columns `COLUMNS`; `agrees` is true, false or empty."""
+    out = io.StringIO(newline="")
+    writer = csv.writer(out, lineterminator="\r\n")
+    writer.writerow(COLUMNS)
+    for record in map(_record, rows):
+        writer.writerow([*record[:5], _AGREES[record[5]], record[6] or "", record[7]])
+    return out.getvalue()
+
+
+def to_json(rows: Iterable[Row]) -> str:
+    """Write `rows` as a JSON array of objects with the keys `COLUMNS`; null where there is no finding."""
+    records = [dict(zip(COLUMNS, _record(row), strict=True)) for row in rows]
+    return json.dumps(records, ensure_ascii=False, indent=1) + "\n"
+
+
+def to_text(rows: Iterable[Row]) -> str:
+    """Write `rows` one a line: outcome, id, what was recomputed, note."""
+    lines = []
+    for row in rows:
+        found = (row.finding.recomputed, row.finding.note) if row.finding else ()
+        cells = (row.entry.id, *filter(None, map(one_line, found)))
+        lines.append(f"{_outcome(row):<12}  {'  '.join(cells)}\n")
+    return "".join(lines)
+
+
+def to_markdown(rows: Iterable[Row]) -> str:
+    """Write `rows` as the Markdown of `table`."""
+    return table(rows).markdown() + "\n"
+
+
+def _record(row: Row) -> tuple[str, str, str, str, str, bool | None, str | None, str]:
+    entry, finding = row.entry, row.finding
+    head = (entry.id, entry.document, entry.kind, entry.printed)
+    if finding is None:
+        return (*head, "", None, None, "")
+    return (*head, finding.recomputed, finding.agrees, finding.verdict.value, finding.note)
+
+
+def table(rows: Iterable[Row]) -> Table:
+    """Tabulate `rows` in reading order: item, printed, recomputed, verdict, note."""
+    rows = in_reading_order(rows)
+    body = tuple(
+        (
+            _place(row.entry),
+            row.entry.printed,
+            row.finding.recomputed if row.finding else "",
+            _outcome(row),
+            row.finding.note if row.finding else "",
+        )
+        for row in rows
+    )
+    return Table(_title(rows), ("Item", "Printed", "Recomputed", "Verdict", "Note"), body)
+
+
+def summary_table(rows: Iterable[Row]) -> Table:
+    """Tabulate the counts of `rows`: a line a section, a column an outcome that occurs, and the sums."""
+    rows = tuple(rows)
+    total = counts(rows)
+    body = [
+        (
+            place.document,
+            _section(place.chapter, place.section),
+            *(str(inside.get(outcome, 0)) for outcome in total),
+            str(sum(inside.values())),
+        )
+        for place, inside in summary(rows).items()
+    ]
+    body.append(("all", "", *map(str, total.values()), str(len(rows))))
+    header = ("Document", "Section", *(_OUTCOMES.get(outcome, outcome) for outcome in total), "entries")
+    return Table(f"{_title(rows)}; by section", header, tuple(body))
+
+
+def describe(counted: dict[str, int]) -> str:
+    """Say `counted` in words, as in ``3 verified, 1 no check``."""
+    return ", ".join(f"{number} {_OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
+
+
+def _outcome(row: Row) -> str:
+    return _OUTCOMES.get(row.outcome, row.outcome)
+
+
+def _title(rows: tuple[Row, ...]) -> str:
+    return f"Ledger of {len(rows)} entries: {describe(counts(rows)) or 'none'}"
+
+
+def _place(entry: Entry) -> str:
+    return f"{entry.document}, {_section(entry.chapter, entry.section)}: {entry.item}"
+
+
+def _section(chapter: str, section: str) -> str:
+    return ".".join(part for part in (chapter, section) if part != "-") or "-"
+
+
+FORMATS = {"csv": to_csv, "markdown": to_markdown, "json": to_json, "text": to_text}

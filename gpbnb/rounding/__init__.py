@@ -1,0 +1,1 @@
+"""Rounding bounds: from one operation to chains of matrix products (hung1984, ch. II, 1-9)."""

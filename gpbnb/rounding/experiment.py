@@ -1,0 +1,505 @@
+"""What does happen: sums and products computed in a format, beside the bounds of their errors.
+
+Errors and bounds are compared as exact Fractions: a violation is one, however small.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import partial
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds import column_sum_norm
+from gpbnb.floatarray import FloatArray
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rounding import theory
+
+Bounds = Mapping[str, Callable[[], Fraction]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One computed result: its inputs, its error, and the bounds of that error.
+
+    A bound that does not exist, because γ_n needs nβ < 1, is absent from `bounds`.
+    """
+
+    fmt: FloatFormat
+    inputs: tuple[Any, ...]
+    computed: Any
+    true: Any
+    error: Fraction
+    bounds: Mapping[str, Fraction]
+
+    def ratio(self, bound: str) -> float:
+        """Error over bound; 0 for an exact result, infinity for an error with a bound of zero."""
+        if self.error == 0:
+            return 0.0
+        return float(self.error / self.bounds[bound]) if self.bounds[bound] else np.inf
+
+    def violates(self, bound: str) -> bool:
+        """Whether the error exceeds the bound, decided exactly."""
+        return self.error > self.bounds[bound]
+
+
+@dataclass(frozen=True)
+class Tally:
+    """A bound over many trials."""
+
+    bound: str
+    trials: int
+    violations: int
+    largest: float
+    median: float
+    worst: Trial
+
+
+def tally(trials: Sequence[Trial]) -> tuple[Tally, ...]:
+    """Count, for each bound in order of its name's appearance, its violations."""
+    names = list(dict.fromkeys(name for trial in trials for name in trial.bounds))
+    result = []
+    for name in names:
+        having = [trial for trial in trials if name in trial.bounds]
+        ratios = [trial.ratio(name) for trial in having]
+        worst = having[int(np.argmax(ratios))]
+        violations = sum(trial.violates(name) for trial in having)
+        result.append(Tally(name, len(having), violations, max(ratios), float(np.median(ratios)), worst))
+    return tuple(result)
+
+
+# -- one computation beside its bounds ------------------------------------------------------------
+
+
+def sum_trial(x: FloatArray) -> Trial:
+    """Add the (n,) terms from left to right; bounds of section 6."""
+    terms, beta = x.to_fractions(), x.format.unit_roundoff
+    return _trial(
+        (x,),
+        x.sum(),
+        sum(terms, start=Fraction(0)),
+        {
+            "1982 (18)": lambda: theory.printed_sum_bound_1982(terms, beta),
+            "1984 (18)": lambda: theory.printed_sum_bound(terms, beta),
+            "weights": lambda: theory.sum_bound(terms, beta),
+            "strict": lambda: theory.strict_sum_bound(terms, beta),
+        },
+    )
+
+
+def product_trial(x: FloatArray, y: FloatArray) -> Trial:
+    """Multiply the (n,) factors from left to right, then divide by each of the (m,) divisors.
+
+    The error is relative, |Q~/Q|; bounds of section 6.
+    """
+    fmt, n, m = x.format, len(x), len(y)
+    computed = x.prod()
+    for divisor in y:
+        computed = computed / divisor
+    true = Fraction(math.prod(x.to_fractions())) / math.prod(y.to_fractions())
+    beta = fmt.unit_roundoff
+    return _trial(
+        (x, y),
+        computed,
+        true,
+        {
+            "1982 (20)": lambda: theory.product_bound(n, m, beta),
+            "1984 (20)": lambda: theory.printed_product_bound(n, m, beta),
+            "strict": lambda: theory.strict_product_bound(n, m, beta),
+        },
+        error=abs(computed.to_fractions() / true - 1),
+    )
+
+
+def dot_trial(a: FloatArray, b: FloatArray) -> Trial:
+    """Inner product of (n,) and (n,); bounds of section 9.1."""
+    fa, fb, beta = a.to_fractions(), b.to_fractions(), a.format.unit_roundoff
+    return _trial(
+        (a, b),
+        a @ b,
+        sum(fa * fb, start=Fraction(0)),
+        {
+            "(26)": lambda: theory.dot_bound(fa, fb, beta),
+            "strict": lambda: theory.strict_dot_bound(fa, fb, beta),
+        },
+    )
+
+
+def matrix_sum_trial(a: FloatArray, b: FloatArray) -> Trial:
+    """Sum of two matrices; the error is the norm (22) of the error matrix; section 8."""
+    fa, fb, beta = a.to_fractions(), b.to_fractions(), a.format.unit_roundoff
+    return _trial((a, b), a + b, fa + fb, {"(24)": lambda: theory.matrix_sum_bound(fa, fb, beta)})
+
+
+def chain_trial(matrices: Sequence[FloatArray]) -> Trial:
+    """Product of matrices from left to right; the error is the norm (22); section 9.2."""
+    computed = matrices[0]
+    for matrix in matrices[1:]:
+        computed = computed @ matrix
+    values = [matrix.to_fractions() for matrix in matrices]
+    beta = computed.format.unit_roundoff
+    return _trial(
+        tuple(matrices),
+        computed,
+        theory.product(values),
+        {
+            "(31)": lambda: theory.printed_chain_claim(values, beta),
+            "(32)": lambda: theory.chain_bound(values, beta),
+            "strict": lambda: theory.strict_chain_bound(values, beta),
+        },
+    )
+
+
+def example_trial(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Trial:
+    """R = ABC + D, Examples 1 and 2 of section 9.2; the error is the norm (22)."""
+    fa, fb, fc, fd = (matrix.to_fractions() for matrix in (a, b, c, d))
+    beta = a.format.unit_roundoff
+    return _trial(
+        (a, b, c, d),
+        a @ b @ c + d,
+        theory.product([fa, fb, fc]) + fd,
+        {
+            "Examples": lambda: theory.printed_example_bound(fa, fb, fc, fd, beta),
+            "corrected": lambda: theory.example_bound(fa, fb, fc, fd, beta),
+            "strict": lambda: theory.strict_example_bound(fa, fb, fc, fd, beta),
+        },
+    )
+
+
+def _trial(
+    inputs: tuple[FloatArray, ...],
+    computed: FloatArray,
+    true: Any,
+    bounds: Bounds,
+    error: Fraction | None = None,
+) -> Trial:
+    if error is None:
+        difference = computed.to_fractions() - true
+        error = column_sum_norm(difference) if computed.ndim else abs(difference)
+    evaluated = {}
+    for name, bound in bounds.items():
+        try:
+            evaluated[name] = bound()
+        except ValueError:  # gamma: so many roundings in so few digits have no strict bound
+            if name != "strict":
+                raise
+    return Trial(computed.format, inputs, computed, true, error, evaluated)
+
+
+# -- data -----------------------------------------------------------------------------------------
+
+KINDS = ("like signs", "mixed signs", "far exponents", "cancelling")
+
+
+def random_numbers(
+    rng: np.random.Generator, fmt: FloatFormat, shape: tuple[int, ...], kind: str = "mixed signs"
+) -> FloatArray:
+    """Numbers of a format with uniformly distributed significands.
+
+    Parameters
+    ----------
+    kind : "like signs", positive numbers with one exponent; "mixed signs", either sign;
+        "far exponents", either sign and exponents over a range of twice the precision;
+        "cancelling", mixed, and the last along the last axis is minus the rounded sum of the
+        others.
+
+    Raises
+    ------
+    ValueError : another kind, or more than 18 decimal digits of precision.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"got kind {kind!r}; needed one of {', '.join(KINDS)}")
+    limit = fmt.base**fmt.precision
+    if limit > 10**18:
+        raise ValueError(f"got {fmt}; needed significands of at most 18 decimal digits")
+    significands = rng.integers(limit // fmt.base, limit, shape)
+    if kind != "like signs":
+        significands = significands * rng.choice([-1, 1], shape)
+    scale = rng.integers(-fmt.precision, fmt.precision + 1, shape) if kind == "far exponents" else 0
+    base = np.full(shape, Fraction(fmt.base), dtype=object)
+    numbers = fmt.array(significands.astype(object) * base**scale)
+    if kind == "cancelling":
+        head = numbers[..., :-1]
+        last: Any = -head.sum(axis=-1)[..., np.newaxis]
+        return cast(FloatArray, np.concatenate([head, last], axis=-1))
+    return numbers
+
+
+def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
+    """Random trials of one sort over sizes and all :data:`KINDS` of data.
+
+    Parameters
+    ----------
+    trial : "sum", "product", "dot", "matrix sum", "chain" or "example".
+    sizes : numbers of terms, factors, or rows of square matrices.
+    repeats : trials for each size and kind.
+    """
+    if trial not in _DRAWS:
+        raise ValueError(f"got trial {trial!r}; needed one of {', '.join(map(repr, _DRAWS))}")
+    # A product knows no cancellation, and its divisors must not be zero.
+    kinds = KINDS[:3] if trial == "product" else KINDS
+    trials = []
+    for size in sizes:
+        for kind in kinds:
+            new = partial(_new, rng, fmt, kind)
+            trials += [_DRAWS[trial](new, size) for _ in range(repeats)]
+    return trials
+
+
+#: Formats of the surveys: few digits and many, the bases of computers old and new, and base 3.
+SURVEYED = tuple(
+    FloatFormat(base, precision, rounding)
+    for base, precision in ((2, 3), (2, 11), (2, 24), (3, 3), (10, 2), (10, 4), (10, 8), (16, 6))
+    for rounding in Rounding
+)
+
+
+def survey(trial: str, repeats: int = 10, seed: int = 1984) -> list[Trial]:
+    """A :func:`sweep` over all formats of :data:`SURVEYED`."""
+    sizes = (2, 3, 5, 10) if trial in ("sum", "product", "dot") else (1, 2, 3)
+    rng = np.random.default_rng(seed)
+    return [one for fmt in SURVEYED for one in sweep(trial, fmt, sizes, repeats, rng)]
+
+
+def _new(rng: np.random.Generator, fmt: FloatFormat, kind: str, *shape: int) -> FloatArray:
+    return random_numbers(rng, fmt, shape, kind)
+
+
+_DRAWS: dict[str, Callable[[Callable[..., FloatArray], int], Trial]] = {
+    "sum": lambda new, n: sum_trial(new(n)),
+    "product": lambda new, n: product_trial(new(n), new(n // 2)),
+    "dot": lambda new, n: dot_trial(new(n), new(n)),
+    "matrix sum": lambda new, n: matrix_sum_trial(new(n, n), new(n, n)),
+    "chain": lambda new, n: chain_trial([new(n, n) for _ in range(4)]),
+    "example": lambda new, n: example_trial(*(new(n, n) for _ in range(4))),
+}
+
+
+@dataclass(frozen=True)
+class Sawtooth:
+    """Relative errors of rounding single numbers."""
+
+    fmt: FloatFormat
+    x: NDArray[np.float64]
+    error: NDArray[np.float64]
+
+
+def sawtooth(fmt: FloatFormat, points: int) -> Sawtooth:
+    """Round numbers spread evenly over the logarithm from 1 to the square of the base."""
+    x = float(fmt.base) ** np.linspace(0, 2, points, endpoint=False)
+    exact = [Fraction(value) for value in x.tolist()]
+    error = np.array([float(abs(fmt.round(value) - value) / value) for value in exact])
+    return Sawtooth(fmt, x, error)
+
+
+@dataclass(frozen=True)
+class Growth:
+    r"""Errors of sums of n terms in units of :math:`\beta \sum_j |x_j|`, for several n.
+
+    `errors[i]` holds the signed errors of the sums of `lengths[i]` terms, one a repeat. The
+    first-order bound is at most n - 1.
+    """
+
+    fmt: FloatFormat
+    kind: str
+    lengths: tuple[int, ...]
+    errors: NDArray[np.float64]
+
+    def beyond_probabilistic(self, failure: float = 0.01) -> NDArray[np.float64]:
+        """Share of the sums of each length whose error exceeds the √n law."""
+        law = [theory.probabilistic_sum_factor(n, self.fmt.unit_roundoff, failure) for n in self.lengths]
+        limit = np.array(law) / float(self.fmt.unit_roundoff)
+        return np.mean(abs(self.errors) > limit[:, np.newaxis], axis=1)
+
+
+def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rng: np.random.Generator) -> Growth:
+    """Add up ever more terms, from left to right.
+
+    Parameters
+    ----------
+    kind : as in :func:`random_numbers`, or "constant": one random number, n times.
+    """
+    longest = max(lengths)
+    if kind == "constant":
+        once: Any = random_numbers(rng, fmt, (repeats, 1), "like signs")
+        x = cast(FloatArray, np.repeat(once, longest, axis=1))
+    else:
+        x = random_numbers(rng, fmt, (repeats, longest), kind)
+    terms = x.to_fractions()
+    total, exact, size = x[:, 0], terms[:, 0], abs(terms[:, 0])
+    errors = {}
+    for j in range(1, longest):
+        total, exact, size = total + x[:, j], exact + terms[:, j], size + abs(terms[:, j])
+        if j + 1 in lengths:
+            errors[j + 1] = (total.to_fractions() - exact) / (size * fmt.unit_roundoff)
+    ordered = tuple(sorted(errors))
+    return Growth(fmt, kind, ordered, np.array([errors[n] for n in ordered], dtype=np.float64))
+
+
+def cancelling_chains(fmt: FloatFormat, repeats: int, rng: np.random.Generator) -> list[Trial]:
+    """Products, other than zero, of a row and a column of two that cancel more and more digits."""
+    trials = []
+    for digits in np.repeat(np.arange(fmt.precision), repeats):
+        x, y = random_numbers(rng, fmt, (2,), "like signs").to_fractions()
+        nearly = y * (1 + Fraction(1, fmt.base ** int(digits)) * Fraction(rng.uniform(0.3, 1.0)))
+        trials.append(chain_trial([fmt.array([[x, y]]), fmt.array([[nearly], [-x]])]))
+    return [trial for trial in trials if trial.true.item()]
+
+
+# -- the worst case -------------------------------------------------------------------------------
+
+
+def worst_product(fmt: FloatFormat, factors: int) -> Trial:
+    """Find the factors whose product, from left to right, has the largest relative error of all.
+
+    With unbounded exponents only the significand of the partial product matters: dynamic
+    programming over significands looks at every chain.
+
+    Parameters
+    ----------
+    factors : n, at least 2.
+
+    Raises
+    ------
+    ValueError : fewer than 2 factors, or a format of more than 1000 numbers to a power of the base.
+    """
+    if factors < 2:
+        raise ValueError(f"got {factors} factors; needed at least 2")
+    base, t = fmt.base, fmt.precision
+    if base**t - base ** (t - 1) > 1000:
+        raise ValueError(f"got {fmt}; needed at most 1000 numbers from one power of the base on")
+    start = np.arange(base ** (t - 1), base**t)
+    products = np.frompyfunc(lambda i, j: fmt.kernel.multiply(int(i), 0, int(j), 0), 2, 2)
+    significand, exponent = (a.astype(np.int64) for a in products.outer(start, start))
+    log_error = np.log(significand * float(base) ** exponent / np.multiply.outer(start, start))
+    # State 0 is one; the first factor leads to its own significand without error.
+    states = len(start)
+    end = np.concatenate([[np.arange(1, states + 1)], significand - start[0] + 1])
+    log_error = np.concatenate([np.zeros((1, states)), log_error])
+    trials = []
+    for sign in (1, -1):  # errors upwards, errors downwards
+        path = _best_path([sign * log_error] * factors, end)
+        trials.append(product_trial(fmt.array([int(start[i]) for i in path]), fmt.array([])))
+    return max(trials, key=lambda trial: trial.error)
+
+
+def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: bool = False) -> Trial:
+    """Find the terms that bring the error of a sum nearest to its first-order bound, or beyond.
+
+    Looks at every sequence of zeros and of terms ``±m * base**e`` with e in `exponents`, by
+    dynamic programming over partial sums; the ratio of the error to the bound, "weights" or (26),
+    is maximized by Dinkelbach's iteration.
+
+    Parameters
+    ----------
+    terms : n, at least 2.
+    exponents : of the last digit of a term; the more, the slower.
+    products : each term is the rounded product of two numbers, so that the sum is an inner
+        product.
+
+    Raises
+    ------
+    ValueError : fewer than 2 terms; no exponents.
+    """
+    if terms < 2 or not len(exponents):
+        raise ValueError(f"got {terms} terms, {len(exponents)} exponents; needed at least 2 and 1")
+    factors = _terms(fmt, exponents, products)
+    exact = np.array(list(factors), dtype=object)
+    choices = fmt.array(exact)
+    size = abs(exact).astype(np.float64)
+    own_error = (choices.to_fractions() - exact).astype(np.float64)
+    end, error = _sum_table(choices, terms)
+    weights = theory.dot_weights(terms) if products else theory.sum_weights(terms)
+    bound = "(26)" if products else "weights"
+    best: Trial | None = None
+    while True:
+        price = float(fmt.unit_roundoff) * (best.ratio(bound) if best else 0.0)
+        path = _best_path([error + own_error - price * w * size for w in weights], end)
+        pairs = [factors[exact[choice]] for choice in path]
+        if products:
+            trial = dot_trial(*(fmt.array(list(side)) for side in zip(*pairs, strict=True)))
+        else:
+            trial = sum_trial(fmt.array([term for term, _ in pairs]))
+        if best and trial.ratio(bound) <= best.ratio(bound):
+            return best
+        best = trial
+
+
+def _terms(fmt: FloatFormat, exponents: Sequence[int], products: bool) -> dict[Fraction, tuple[Fraction, int]]:
+    """Exact terms and two numbers of the format that each is the product of."""
+    significands = range(fmt.base ** (fmt.precision - 1), fmt.base**fmt.precision)
+    terms: dict[Fraction, tuple[Fraction, int]] = {Fraction(0): (Fraction(0), 0)}
+    for e in exponents:
+        for m in significands:
+            for k in significands if products else [1]:
+                for sign in (1, -1):
+                    x = sign * m * Fraction(fmt.base) ** e
+                    terms.setdefault(x * k, (x, k))
+    return terms
+
+
+def _sum_table(choices: FloatArray, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Where adding each choice to each partial sum leads, and the error of the addition.
+
+    Row 0 is the sum of nothing; rows that only the last addition reaches are left out of the
+    table, being ends.
+    """
+    index = {Fraction(0): 0}
+    ends, errors, fresh = [], [], choices.format.array([0])
+    for _ in range(terms):
+        if not len(fresh):
+            break
+        values = (fresh[:, np.newaxis] + choices).to_fractions()
+        exact = np.add.outer(fresh.to_fractions(), choices.to_fractions())
+        errors.append((values - exact).astype(np.float64))
+        new = list(dict.fromkeys(value for value in values.ravel() if value not in index))
+        index |= {value: i for i, value in enumerate(new, start=len(index))}
+        ends.append(np.frompyfunc(index.__getitem__, 1, 1)(values).astype(np.intp))
+        fresh = choices.format.array(new)
+    return np.concatenate(ends), np.concatenate(errors)
+
+
+def _best_path(rewards: Sequence[NDArray[np.float64]], end: NDArray[np.intp]) -> list[int]:
+    """The choices of largest total reward, from state 0 on.
+
+    From state i, choice j earns ``reward[i, j]`` and leads to state ``end[i, j]``.
+    """
+    states, choices = end.shape
+    target = end.ravel()
+    value = np.full(max(states, end.max() + 1), -np.inf)
+    value[0] = 0.0
+    came_from = []
+    for reward in rewards:
+        candidates = (value[:states, np.newaxis] + reward).ravel()
+        value = np.full(len(value), -np.inf)
+        np.maximum.at(value, target, candidates)
+        winners = np.flatnonzero(candidates == value[target])[::-1]  # of equals, the first
+        origin = np.zeros(len(value), dtype=np.intp)
+        origin[target[winners]] = winners
+        came_from.append(origin)
+    state = int(np.argmax(value))
+    path: list[int] = []
+    for origin in reversed(came_from):
+        state, choice = divmod(int(origin[state]), choices)
+        path.append(choice)
+    return path[::-1]
+
+
+def tie_sum(fmt: FloatFormat, terms: int) -> Trial:
+    r"""Sum 1, β, −β, …, −β, where each addition is a tie that rounds up by β.
+
+    It exceeds the bound of hung1984, ch. II, (18), from 5 terms on, in every precision.
+
+    Raises
+    ------
+    ValueError : an odd base, in which β is no finite number; chopping; fewer than 2 terms.
+    """
+    if fmt.base % 2 or fmt.rounding is not Rounding.NEAREST or terms < 2:
+        raise ValueError(f"got {fmt}, {terms} terms; needed an even base, NEAREST, at least 2 terms")
+    beta = fmt.unit_roundoff
+    return sum_trial(fmt.array([1, beta, *[-beta] * (terms - 2)]))

@@ -1,0 +1,49 @@
+"""Tables for notebooks and the command line: Markdown with math."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that notebooks show as Markdown, math included.
+
+    Parameters
+    ----------
+    title : its short plain-text form.
+    header, body : cells; prose with math between single dollar signs.
+    """
+
+    title: str
+    header: tuple[str, ...]
+    body: tuple[tuple[str, ...], ...]
+
+    def markdown(self) -> str:
+        """Return the table as lines of equally many cells between unescaped pipes."""
+        lines = [map(_cell, self.header), ("---",) * len(self.header), *(map(_cell, row) for row in self.body)]
+        return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
+
+    def _repr_markdown_(self) -> str:
+        return self.markdown()
+
+    def __repr__(self) -> str:
+        return f"<{self.title}>"
+
+
+def one_line(text: str) -> str:
+    """Fold white space, line ends included, into single spaces."""
+    return " ".join(text.split())
+
+
+def _cell(text: str) -> str:
+    r"""Turn `text` into a Markdown cell: prose escaped, and `|` and `\|` within math as `\vert` and `\Vert`."""
+    parts = one_line(text).split("$")
+    parts[::2] = [re.sub(r"([\\`*_{}\[\]<>|~^#&])", r"\\\1", prose) for prose in parts[::2]]
+    parts[1::2] = [re.sub(r"\\\\|\\\||\|", _bar, math) for math in parts[1::2]]
+    return "$".join(parts)
+
+
+def _bar(match: re.Match[str]) -> str:
+    return {"|": r"\vert ", r"\|": r"\Vert "}.get(match[0], match[0])
