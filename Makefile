@@ -1,0 +1,93 @@
+# `make help` lists what there is. All that is made stays inside this checkout.
+.DEFAULT_GOAL := help
+.PHONY: help book test test-pages notebooks lint format bench environment screenshots serve clean
+
+HERE := $(CURDIR)
+PY := .venv/bin/python
+HTML := _build/html
+UV_COMPILE := uv --no-config pip compile pyproject.toml --group book --group test --group pages --group dev \
+	--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: --generate-hashes \
+	--no-emit-index-url --custom-compile-command "make environment" --quiet --output-file environment.txt
+
+# Caches and settings that would else go to the home folder, or come from it and change a result.
+export PIP_CACHE_DIR := $(HERE)/.cache/pip
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export UV_CACHE_DIR := $(HERE)/.cache/uv
+export XDG_CACHE_HOME := $(HERE)/.cache
+export XDG_DATA_HOME := $(HERE)/.cache/data
+export XDG_STATE_HOME := $(HERE)/.cache/state
+export MPLCONFIGDIR := $(HERE)/.cache/matplotlib
+export IPYTHONDIR := $(HERE)/.cache/ipython
+export JUPYTER_CONFIG_DIR := $(HERE)/.cache/jupyter/config
+export JUPYTER_DATA_DIR := $(HERE)/.cache/jupyter/data
+export JUPYTER_RUNTIME_DIR := $(HERE)/.cache/jupyter/runtime
+export JUPYTER_PLATFORM_DIRS := 1
+export JUPYTER_PREFER_ENV_PATH := 1
+export PYTEST_DEBUG_TEMPROOT := $(HERE)/.cache/tmp
+export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
+export NUMBA_CACHE_DIR := $(HERE)/.cache/numba
+export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
+export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
+export PYTHONNOUSERSITE := 1
+unexport PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
+
+# IPython and pytest want theirs to be there.
+_ := $(shell mkdir -p .cache/tmp)
+
+# A moved checkout needs a new .venv: the old one points to the old place.
+ifneq ($(shell cat .venv/made-for 2>/dev/null),$(HERE))
+.PHONY: .venv/made-for
+endif
+
+help: ## list the targets
+	@sed -n 's/^\([a-z][a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{printf "%-20s %s\n", $$1, $$2}'
+
+# The stamp is written last, so that a .venv interrupted half-way is made anew.
+.venv/made-for: environment.txt
+	@scripts/make-venv.sh
+	@printf '%s\n' '$(HERE)' > $@
+
+book: .venv/made-for ## execute every notebook afresh and build the HTML book
+	@rm -rf $(HTML) _build/.doctrees
+	.venv/bin/jupyter-book build . -W -n --keep-going
+	@test -f $(HTML)/index.html || { echo "make book: $(HTML)/index.html was not built" >&2; exit 1; }
+	@printf '\nThe book is ready. Open it in a browser, no network needed:\n  %s\n  file://%s\n' \
+		'$(HTML)/index.html' '$(HERE)/$(HTML)/index.html'
+
+test: .venv/made-for ## unit and property tests, and every notebook against its stored outputs
+	$(PY) -m pytest -n 2 --dist loadfile --nbval --nbval-current-env --nbval-cell-timeout=900 \
+		--ignore=tests/pages tests book
+
+test-pages: .venv/made-for ## the built book in a real Chromium without a network
+	@test -f $(HTML)/index.html || $(MAKE) book
+	$(PY) -m pytest -n 2 tests/pages
+
+notebooks: .venv/made-for ## execute the notebooks in place
+	$(PY) scripts/execute_notebooks.py
+
+lint: .venv/made-for ## ruff and mypy
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+format: .venv/made-for ## let ruff lay out the code and mend what it can
+	$(PY) -m ruff check --fix .
+	$(PY) -m ruff format .
+
+bench: .venv/made-for ## timings against peers, side by side
+	$(PY) -m benchmarks
+
+environment: .venv/made-for ## compile environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
+	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade)
+
+screenshots: .venv/made-for ## pictures of every page: light, dark, phone
+	@test -f $(HTML)/index.html || $(MAKE) book
+	$(PY) -m tests.pages.screenshots
+
+serve: .venv/made-for ## serve the built book on loopback, port 8000
+	@test -f $(HTML)/index.html || $(MAKE) book
+	$(PY) -m http.server --bind 127.0.0.1 --directory $(HTML) 8000
+
+clean: ## remove everything that was made: .venv, .cache, _build
+	rm -rf .venv .cache _build
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,40 @@
+#!/bin/sh
+# Make .venv from environment.txt and install gpbnb into it, editable. Called by make.
+set -eu
+cd "$(dirname "$0")/.."
+
+missing() {
+    echo "gpbnb needs $1" >&2
+    exit 1
+}
+
+command -v git >/dev/null 2>&1 || missing "git, and found none. Install it (Debian, Ubuntu: apt install git) and try again."
+
+# A command that is found need not run: version managers leave shims for versions that are not there.
+python= seen= novenv=
+for candidate in ${PYTHON:+"$PYTHON"} python3 python3.14 python3.13 python3.12 python3.11 python /usr/bin/python3; do
+    version=$("$candidate" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue
+    seen="$seen $candidate ($version)"
+    "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || continue
+    if "$candidate" -c 'import venv, ensurepip' 2>/dev/null; then
+        python=$candidate
+        break
+    fi
+    novenv="$candidate ($version)"
+done
+if [ -z "$python" ]; then
+    [ -z "$novenv" ] || missing "Python's venv and ensurepip modules, which $novenv lacks.
+Install them (Debian, Ubuntu: apt install python3-venv) and try again."
+    [ -z "$seen" ] || missing "Python 3.11 or newer, and found only$seen.
+Install a newer one, or name it: make PYTHON=/path/to/python3"
+    missing "Python 3.11 or newer, and found none.
+Install it (Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3"
+fi
+
+echo "Making .venv with $python ($version). The first time this downloads about 200 MB."
+# pip asks rustc for its version, which makes rustup write into the home folder.
+export RUSTUP_HOME="$PWD/.cache/rustup"
+rm -rf .venv
+"$python" -m venv .venv
+.venv/bin/python -m pip install --quiet --require-hashes --only-binary :all: -r environment.txt
+.venv/bin/python -m pip install --quiet --no-deps --no-build-isolation --no-index -e .
