@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.formats import exact_ratio
+
 
 def exact(values: Any) -> NDArray[Any]:
     """Entries as exact Fractions, in an object array of the same shape.
@@ -26,20 +28,24 @@ def exact(values: Any) -> NDArray[Any]:
     entries: NDArray[Any] = np.asarray(values, dtype=object)
     fractions = np.empty(entries.shape, object)
     for index in np.ndindex(entries.shape):
-        try:
-            entry: Any = entries[index]
-            fractions[index] = Fraction(entry)
-        except (ValueError, OverflowError) as error:
-            raise ValueError(f"got {entry!r}; needed a finite number") from error
+        entry: Any = entries[index]
+        if not isinstance(entry, Fraction):
+            try:
+                p, q, power = exact_ratio(entry)
+            except (TypeError, ValueError) as error:
+                where = f"entry {', '.join(map(str, index))}: " if index else ""
+                raise type(error)(f"{where}{error}") from None
+            entry = Fraction(p, q) * Fraction(10) ** power
+        fractions[index] = entry
     return fractions
 
 
 def max_norm(x: Any) -> Fraction:
     r"""Largest size of an entry of a vector, :math:`\max_j |x_j|`; hung1984, ch. II, (21)."""
-    entries = abs(exact(x))
+    entries = exact(x)
     if entries.ndim != 1:
-        raise ValueError(f"got shape {entries.shape}; needed a vector (n,)")
-    return max(entries, default=Fraction(0))
+        raise ValueError(f"got shape {entries.shape}; needed a vector (n,); take a matrix row by row")
+    return max(abs(entries), default=Fraction(0))
 
 
 def column_sum_norm(a: Any) -> Fraction:
@@ -53,10 +59,10 @@ def row_sum_norm(a: Any) -> Fraction:
 
 
 def _sizes(a: Any) -> NDArray[Any]:
-    entries = abs(exact(a))
+    entries = exact(a)
     if entries.ndim != 2:
-        raise ValueError(f"got shape {entries.shape}; needed a matrix (m, n)")
-    return entries
+        raise ValueError(f"got shape {entries.shape}; needed a matrix (m, n); reshape a vector to (n, 1)")
+    return np.asarray(abs(entries))
 
 
 def gamma(n: int, unit_roundoff: Fraction) -> Fraction:
@@ -97,7 +103,9 @@ def gamma_probabilistic(n: int, unit_roundoff: Fraction, failure: float = 1e-2) 
         \text{failure} = 2\exp\Bigl(-\frac{\lambda^2(1-\beta)^2}{2}\Bigr)
 
     It rests on roundings that are independent with mean zero: a fair model of rounding to nearest
-    of data that have many digits, and wrong for chopping.
+    of data that have many digits, and wrong for chopping. Then :math:`\sum\log(1+\epsilon_i)` is a
+    sum of independent terms of at most :math:`\beta/(1-\beta)` in size, whose mean is at most
+    :math:`n\beta^2/(1-\beta)`; Hoeffding's inequality says how far it strays.
 
     Raises
     ------
@@ -105,12 +113,12 @@ def gamma_probabilistic(n: int, unit_roundoff: Fraction, failure: float = 1e-2) 
 
     References
     ----------
-    Higham & Mary 2019, Theorem 2.4.
+    Higham & Mary 2019.
     """
     u = float(unit_roundoff)
     if not 0 < failure < 1:
-        raise ValueError(f"got failure = {failure}; needed a probability between 0 and 1")
+        raise ValueError(f"got failure = {failure}; needed a probability above 0 and below 1")
     if n < 0 or not 0 <= u < 1:
-        raise ValueError(f"got n = {n}, unit roundoff {u}; needed n >= 0 and 0 <= u < 1")
+        raise ValueError(f"got n = {n}, unit roundoff {u}; needed n >= 0 and 0 <= u < 1; use more digits")
     spread = math.sqrt(2 * math.log(2 / failure)) / (1 - u)
     return math.expm1(spread * math.sqrt(n) * u + n * u * u / (1 - u))

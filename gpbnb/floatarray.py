@@ -130,8 +130,11 @@ class FloatArray:
         return self._moved(lambda a: a[index])
 
     def __setitem__(self, index: Any, value: Any) -> None:
+        self.__delitem__(index)
+
+    def __delitem__(self, index: Any) -> None:
         raise TypeError(
-            "got an assignment to an entry; needed none, a FloatArray does not change; "
+            "got a change of an entry; needed none, a FloatArray does not change; "
             "build a new one with fmt.array, np.where or np.concatenate"
         )
 

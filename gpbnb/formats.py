@@ -202,7 +202,7 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
             raise ValueError(_not_finite(value))
         p = int(Decimal((0, digits, 0)))
         return (-p if sign else p), 1, exponent
-    # Python's and NumPy's floats, those of gmpy2 and mpmath, and whatever else converts exactly
+    # Python's and NumPy's floats, those of gmpy2 and sympy, and whatever else converts exactly
     if hasattr(value, "as_integer_ratio"):
         try:
             p, q = value.as_integer_ratio()

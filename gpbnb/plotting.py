@@ -45,6 +45,7 @@ def figure(columns: int = 1, height: float = 3.6) -> tuple[Figure, NDArray[Any]]
     -------
     figure, axes : `axes` is an array (columns,).
     """
+    plt.draw_if_interactive()  # loads the backend: what it sets inside rc_context would be undone
     with plt.rc_context(_STYLE):
         fig, axes = plt.subplots(1, columns, figsize=(8.0, height), squeeze=False)
     return fig, axes[0]

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gpbnb.formats import FloatFormat
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,12 @@ class Table:
 
     def __repr__(self) -> str:
         return f"<{self.title}>"
+
+
+def digits(fmt: FloatFormat) -> str:
+    """Name the precision of a format, as in "4 decimal digits" or "24 bits"."""
+    unit = {2: "bit", 10: "decimal digit"}.get(fmt.base, f"base-{fmt.base} digit")
+    return f"{fmt.precision} {unit}{'s' if fmt.precision > 1 else ''}"
 
 
 def one_line(text: str) -> str:

@@ -77,7 +77,7 @@ class ExactKernel:
         """Whether ``pair``, just rounded from ``p / q * 10**k``, equals it."""
         m, e = pair
         if m == 0:
-            return p == 0  # no other number rounds to zero
+            return True  # no other number rounds to zero
         if self.base == 10:
             e, k = e - k, 0
         numerator = m * q * self.base ** max(e, 0) * 10 ** max(-k, 0)
@@ -92,8 +92,9 @@ class ExactKernel:
             return m1, e1
         if e1 < e2:
             m1, e1, m2, e2 = m2, e2, m1, e1
-        if e1 - e2 > self.precision + 2:
-            # Far below the last digit only the sign of the smaller operand matters.
+        if e1 - e2 > self.precision + 1:
+            # The smaller operand is below base**-2 units of the last digit, the next number or midpoint at least
+            # 1 / (2 * base) units away, also just below a power of the base: only its sign matters.
             m2, e2 = (1 if m2 > 0 else -1), e1 - 3
         n = m1 * self._power(e1 - e2) + m2
         return self._round_integer(n, e2) if n else ZERO

@@ -88,7 +88,7 @@ def sums() -> Derivation:
             ),
             Step(
                 "weight of the new term $x_{n+1}$",
-                later.subs({N: N + 1, J: N + 1}, simultaneous=True),
+                together(later.subs(N, N + 1) + J, sp.Mul(-1, N + 1, evaluate=False)),
                 sp.Integer(1),
             ),
             Step(
@@ -105,14 +105,28 @@ def sums() -> Derivation:
     )
 
 
-def tie_sum_ratio() -> sp.Expr:
-    r"""Error over the bound (18) of 1984 for the terms 1, β, −β, …, −β (n of them).
+def ties() -> Derivation:
+    r"""Error over the bound (18) of 1984 for n terms 1, β, −β, …, −β.
 
-    Each addition is a tie that rounds up by β, so that the error is (n - 1)β.
+    Each of the n - 1 additions is a tie that rounds up by β. The sum itself, 1 - (n - 3)β, must not
+    be negative.
     """
     total = 1 + BETA - (N - 2) * BETA
-    bound = BETA * ((N - 1) * total + BETA * (N - 1) * (N - 2) / 2)
-    return sp.factor(sp.cancel((N - 1) * BETA / bound))
+    tail = BETA * (N - 1) * (N - 2) / 2
+    return Derivation(
+        (
+            Step(
+                "error $(n-1)\\beta$ over (18), while $s = 1-(n-3)\\beta \\ge 0$; above one from $n = 5$ on",
+                over((N - 1) * BETA, BETA * ((N - 1) * total + tail)),
+                tie_sum_ratio(),
+            ),
+        )
+    )
+
+
+def tie_sum_ratio() -> sp.Expr:
+    """The right side of :func:`ties`."""
+    return 1 / (1 - (N - 4) * BETA / 2)
 
 
 # -- products, (19)-(20), and roundings on top of each other --------------------------------------
@@ -251,7 +265,7 @@ def chain_shortcut() -> sp.Expr:
     Zero for every a, b only if both products carry the same error: (30) is no identity.
     """
     error, products, _ = dot_error(2)
-    shared = sp.Symbol("epsilon'")
+    shared = sp.Symbol(r"{\epsilon'}")
     return sp.factor(sp.expand(error - shared * sum(products)))
 
 

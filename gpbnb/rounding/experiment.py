@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from typing import Any, cast
 
 import numpy as np
@@ -98,6 +98,8 @@ def product_trial(x: FloatArray, y: FloatArray) -> Trial:
     The error is relative, |Q~/Q|; bounds of section 6.
     """
     fmt, n, m = x.format, len(x), len(y)
+    if not n or np.any(x == 0):
+        raise ValueError(f"got the factors {x}; needed at least one, none of them zero: the error is relative")
     computed = x.prod()
     for divisor in y:
         computed = computed / divisor
@@ -259,11 +261,12 @@ SURVEYED = tuple(
 )
 
 
-def survey(trial: str, repeats: int = 10, seed: int = 1984) -> list[Trial]:
+@cache
+def survey(trial: str, repeats: int = 10, seed: int = 1984) -> tuple[Trial, ...]:
     """A :func:`sweep` over all formats of :data:`SURVEYED`."""
     sizes = (2, 3, 5, 10) if trial in ("sum", "product", "dot") else (1, 2, 3)
     rng = np.random.default_rng(seed)
-    return [one for fmt in SURVEYED for one in sweep(trial, fmt, sizes, repeats, rng)]
+    return tuple(one for fmt in SURVEYED for one in sweep(trial, fmt, sizes, repeats, rng))
 
 
 def _new(rng: np.random.Generator, fmt: FloatFormat, kind: str, *shape: int) -> FloatArray:
@@ -324,7 +327,9 @@ def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rn
     ----------
     kind : as in :func:`random_numbers`, or "constant": one random number, n times.
     """
-    longest = max(lengths)
+    longest = max(lengths, default=0)
+    if min(lengths, default=0) < 2 or repeats < 1:
+        raise ValueError(f"got lengths {tuple(lengths)}, {repeats} repeats; needed lengths of at least 2, and 1 repeat")
     if kind == "constant":
         once: Any = random_numbers(rng, fmt, (repeats, 1), "like signs")
         x = cast(FloatArray, np.repeat(once, longest, axis=1))
@@ -493,7 +498,8 @@ def _best_path(rewards: Sequence[NDArray[np.float64]], end: NDArray[np.intp]) ->
 def tie_sum(fmt: FloatFormat, terms: int) -> Trial:
     r"""Sum 1, β, −β, …, −β, where each addition is a tie that rounds up by β.
 
-    It exceeds the bound of hung1984, ch. II, (18), from 5 terms on, in every precision.
+    It exceeds the bound of hung1984, ch. II, (18), from 5 terms on, in every precision, as long as
+    (3n - 8)β < 4: by a factor of nearly 2 where the sum is nearly zero.
 
     Raises
     ------

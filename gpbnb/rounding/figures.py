@@ -9,10 +9,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from gpbnb.bounds import column_sum_norm
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.formats import Rounding
 from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
 from gpbnb.rounding import theory
 from gpbnb.rounding.experiment import Growth, Sawtooth, Trial
+from gpbnb.tables import digits
 
 
 def sawtooth(result: Sawtooth, ax: Axes) -> list[Artist]:
@@ -27,7 +28,7 @@ def sawtooth(result: Sawtooth, ax: Axes) -> list[Artist]:
     ax.set_xscale("log")
     ax.set_ylim(0, 1.55 * beta)
     legend(ax, loc="upper right")
-    label(ax, "number $x$ (no unit)", "relative error (no unit)", f"{fmt.rounding.value}, {_digits(fmt)}")
+    label(ax, "number $x$ (no unit)", "relative error (no unit)", f"{fmt.rounding.value}, {digits(fmt)}")
     return artists
 
 
@@ -36,12 +37,11 @@ def worst_ratios(
 ) -> list[Artist]:
     """Largest error over a first-order bound, against the number of operands, a curve a format."""
     artists: list[Artist] = []
-    colours = (OBSERVED, *OBSERVED_OTHERS)
-    for i, curve in enumerate(curves):
+    for (marker, colour), curve in zip(_looks(len(curves)), curves, strict=True):
         n = [len(trial.inputs[0]) for trial in curve]
         ratio = [trial.ratio(bound) for trial in curve]
-        name = _digits(curve[0].fmt)
-        artists += ax.plot(n, ratio, marker="osD^v"[i], color=colours[i], lw=0.8, label=name)
+        name = digits(curve[0].fmt)
+        artists += ax.plot(n, ratio, marker=marker, color=colour, lw=0.8, label=name)
     artists.append(ax.axhline(1, color=BOUND, label="bound"))
     legend(ax)
     label(ax, f"{operands} $n$", f"worst error / {bound_name} (no unit)")
@@ -51,12 +51,11 @@ def worst_ratios(
 def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
     """Median (points) and largest error (thin lines) of sums of ever more terms, beside both laws."""
     artists: list[Artist] = []
-    colours = (OBSERVED, *OBSERVED_OTHERS)
-    for i, result in enumerate(results):
+    for (marker, colour), result in zip(_looks(len(results)), results, strict=True):
         size, n = np.abs(result.errors), np.array(result.lengths)
         name = f"{result.kind}, {result.fmt.rounding.value}"
-        artists += ax.plot(n, np.median(size, axis=1), "osD^v"[i], color=colours[i], label=name)
-        artists += ax.plot(n, size.max(axis=1), color=colours[i], lw=0.8)
+        artists += ax.plot(n, np.median(size, axis=1), marker, color=colour, label=name)
+        artists += ax.plot(n, size.max(axis=1), color=colour, lw=0.8)
     fmt, n = results[0].fmt, np.array(results[0].lengths)
     beta = fmt.unit_roundoff
     law = [theory.probabilistic_sum_factor(int(k), beta) / float(beta) for k in n]
@@ -85,7 +84,9 @@ def cancellation(trials: Sequence[Trial], ax: Axes) -> list[Artist]:
     return artists
 
 
-def pessimism(groups: Sequence[tuple[str, Sequence[Trial]]], bound: str, ax: Axes) -> list[Artist]:
+def pessimism(
+    groups: Sequence[tuple[str, Sequence[Trial]]], bound: str, ax: Axes, operands: str, bound_name: str
+) -> list[Artist]:
     """Distribution of error over bound for groups of trials, as boxes from quartile to quartile."""
     ratios = [[trial.ratio(bound) for trial in trials] for _, trials in groups]
     boxes = ax.boxplot(
@@ -99,11 +100,13 @@ def pessimism(groups: Sequence[tuple[str, Sequence[Trial]]], bound: str, ax: Axe
     ax.axhline(1, color=BOUND)
     ax.set_yscale("log")
     ax.axhline(0.1, color=REFERENCE, lw=0.6, ls=":")
-    label(ax, "operands $n$", f"error / bound {bound} (no unit)")
+    label(ax, f"{operands} $n$", f"error / {bound_name} (no unit)")
     return [artist for group in boxes.values() for artist in group]
 
 
-def _digits(fmt: FloatFormat) -> str:
-    base, precision = fmt.base, fmt.precision
-    unit = {2: "bit", 10: "decimal digit"}.get(base, f"base-{base} digit")
-    return f"{precision} {unit}{'s' if precision > 1 else ''}"
+def _looks(curves: int) -> list[tuple[str, str]]:
+    """Marker and colour of each of some curves."""
+    looks = list(zip("osD^v", (OBSERVED, *OBSERVED_OTHERS), strict=True))
+    if curves > len(looks):
+        raise ValueError(f"got {curves} curves; needed at most {len(looks)}, or colours repeat; draw two figures")
+    return looks[:curves]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gpbnb.rounding.experiment import Tally, Trial
-from gpbnb.tables import Table
+from gpbnb.bounds import exact
+from gpbnb.floatarray import FloatArray
+from gpbnb.rounding.experiment import Trial
+from gpbnb.rounding.experiment import tally as count
+from gpbnb.tables import Table, digits
 
 
-def tallies(results: Mapping[str, Sequence[Tally]]) -> Table:
+def tallies(trials: Mapping[str, Sequence[Trial]]) -> Table:
     """Violations and ratios of every bound, a line each, by sort of computation."""
     body = [
         (
@@ -19,8 +22,8 @@ def tallies(results: Mapping[str, Sequence[Tally]]) -> Table:
             f"{tally.largest:.3g}",
             f"{tally.median:.3g}",
         )
-        for sort, group in results.items()
-        for tally in group
+        for sort, group in trials.items()
+        for tally in count(group)
     ]
     header = ("computation", "bound", "trials", "violations", "largest error / bound", "median error / bound")
     return Table(f"{len(body)} bounds in random trials", header, tuple(body))
@@ -32,7 +35,7 @@ def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
         (
             name,
             "; ".join(_short(operand) for operand in trial.inputs if operand.size),
-            f"{trial.fmt.precision} digits, base {trial.fmt.base}",
+            digits(trial.fmt),
             _short(trial.computed),
             _number(trial.true),
             *(f"{trial.ratio(bound):.4g}" if bound in trial.bounds else "none" for bound in bounds),
@@ -43,13 +46,12 @@ def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
     return Table(f"{len(body)} worked examples", header, tuple(body))
 
 
-def _short(operand: object) -> str:
-    text = " ".join(str(operand).split())
+def _short(operand: FloatArray) -> str:
+    lines = operand if operand.ndim > 1 else [operand.reshape(-1)]
+    text = "; ".join(", ".join(map(str, line)) for line in lines)
     return text if len(text) <= 60 else f"{text[:40]} … {text[-12:]}"
 
 
 def _number(value: object) -> str:
-    item = getattr(value, "item", None)
-    if item is not None and getattr(value, "size", 0) == 1:
-        value = item()
-    return f"{float(value):.10g}" if not hasattr(value, "shape") else "a matrix"  # type: ignore[arg-type]
+    entries = exact(value)
+    return f"{float(entries.item()):.10g}" if entries.size == 1 else "a matrix"

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -32,20 +33,20 @@ def sum_weights(n: int) -> list[int]:
 
 def printed_sum_bound_1982(x: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`(n-1)\beta\,|s|`, :math:`s = \sum x_j`; hung1982, ch. III, (18)."""
-    terms = exact(x)
+    terms = _vector(x)
     return (len(terms) - 1) * beta * abs(_total(terms))
 
 
 def printed_sum_bound(x: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\beta\,[(n-1)|s| + \sum_{j\ge3}(j-2)|x_j|]`; hung1984, ch. II, (18)."""
-    terms = exact(x)
+    terms = _vector(x)
     tail = sum((j - 2) * abs(terms[j - 1]) for j in range(3, len(terms) + 1))
     return beta * ((len(terms) - 1) * abs(_total(terms)) + tail)
 
 
 def printed_sum_bound_coarse(x: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\beta\,[(n-1)|s| + \tfrac12(n-1)(n-2)\max|x_j|]`; hung1984, ch. II, (18)."""
-    terms = exact(x)
+    terms = _vector(x)
     n = len(terms)
     largest = max(abs(terms), default=Fraction(0))
     return beta * ((n - 1) * abs(_total(terms)) + Fraction((n - 1) * (n - 2), 2) * largest)
@@ -53,7 +54,7 @@ def printed_sum_bound_coarse(x: Any, beta: Fraction) -> Fraction:
 
 def sum_bound(x: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\beta \sum_j w_j |x_j|` with :func:`sum_weights`; to first order."""
-    terms = exact(x)
+    terms = _vector(x)
     return beta * sum(
         (w * abs(term) for w, term in zip(sum_weights(len(terms)), terms, strict=True)),
         start=Fraction(0),
@@ -63,11 +64,14 @@ def sum_bound(x: Any, beta: Fraction) -> Fraction:
 def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\sum_j \gamma_{w_j} |x_j|` with :func:`sum_weights`; to every order.
 
+    The computed sum is :math:`\sum_j x_j \prod (1+\epsilon_i)`, with the roundings that x_j passes
+    through.
+
     References
     ----------
-    Higham 2002, section 4.2.
+    Higham 2002, Lemma 3.1, term by term.
     """
-    terms = exact(x)
+    terms = _vector(x)
     return sum(
         (gamma(w, beta) * abs(term) for w, term in zip(sum_weights(len(terms)), terms, strict=True)),
         start=Fraction(0),
@@ -78,12 +82,18 @@ def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> f
     r"""Bound of the error of a sum of n, as a multiple of :math:`\sum_j |x_j|`, of size √n β.
 
     It fails with at most the probability `failure` if roundings are independent with mean zero:
-    each of the n terms may take its share of it.
+    each of the n terms, of at most n - 1 roundings, may take its share of it.
+
+    Raises
+    ------
+    ValueError : no term; and as :func:`gpbnb.bounds.gamma_probabilistic`.
 
     References
     ----------
-    Higham & Mary 2019, Theorem 2.8.
+    Higham & Mary 2019, for inner products.
     """
+    if n < 1:
+        raise ValueError(f"got a sum of {n} terms; needed at least 1")
     return gamma_probabilistic(n - 1, beta, failure / n)
 
 
@@ -92,17 +102,23 @@ def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> f
 
 def printed_product_bound(n: int, m: int, beta: Fraction) -> Fraction:
     r"""Bound as :math:`(n+m+1)\beta`, n factors over m divisors; hung1984, ch. II, (20)."""
-    return (n + m + 1) * beta
+    return (_operations(n, m) + 2) * beta
 
 
 def product_bound(n: int, m: int, beta: Fraction) -> Fraction:
     r"""Bound as :math:`(n+m-1)\beta`, to first order; hung1982, ch. III, (20)."""
-    return (n + m - 1) * beta
+    return _operations(n, m) * beta
 
 
 def strict_product_bound(n: int, m: int, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\gamma_{n+m-1}`, to every order; Higham 2002, Lemma 3.1."""
-    return gamma(n + m - 1, beta)
+    return gamma(_operations(n, m), beta)
+
+
+def _operations(n: int, m: int) -> int:
+    if n < 1 or m < 0:
+        raise ValueError(f"got {n} factors and {m} divisors; needed at least 1 and 0; write 1/y with the factor 1")
+    return n + m - 1
 
 
 # -- inner and matrix products --------------------------------------------------------------------
@@ -118,13 +134,13 @@ def dot_weights(n: int) -> list[int]:
 
 def dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\beta\{n|a_1b_1| + \sum_{j\ge2}(n+2-j)|a_jb_j|\}`; hung1984, ch. II, (26)."""
-    products = abs(exact(a) * exact(b))
+    products = abs(_products(a, b))
     return beta * sum((w * p for w, p in zip(dot_weights(len(products)), products, strict=True)), start=Fraction(0))
 
 
 def strict_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\gamma_n |a|^T|b|`, to every order; Higham 2002, (3.5)."""
-    products = abs(exact(a) * exact(b))
+    products = abs(_products(a, b))
     return gamma(len(products), beta) * _total(products)
 
 
@@ -134,13 +150,14 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     .. math:: \frac{|\tilde I|}{|I|} \le
         \gamma_n \frac{|a|^T|b|}{|a^Tb|}
 
-    The quotient is the condition number of the inner product.
+    The quotient is the condition number of the inner product: how much larger its relative change
+    may be than those of the entries of one of the vectors.
 
     Raises
     ------
     ZeroDivisionError : the inner product is zero, so that it has no relative error.
     """
-    value = abs(_total(exact(a) * exact(b)))
+    value = abs(_total(_products(a, b)))
     if value == 0:
         raise ZeroDivisionError("got an inner product of zero; needed another; use strict_dot_bound")
     return strict_dot_bound(a, b, beta) / value
@@ -148,8 +165,9 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 
 def matmul_entry_bounds(a: Any, b: Any, beta: Fraction) -> NDArray[Any]:
     r"""Bound of each entry, :math:`[\tilde C] \le \beta [A] D [B]`; hung1982, ch. III, (27)."""
-    weights = np.array(dot_weights(exact(a).shape[1]), dtype=object)
-    return beta * ((abs(exact(a)) * weights) @ abs(exact(b)))
+    weights = np.array(dot_weights(interfaces([a, b])[0]), dtype=object)
+    bounds: NDArray[Any] = beta * ((abs(exact(a)) * weights) @ abs(exact(b)))
+    return bounds
 
 
 def chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
@@ -162,7 +180,11 @@ def chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
 
 
 def strict_chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
-    r"""Bound as :math:`\gamma_{\sum d_i} \prod\|M_j\|`; to every order."""
+    r"""Bound as :math:`\gamma_{\sum d_i} \prod\|M_j\|`; to every order.
+
+    An entry of the product is a sum over paths, one entry of each factor; each passes through at
+    most :math:`\sum d_i` roundings.
+    """
     return gamma(sum(interfaces(matrices)), beta) * _norm_product(matrices)
 
 
@@ -186,24 +208,25 @@ def printed_example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fra
     hung1984, ch. II, section 9.2, Examples 1 and 2.
     """
     abc = product([a, b, c])
+    _sum(abc, d)
     return beta * ((1 + sum(interfaces([a, b, c]))) * column_sum_norm(abc) + column_sum_norm(d))
 
 
 def example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fraction:
     r"""The same corrected, :math:`\beta[(m+r)\|A\|\|B\|\|C\| + \|ABC + D\|]`; to first order."""
-    result = product([a, b, c]) + exact(d)
+    result = _sum(product([a, b, c]), d)
     return chain_bound([a, b, c], beta) + beta * column_sum_norm(result)
 
 
 def strict_example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fraction:
     r"""To every order, :math:`(1+\beta)\gamma_{m+r}\|A\|\|B\|\|C\| + \beta\|ABC + D\|`."""
-    result = product([a, b, c]) + exact(d)
+    result = _sum(product([a, b, c]), d)
     return (1 + beta) * strict_chain_bound([a, b, c], beta) + beta * column_sum_norm(result)
 
 
 def matrix_sum_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\beta\|A+B\|`, to every order; hung1984, ch. II, (24)."""
-    return beta * column_sum_norm(exact(a) + exact(b))
+    return beta * column_sum_norm(_sum(a, b))
 
 
 # -- exact values ---------------------------------------------------------------------------------
@@ -211,6 +234,7 @@ def matrix_sum_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 
 def product(matrices: Sequence[Any]) -> NDArray[Any]:
     """The exact product of matrices."""
+    interfaces(matrices)
     result = exact(matrices[0])
     for matrix in matrices[1:]:
         result = result @ exact(matrix)
@@ -218,8 +242,20 @@ def product(matrices: Sequence[Any]) -> NDArray[Any]:
 
 
 def interfaces(matrices: Sequence[Any]) -> list[int]:
-    """Interface dimensions d_1 ... d_{N-1} of a product of N matrices; hung1984, ch. II, (29)."""
-    return [np.shape(matrix)[1] for matrix in matrices[:-1]]
+    """Interface dimensions d_1 ... d_{N-1} of a product of N matrices; hung1984, ch. II, (29).
+
+    Raises
+    ------
+    ValueError : no matrix, something else than a matrix, or rows that do not fit the columns before.
+    """
+    shapes = [np.shape(matrix) for matrix in matrices]
+    fit = all(len(shape) == 2 for shape in shapes) and all(p[1] == q[0] for p, q in pairwise(shapes))
+    if not shapes or not fit:
+        raise ValueError(
+            f"got shapes {', '.join(map(str, shapes)) or 'none'}; needed matrices, each with as many rows as the one "
+            "before has columns; transpose or reshape"
+        )
+    return [columns for _, columns in shapes[:-1]]
 
 
 def _norm_product(matrices: Sequence[Any]) -> Fraction:
@@ -227,6 +263,27 @@ def _norm_product(matrices: Sequence[Any]) -> Fraction:
     for matrix in matrices:
         result *= column_sum_norm(matrix)
     return result
+
+
+def _vector(x: Any) -> NDArray[Any]:
+    terms = exact(x)
+    if terms.ndim != 1:
+        raise ValueError(f"got terms of shape {terms.shape}; needed a vector (n,); sum a matrix row by row")
+    return terms
+
+
+def _products(a: Any, b: Any) -> NDArray[Any]:
+    left, right = _vector(a), _vector(b)
+    if len(left) != len(right):
+        raise ValueError(f"got vectors of {len(left)} and {len(right)}; needed equal lengths")
+    return np.asarray(left * right)
+
+
+def _sum(a: Any, b: Any) -> NDArray[Any]:
+    left, right = exact(a), exact(b)
+    if left.shape != right.shape:
+        raise ValueError(f"got a sum of shapes {left.shape} and {right.shape}; needed equal shapes")
+    return np.asarray(left + right)
 
 
 def _total(terms: NDArray[Any]) -> Fraction:

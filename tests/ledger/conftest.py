@@ -1,0 +1,38 @@
+"""Topics made up for the tests, as modules that can be imported by name."""
+
+import re
+import textwrap
+
+import pytest
+
+CHECKED = ("hung1984.I.two-tasks", "hung1984.I.1-f-study")
+
+
+@pytest.fixture
+def topic(tmp_path, monkeypatch):
+    """Return a function that makes an importable module with the given checks and returns its name."""
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def make(name, body):
+        source = "from gpbnb.findings import Checks, Verdict, answer, compare, unverifiable\n\nCHECKS = Checks()\n\n"
+        (tmp_path / f"{name}.py").write_text(source + textwrap.dedent(body), encoding="utf-8")
+        return name
+
+    return make
+
+
+@pytest.fixture
+def complete(topic, request):
+    """A topic that checks all of hung1984, I."""
+    name = re.sub(r"\W", "_", request.node.name)
+    return topic(
+        f"complete_{name}",
+        f"""
+        CALLS = []
+
+        @CHECKS.add("{CHECKED[0]}", "{CHECKED[1]}")
+        def both():
+            CALLS.append(1)
+            return compare(False, "$|a|$, not \\"b\\"", Verdict.TYPO, "line one\\nline two")
+        """,
+    )

@@ -1,0 +1,172 @@
+"""The ledger written out: CSV, JSON, text, and Markdown that renders."""
+
+import csv
+import io
+import itertools
+import json
+import re
+
+import pytest
+from markdown_it import MarkdownIt
+from mdit_py_plugins.dollarmath import dollarmath_plugin
+
+from gpbnb.findings import Verdict, answer, compare, unverifiable
+from gpbnb.ledger import Row, load_inventory, summary_table, table
+from gpbnb.ledger.inventory import Entry
+from gpbnb.ledger.render import to_csv, to_json, to_markdown, to_text
+
+ENTRY = Entry("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
+FINDINGS = {
+    "typo": compare(False, r"$(n+m-1)\beta$", Verdict.TYPO, 'one "sign", \nas |(20)| of 1982'),
+    "verified": compare(True, "yes"),
+    "unverifiable": unverifiable("", "no data"),
+    "answered": answer(True, "done", "here"),
+}
+ROWS = (*(Row(ENTRY, finding) for finding in FINDINGS.values()), Row(ENTRY, None), Row(ENTRY, None, ValueError("x")))
+EVERYTHING = tuple(Row(entry, FINDINGS["typo"]) for entry in load_inventory())
+
+
+def test_csv_is_rfc_4180_with_the_columns_of_the_contract():
+    text = to_csv(ROWS)
+    assert text.startswith("id,document,kind,printed,recomputed,agrees,verdict,note\r\n")
+    assert text.endswith("\r\n")
+    assert text.split("\r\n")[1] == (
+        r"hung1984.II.eq20,hung1984,equation,$|\tilde Q/Q|\le(n+m+1)\beta$,$(n+m-1)\beta$,false,typo,"
+        '"one ""sign"", \nas |(20)| of 1982"'
+    )
+    records = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
+    assert [record["agrees"] for record in records] == ["false", "true", "", "true", "", ""]
+    assert [record["verdict"] for record in records] == [*FINDINGS, "", ""]
+    assert [record["note"] for record in records] == [*(f.note for f in FINDINGS.values()), "", ""]
+    assert {record["printed"] for record in records} == {ENTRY.printed}
+
+
+def test_json_says_the_same():
+    records = json.loads(to_json(ROWS))
+    assert [record["agrees"] for record in records] == [False, True, None, True, None, None]
+    assert [record["verdict"] for record in records] == [*FINDINGS, None, None]
+    assert records[0] == {
+        "id": ENTRY.id,
+        "document": "hung1984",
+        "kind": "equation",
+        "printed": ENTRY.printed,
+        "recomputed": r"$(n+m-1)\beta$",
+        "agrees": False,
+        "verdict": "typo",
+        "note": FINDINGS["typo"].note,
+    }
+    assert json.loads(to_json(())) == []
+
+
+def test_text_is_a_line_an_entry():
+    assert to_text(ROWS).splitlines() == [
+        r'typo          hung1984.II.eq20  $(n+m-1)\beta$  one "sign", as |(20)| of 1982',
+        "verified      hung1984.II.eq20  yes",
+        "unverifiable  hung1984.II.eq20  no data",
+        "answered      hung1984.II.eq20  done  here",
+        "no check      hung1984.II.eq20",
+        "check failed  hung1984.II.eq20",
+    ]
+
+
+def cells(line):
+    return re.split(r"(?<!\\)\|", line)[1:-1]
+
+
+def rendered(markdown):
+    """Return the cells of the one table in `markdown`, each as (math texts, prose text)."""
+    tokens = MarkdownIt("commonmark").enable("table").enable("strikethrough").use(dollarmath_plugin).parse(markdown)
+    assert [token.type for token in tokens if token.level == 0] == ["table_open", "table_close"]
+    found = []
+    for before, token in itertools.pairwise(tokens):
+        if before.type == "tr_open":
+            found.append([])
+        if token.type == "inline":
+            assert {child.type for child in token.children} <= {"text", "text_special", "math_inline"}
+            math = [child.content for child in token.children if child.type == "math_inline"]
+            found[-1].append((math, "".join(child.content for child in token.children if child.type != "math_inline")))
+    return found
+
+
+def test_a_table_renders_with_its_math_and_prose_unharmed():
+    head, *body = rendered(table(ROWS).markdown())
+    assert [prose for _, prose in head] == ["Item", "Printed", "Recomputed", "Verdict", "Note"]
+    printed = ([r"\vert \tilde Q/Q\vert \le(n+m+1)\beta"], "")
+    assert body[0] == [
+        ([], "hung1984, II.6: eq (20)"),
+        printed,
+        ([r"(n+m-1)\beta"], ""),
+        ([], "typo"),
+        ([], 'one "sign", as |(20)| of 1982'),
+    ]
+    assert [row[3][1] for row in body] == [*FINDINGS, "no check", "check failed"]
+    assert body[4][1:] == [printed, ([], ""), ([], "no check"), ([], "")]
+
+
+@pytest.mark.parametrize(
+    ("math", "safe"),
+    [
+        (r"|a|", r"\vert a\vert"),
+        (r"\|A\|_1", r"\Vert A\Vert _1"),
+        (r"|a_1||b_1|", r"\vert a_1\vert \vert b_1\vert"),
+        (r"a\\|b|", r"a\\\vert b\vert"),
+        (r"\left|x\right|", r"\left\vert x\right\vert"),
+        (r"\beta\{n|a|\}", r"\beta\{n\vert a\vert \}"),
+    ],
+)
+def test_bars_within_math(math, safe):
+    entry = Entry(**{**vars(ENTRY), "printed": f"${math}$"})
+    _, body = rendered(table([Row(entry, None)]).markdown())
+    assert [found.strip() for found in body[1][0]] == [safe]
+
+
+@pytest.mark.parametrize(
+    "prose", ["a*b*c", "u_j_k", "A~, b~_j ~~x~~", "[1] `x` <y> <https://z>", r"a\b", "#1 {x} |y| &lt;"]
+)
+def test_prose_is_not_markup(prose):
+    entry = Entry(**{**vars(ENTRY), "item": prose, "printed": f"{prose} $x$ {prose}"})
+    _, body = rendered(table([Row(entry, None)]).markdown())
+    assert body[0] == ([], f"hung1984, II.6: {prose}")
+    assert body[1] == (["x"], f"{prose}  {prose}")
+
+
+def test_the_whole_inventory_makes_a_sound_table():
+    markdown = table(EVERYTHING).markdown()
+    lines = markdown.split("\n")
+    assert len(lines) == len(EVERYTHING) + 2
+    assert {len(cells(line)) for line in lines} == {5}
+    _, *body = rendered(markdown)
+    printed = {(row.entry.id, row.entry.printed) for row in EVERYTHING}
+    assert len(body) == len(printed)
+    prose = sorted("".join(text.split("$")[::2]) for _, text in printed)
+    assert sorted(row[1][1] for row in body) == prose
+    assert sum(len(row[1][0]) for row in body) == sum(text.count("$") // 2 for _, text in printed)
+    assert not any("|" in math for row in body for math in row[1][0])
+
+
+def test_rows_may_be_an_iterator():
+    assert table(iter(ROWS)) == table(ROWS)
+    assert summary_table(iter(ROWS)) == summary_table(ROWS)
+
+
+def test_representations_are_short_and_stable():
+    title = "Ledger of 6 entries: 1 verified, 1 typo, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
+    assert repr(table(ROWS)) == f"<{title}>"
+    assert repr(summary_table(ROWS)) == f"<{title}; by section>"
+    assert repr(table(())) == "<Ledger of 0 entries: none>"
+    assert table(ROWS)._repr_markdown_() == table(ROWS).markdown() == to_markdown(ROWS)[:-1]
+
+
+def test_summary_table():
+    far = Row(Entry(**{**vars(ENTRY), "section": "9.2"}), FINDINGS["verified"])
+    apart = Row(Entry("savage2016.main.eq1", "savage2016", "-", "analysis", "eq (1)", "equation", "$a$"), None)
+    plain = Row(Entry("hung1984.I.x", "hung1984", "I", "-", "x", "claim", "a"), None)
+    found = [[prose for _, prose in row] for row in rendered(summary_table((*ROWS[:2], far, apart, plain)).markdown())]
+    assert found == [
+        ["Document", "Section", "verified", "typo", "no check", "entries"],
+        ["hung1984", "II.6", "1", "1", "0", "2"],
+        ["hung1984", "II.9.2", "1", "0", "0", "1"],
+        ["hung1984", "I", "0", "0", "1", "1"],
+        ["savage2016", "analysis", "0", "0", "1", "1"],
+        ["all", "", "2", "1", "2", "5"],
+    ]

@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+
+from . import browser as tools
+
+
+@pytest.fixture(scope="session")
+def open_page():
+    """Open a page of the book and wait for its formulas, if it does not lead elsewhere; `page.faults` collects."""
+    with tools.serve() as base, tools.launch() as browser:
+
+        @contextmanager
+        def open_page(address, size="desktop"):
+            context = browser.new_context(viewport=tools.SIZES[size], reduced_motion="reduce")
+            page = context.new_page()
+            page.faults = faults = []
+            page.on("console", lambda m: faults.append(f"console: {m.text}") if m.type == "error" else None)
+            page.on("pageerror", lambda error: faults.append(f"script: {error}"))
+            page.on("request", lambda r: None if r.url.startswith((base, "data:", "blob:")) else faults.append(r.url))
+            page.on("requestfailed", lambda r: faults.append(f"failed: {r.url} {r.failure}"))
+            page.on("response", lambda r: faults.append(f"{r.status}: {r.url}") if r.status >= 400 else None)
+            page.goto(base + address, wait_until="load")
+            if address:
+                page.evaluate(tools.SETTLED)
+            yield page
+            context.close()
+
+        yield open_page
+
+
+# One page is opened at a time, and serves all tests of it.
+@pytest.fixture(scope="module", params=[(a, s) for a in tools.pages() for s in tools.SIZES], ids="-".join)
+def page(request, open_page):
+    with open_page(*request.param) as page:
+        yield page
+
+
+@pytest.fixture(scope="session")
+def axe():
+    return Axe()

@@ -1,0 +1,134 @@
+"""Every page of the built book in a real browser without a network."""
+
+from __future__ import annotations
+
+from html.parser import HTMLParser
+from urllib.parse import unquote, urljoin, urlsplit
+
+import pytest
+
+from . import browser as tools
+
+PAGES = tools.pages()
+
+
+def test_loads_from_this_machine_alone(page):
+    assert page.faults == []
+    assert page.title().strip()
+
+
+def test_every_formula_is_rendered(page):
+    raw = page.locator(".math").evaluate_all(
+        "all => all.filter(e => !e.querySelector('mjx-container')).map(e => e.textContent)"
+    )
+    assert raw == []
+    assert page.locator("mjx-merror, [data-mjx-error]").all_text_contents() == []
+
+
+def test_no_formula_or_table_is_left_as_typed(page):
+    """An output that is not parsed as MyST shows its dollars and bars; code is meant to."""
+    text = page.locator("article").first.evaluate(
+        "e => { e = e.cloneNode(true); e.querySelectorAll('pre, code, dt, mjx-container').forEach(x => x.remove());"
+        " return e.textContent }"
+    )
+    assert [line for line in text.splitlines() if "$" in line or "| --" in line or "| —" in line] == []
+
+
+def test_every_picture_loads_and_has_alt_text(page):
+    page.evaluate("document.querySelectorAll('img').forEach(i => i.loading = 'eager')")
+    page.wait_for_function("[...document.images].every(i => i.complete)")
+    pictures = page.locator("article img").evaluate_all(
+        "all => all.map(i => ({src: i.src, alt: i.alt.trim(), width: i.naturalWidth}))"
+    )
+    # The name of the file is what Sphinx puts where an author gave no text.
+    poor = [p for p in pictures if not p["alt"] or not p["width"] or p["alt"].endswith((".png", ".svg", ".jpg"))]
+    assert poor == []
+
+
+def test_never_scrolls_sideways(page):
+    page.evaluate("window.scrollTo(1000, 0)")
+    assert page.evaluate("[document.documentElement.scrollWidth, window.scrollX]") == [page.viewport_size["width"], 0]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_violation(page, axe, scheme):
+    page.emulate_media(color_scheme=scheme)
+    page.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")
+    found = axe.run(page).response["violations"]
+    assert [f"{v['id']}: {node['target']} {node['html'][:160]}" for v in found for node in v["nodes"]] == []
+
+
+def test_index_leads_to_the_first_page(open_page):
+    with open_page("") as page:
+        page.wait_for_url("**/book/index.html")
+        assert page.locator("article h1").count() == 1
+
+
+def test_the_colour_mode_can_be_chosen(open_page):
+    with open_page("book/index.html") as page:
+        seen = set()
+        for _ in range(3):
+            page.locator(".theme-switch-button").first.click()
+            seen.add(page.locator("html").get_attribute("data-mode"))
+        assert seen == {"light", "dark", "auto"}
+        assert page.faults == []
+
+
+def test_search_finds_a_word(open_page):
+    with open_page("search.html?q=rounding") as page:
+        first = page.locator("#search-results li a").first
+        first.wait_for(timeout=10_000)
+        first.click()
+        page.wait_for_load_state("load")
+        assert "search.html" not in page.url
+        assert "rounding" in page.locator("main").inner_text().lower()
+        assert page.faults == []
+
+
+def test_the_search_button_leads_to_results(open_page):
+    with open_page("book/index.html") as page:
+        page.keyboard.press("Control+k")
+        page.keyboard.type("precision")
+        page.keyboard.press("Enter")
+        page.wait_for_url("**/search.html?q=precision*")
+        page.locator("#search-results li a").first.wait_for(timeout=10_000)
+        assert page.faults == []
+
+
+class Anchors(HTMLParser):
+    """Collects the addresses a page points to, and the names that can be pointed at."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.links: set[str] = set()
+        self.names: set[str] = {"", "top"}
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        self.names |= {values[k] for k in ("id", "name") if values.get(k)}
+        self.links |= {values[k] for k in ("href", "src") if values.get(k)}
+
+
+def test_every_link_within_the_book_leads_somewhere():
+    anchors = {a: Anchors((tools.HTML / a).read_text(encoding="utf-8")) for a in ["index.html", *PAGES]}
+    dead = []
+    for address, page in anchors.items():
+        for link in page.links:
+            parts = urlsplit(urljoin(f"book://book/{address}", link))
+            if parts.scheme != "book":
+                continue
+            target = unquote(parts.path).lstrip("/")
+            if not (tools.HTML / target).is_file() or (
+                target in anchors and unquote(parts.fragment) not in anchors[target].names
+            ):
+                dead.append(f"{address}: {link}")
+    assert dead == []
+
+
+@pytest.mark.parametrize("address", PAGES)
+def test_no_page_names_a_host_for_scripts(address):
+    """What a browser would only load when asked to is seen in the page's text."""
+    text = (tools.HTML / address).read_text(encoding="utf-8")
+    for host in ("unpkg.com", "jsdelivr.net", "cdnjs", "googleapis.com", "gstatic.com"):
+        assert host not in text

@@ -1,0 +1,158 @@
+"""gpbnb.rounding.derivation: every step holds, for general n, and means what the numbers do."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+
+import pytest
+import sympy as sp
+
+from gpbnb.derivation import Derivation, first_order
+from gpbnb.rounding import derivation, theory
+
+DERIVATIONS = {
+    function.__name__: function()
+    for function in (
+        derivation.one_rounding,
+        derivation.sums,
+        derivation.ties,
+        derivation.roundings,
+        derivation.dots,
+        derivation.chains,
+        derivation.examples,
+    )
+}
+STEPS = [(name, i) for name, steps in DERIVATIONS.items() for i in range(len(steps.steps))]
+each_step = pytest.mark.parametrize(("name", "i"), STEPS)
+
+
+@each_step
+def test_the_step_holds(name, i):
+    step = DERIVATIONS[name].steps[i]
+    assert step.holds
+    assert step.name
+
+
+def test_the_derivations_hold():
+    assert all(steps.holds for steps in DERIVATIONS.values())
+    assert sum(len(steps.steps) for steps in DERIVATIONS.values()) == 23
+
+
+@each_step
+def test_a_wrong_step_would_be_found_out(name, i):
+    steps = DERIVATIONS[name].steps
+    for wrong in (
+        replace(steps[i], right=steps[i].right + derivation.BETA),
+        replace(steps[i], right=2 * steps[i].right),
+        replace(steps[i], rest=steps[i].rest + 1),
+        replace(steps[i], right=steps[i].right + derivation.BETA, rest=steps[i].rest - derivation.BETA),
+    ):
+        assert not wrong.holds
+        assert not Derivation((*steps[:i], wrong, *steps[i + 1 :])).holds
+
+
+@each_step
+def test_the_step_is_typeset(name, i):
+    latex = DERIVATIONS[name].steps[i].latex()
+    assert r"\;=\;" in latex
+    assert not re.search(r"[-+]\s*-|--|\bnan\b|None|\?", latex)
+    assert latex.count("{") == latex.count("}")
+    assert latex.count(r"\left") == latex.count(r"\right")
+    assert "$" not in latex
+
+
+@each_step
+def test_the_sides_are_not_the_same_to_look_at(name, i):
+    """A step whose two sides are printed alike shows nothing."""
+    left, right = DERIVATIONS[name].steps[i].latex().split(r"\;=\;")
+    assert left.strip() != right.strip()
+
+
+@pytest.mark.parametrize("n", range(1, 7))
+def test_errors_of_sums_have_the_weights_of_theory(n):
+    error, x, eps = derivation.sum_error(n)
+    assert len(eps) == n - 1
+    assert [derivation.roundings_of(error, term, eps) for term in x] == theory.sum_weights(n)
+    assert sp.expand(error - derivation.printed_sum_error(n)) == 0
+
+
+def test_the_four_term_sum_is_computed_as_printed():
+    total, (x1, x2, x3, x4), (e1, e2, e3) = derivation.rounded_sum(4)
+    printed = (((x1 + x2) * (1 + e1) + x3) * (1 + e2) + x4) * (1 + e3)
+    assert sp.expand(total - printed) == 0
+    linear = (x1 + x2) * (e1 + e2 + e3) + x3 * (e2 + e3) + x4 * e3
+    assert sp.expand(derivation.sum_error(4)[0] - linear) == 0
+    last = (x1 + x2 + x3 + x4) * (e1 + e2 + e3) - x3 * e1 - x4 * (e1 + e2)
+    assert sp.expand(derivation.printed_sum_error(4) - last) == 0
+
+
+def test_1982_has_no_form_of_the_sum_error():
+    """s (ε1 + ε2 + ε3) alone, behind (18) of 1982, is not the error."""
+    error, x, eps = derivation.sum_error(4)
+    left_out = sp.expand(error - sum(x) * sum(eps))
+    assert left_out == sp.expand(-x[2] * eps[0] - x[3] * (eps[0] + eps[1]))
+
+
+@pytest.mark.parametrize("n", range(1, 7))
+def test_errors_of_inner_products_have_the_weights_of_theory(n):
+    error, products, eps = derivation.dot_error(n)
+    assert len(eps) == 2 * n - 1
+    assert [derivation.roundings_of(error, product, eps) for product in products] == theory.dot_weights(n)
+
+
+def test_the_three_term_inner_product_is_as_printed_in_1984_and_not_in_1982():
+    error, (p1, p2, p3), (e1, e2, e3, e4, e5) = derivation.dot_error(3)
+    printed = p1 * (e1 + e3 + e5) + p2 * (e2 + e3 + e5) + p3 * (e4 + e5)
+    assert sp.expand(error - printed) == 0
+    assert sp.expand(error - printed - p2) != 0
+
+
+@pytest.mark.parametrize("n", range(1, 5))
+@pytest.mark.parametrize("m", range(4))
+def test_products_and_quotients_have_as_many_roundings_as_operations(n, m):
+    error, eps = derivation.quotient_error(n, m)
+    assert error == sum(eps)
+    assert len(set(eps)) == n + m - 1
+    count = derivation.product_operations().subs({derivation.N: n, derivation.M: m})
+    assert len(eps) == count == theory.product_bound(n, m, Fraction(1))
+    assert len(eps) != theory.printed_product_bound(n, m, Fraction(1))
+
+
+def test_the_error_of_a_product_is_no_multiple_of_the_product():
+    leftover = derivation.chain_shortcut()
+    assert leftover != 0
+    (shared,) = (s for s in leftover.free_symbols if "'" in s.name)
+    e1, e2, e3 = sp.symbols("epsilon_1:4")
+    # Zero for every a and b only if both products carry the same error.
+    assert sp.expand(leftover.subs(shared, e1 + e3).subs(e2, e1)) == 0
+    assert sp.expand(leftover.subs(shared, e1 + e3)) != 0
+
+
+def test_the_sum_of_ties_exceeds_18_from_five_terms_on():
+    ratio, n, beta = derivation.tie_sum_ratio(), derivation.N, derivation.BETA
+    assert sp.simplify(ratio.subs(n, 4)) == 1
+    for count in (2, 3):
+        assert sp.simplify(1 - ratio.subs(n, count)).subs(beta, sp.Rational(1, 8)) > 0
+    for count in (5, 6, 100):
+        assert sp.simplify(ratio.subs(n, count) - 1).subs(beta, sp.Rational(1, 2000)) > 0
+
+
+def test_one_rounding_at_numbers():
+    """The last step of (8) is β/(1+β), with β of format and base."""
+    step = DERIVATIONS["one_rounding"].steps[-1]
+    b, t, e = (next(s for s in step.left.free_symbols if s.name == name) for name in "bte")
+    for base, precision, exponent in ((10, 4, 3), (2, 1, 0), (16, 6, -2)):
+        beta = sp.Rational(1, 2) * sp.Integer(base) ** (1 - precision)
+        value = step.left.subs({b: base, t: precision, e: exponent}).doit()
+        assert sp.simplify(value - beta / (1 + beta)) == 0
+
+
+@pytest.mark.parametrize("k", range(1, 8))
+def test_roundings_on_top_of_each_other_at_numbers(k):
+    """The second-order excess of k errors of β/(1+β) over kβ is k(k-3)/2."""
+    beta = sp.Symbol("beta", positive=True)
+    series = sp.series((1 + beta / (1 + beta)) ** k - 1 - k * beta, beta, 0, 3).removeO()
+    assert series.coeff(beta, 2) == sp.Rational(k * (k - 3), 2)
+    assert first_order((1 + beta) ** k, (beta,)) == k * beta

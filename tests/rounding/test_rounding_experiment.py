@@ -1,0 +1,387 @@
+"""gpbnb.rounding.experiment: what is computed, beside what oracles compute, and beside its bounds."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import oracles
+import pytest
+import sympy as sp
+
+from gpbnb.bounds import column_sum_norm
+from gpbnb.floatarray import FloatArray
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rounding import derivation, experiment, theory
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FOUR = FloatFormat(10, 4)
+SORTS = ("sum", "product", "dot", "matrix sum", "chain", "example")
+
+
+def arithmetic(fmt: FloatFormat) -> oracles.Arithmetic:
+    return oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
+
+
+def survey(sort):
+    return experiment.survey(sort, repeats=2, seed=7)
+
+
+# -- a trial is what it says ----------------------------------------------------------------------
+
+
+def recomputed(sort, trial):
+    """Computed and true value of a trial, by the oracles; matrices as lists."""
+    fl = arithmetic(trial.fmt)
+    inputs = [x.to_fractions().tolist() for x in trial.inputs]
+    match sort:
+        case "sum":
+            return fl.total(inputs[0]), sum(inputs[0])
+        case "product":
+            value = Fraction(1)
+            for x in inputs[0]:
+                value = fl.fl(value * x)
+            for y in inputs[1]:
+                value = fl.fl(value / y)
+            return value, math.prod(inputs[0]) / Fraction(math.prod(inputs[1]))
+        case "dot":
+            return fl.dot(*inputs), sum(a * b for a, b in zip(*inputs, strict=True))
+        case "matrix sum":
+            a, b = inputs
+            true = [[p + q for p, q in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+            return [[fl.fl(x) for x in row] for row in true], true
+        case _:
+            value, true = inputs[0], np.array(inputs[0], dtype=object)
+            for matrix in inputs[1 : None if sort == "chain" else 3]:
+                value, true = fl.matmul(value, matrix), true @ np.array(matrix, dtype=object)
+            if sort == "example":
+                pairs = [zip(*rows, strict=True) for rows in zip(value, inputs[3], strict=True)]
+                value = [[fl.fl(p + q) for p, q in row] for row in pairs]
+                true = true + np.array(inputs[3], dtype=object)
+            return value, true.tolist()
+
+
+@pytest.mark.parametrize("sort", SORTS)
+def test_trials_are_what_the_oracles_compute(sort):
+    for trial in survey(sort)[::5]:
+        value, true = recomputed(sort, trial)
+        found, exact = trial.computed.to_fractions(), trial.true
+        if isinstance(value, list):
+            assert found.tolist() == value
+            assert exact.tolist() == true
+            difference = np.array(value, dtype=object) - np.array(true, dtype=object)
+            assert trial.error == max(abs(difference).sum(axis=0))
+        else:
+            assert found == value
+            assert exact == true
+            assert trial.error == (abs(value / true - 1) if sort == "product" else abs(value - true))
+
+
+# -- sweeps: which bounds hold --------------------------------------------------------------------
+
+#: Bound, and a floor of the largest error over bound in the sweep, so that nothing holds vacuously.
+HOLD = {
+    "sum": {"1984 (18)": 0.6, "weights": 0.6, "strict": 0.6},
+    "product": {"1982 (20)": 0.6, "1984 (20)": 0.3, "strict": 0.6},
+    "dot": {"(26)": 0.6, "strict": 0.5},
+    "matrix sum": {"(24)": 0.8},
+    "chain": {"(32)": 0.5, "strict": 0.5},
+    "example": {"corrected": 0.5, "strict": 0.5},
+}
+FAIL = {"sum": {"1982 (18)"}, "chain": {"(31)"}, "example": {"Examples"}}
+
+
+@pytest.mark.parametrize("sort", SORTS)
+def test_bounds_in_a_sweep(sort):
+    trials = survey(sort)
+    found = {each.bound: each for each in experiment.tally(trials)}
+    assert found.keys() == HOLD[sort].keys() | FAIL.get(sort, set())
+    for bound, floor in HOLD[sort].items():
+        assert found[bound].violations == 0
+        assert floor < found[bound].largest <= 1
+        assert all(trial.error <= trial.bounds[bound] for trial in trials if bound in trial.bounds)
+        if bound != "strict":
+            assert found[bound].trials == len(trials)
+    for bound in FAIL.get(sort, ()):
+        assert found[bound].violations > 0
+        assert found[bound].largest > 1
+        assert found[bound].worst.violates(bound)
+
+
+@pytest.mark.parametrize("sort", SORTS)
+def test_a_survey_visits_every_format_size_and_kind(sort):
+    trials = survey(sort)
+    kinds = 3 if sort == "product" else 4
+    sizes = 4 if sort in ("sum", "product", "dot") else 3
+    assert len(trials) == len(experiment.SURVEYED) * kinds * sizes * 2
+    assert list(dict.fromkeys(trial.fmt for trial in trials)) == list(experiment.SURVEYED)
+    assert {fmt.rounding for fmt in experiment.SURVEYED} == set(Rounding)
+    assert {2, 3, 10, 16} == {fmt.base for fmt in experiment.SURVEYED}
+
+
+@pytest.mark.parametrize("sort", SORTS)
+def test_a_strict_bound_is_absent_only_where_gamma_is(sort):
+    for trial in survey(sort):
+        n = len(trial.inputs[0])
+        operations = {
+            "sum": n - 1,
+            "product": n + n // 2 - 1,
+            "dot": n,
+            "matrix sum": 0,
+            "chain": 3 * n,
+            "example": 2 * n,
+        }[sort]
+        exists = operations * trial.fmt.unit_roundoff < 1 and sort != "matrix sum"
+        assert ("strict" in trial.bounds) == exists
+
+
+def test_a_survey_is_the_same_again_and_another_with_another_seed():
+    first = survey("sum")
+    experiment.survey.cache_clear()
+    second = survey("sum")
+    assert first is not second
+    assert [trial.error for trial in first] == [trial.error for trial in second]
+    assert [trial.error for trial in first] != [trial.error for trial in experiment.survey("sum", 2, seed=8)]
+
+
+def test_like_signs_obey_18_of_1982():
+    rng = np.random.default_rng(18)
+    for fmt in experiment.SURVEYED:
+        for n in (2, 3, 6):
+            trial = experiment.sum_trial(experiment.random_numbers(rng, fmt, (n,), "like signs"))
+            assert not trial.violates("1982 (18)")
+
+
+# -- ratio and tally ------------------------------------------------------------------------------
+
+
+def trial(error, **bounds):
+    zero = FOUR.array(0)
+    return experiment.Trial(FOUR, (), zero, Fraction(0), Fraction(error), {k: Fraction(v) for k, v in bounds.items()})
+
+
+def test_ratio_and_violation():
+    assert trial(3, a=4).ratio("a") == 0.75
+    assert not trial(4, a=4).violates("a")
+    assert trial(Fraction(4) + Fraction(1, 10**40), a=4).violates("a")  # however small
+    assert trial(0, a=0).ratio("a") == 0
+    assert trial(1, a=0).ratio("a") == math.inf
+    assert trial(1, a=0).violates("a")
+    assert not trial(0, a=0).violates("a")
+
+
+def test_tally_counts_each_bound_among_the_trials_that_have_it():
+    trials = [trial(1, a=2, b=1), trial(3, a=2), trial(2, a=8, b=1), trial(0, a=5)]
+    a, b = experiment.tally(trials)
+    assert (a.bound, a.trials, a.violations, a.largest, a.median) == ("a", 4, 1, 1.5, 0.375)
+    assert a.worst is trials[1]
+    assert (b.bound, b.trials, b.violations, b.largest, b.median) == ("b", 2, 1, 2.0, 1.5)
+    assert b.worst is trials[2]
+    assert experiment.tally([]) == ()
+
+
+# -- data -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 3), FloatFormat(10, 4), FloatFormat(16, 6, CHOP), FloatFormat(10, 18)])
+def test_random_numbers_are_of_their_kind(fmt):
+    rng = np.random.default_rng(3)
+    limit, least = fmt.base**fmt.precision, fmt.base ** (fmt.precision - 1)
+    like = experiment.random_numbers(rng, fmt, (500,), "like signs").to_fractions()
+    assert all(least <= x < limit for x in like)
+    mixed = experiment.random_numbers(rng, fmt, (500,)).to_fractions()
+    assert all(least <= abs(x) < limit for x in mixed)
+    assert 150 < sum(x > 0 for x in mixed) < 350  # nine standard deviations of a fair coin
+    far = experiment.random_numbers(rng, fmt, (500,), "far exponents")
+    exponents = {fmt.split(x)[2] - fmt.precision for x in far.to_fractions()}
+    assert exponents == set(range(-fmt.precision, fmt.precision + 1))
+    cancelling = experiment.random_numbers(rng, fmt, (20, 5), "cancelling")
+    assert cancelling.shape == (20, 5)
+    assert np.all(cancelling.sum(axis=1) == 0)
+    assert all(isinstance(x, FloatArray) and x.format == fmt for x in (far, cancelling))
+
+
+def test_significands_are_uniform():
+    rng = np.random.default_rng(4)
+    x = experiment.random_numbers(rng, FloatFormat(10, 1), (9000,), "like signs").to_float()
+    counts = np.unique(x, return_counts=True)[1]
+    assert len(counts) == 9
+    assert abs(counts - 1000).max() < 150  # five standard deviations, 30 each
+
+
+@pytest.mark.parametrize("rule", Rounding)
+def test_the_sawtooth_is_the_error_of_rounding(rule):
+    fmt = FloatFormat(10, 2, rule)
+    result = experiment.sawtooth(fmt, 2000)
+    assert result.x[0] == 1
+    assert result.x[-1] < 100
+    for x, error in zip(result.x[::20], result.error[::20], strict=True):
+        value = Fraction(x)
+        exact = abs(oracles.rounded(value, 10, 2, rule is NEAREST) / value - 1)
+        assert error == float(exact)
+    beta = float(fmt.unit_roundoff)
+    largest = beta / (1 + beta) if rule is NEAREST else beta
+    assert 0.9 * largest < result.error.max() <= largest
+
+
+# -- growth ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [*experiment.KINDS, "constant"])
+@pytest.mark.parametrize("rule", Rounding)
+def test_growth_is_the_error_of_each_sum(kind, rule):
+    fmt = FloatFormat(10, 3, rule)
+    result = experiment.growth(fmt, kind, (7, 2, 4), 5, np.random.default_rng(6))
+    assert (result.fmt, result.kind, result.lengths) == (fmt, kind, (2, 4, 7))
+    assert result.errors.shape == (3, 5)
+    rng = np.random.default_rng(6)
+    if kind == "constant":
+        x = np.repeat(experiment.random_numbers(rng, fmt, (5, 1), "like signs").to_fractions(), 7, axis=1)
+    else:
+        x = experiment.random_numbers(rng, fmt, (5, 7), kind).to_fractions()
+    for i, n in enumerate((2, 4, 7)):
+        for repeat in range(5):
+            terms = x[repeat, :n].tolist()
+            error = arithmetic(fmt).total(terms) - sum(terms)
+            assert result.errors[i, repeat] == float(error / (sum(map(abs, terms)) * fmt.unit_roundoff))
+    assert (abs(result.errors) <= np.array([[1], [3], [6]])).all()
+
+
+def test_the_root_n_law_holds_where_its_assumptions_do_and_fails_where_not():
+    def beyond(kind, rule):
+        fmt = FloatFormat(2, 11, rule)
+        return experiment.growth(fmt, kind, (1000,), 40, np.random.default_rng(2)).beyond_probabilistic()[0]
+
+    assert beyond("like signs", NEAREST) == beyond("mixed signs", NEAREST) == 0
+    assert beyond("constant", NEAREST) > 0.05  # five times what the law grants
+    assert beyond("like signs", CHOP) > 0.1
+
+
+def test_beyond_counts_the_sums_above_the_law():
+    fmt = FloatFormat(2, 11)
+    law = theory.probabilistic_sum_factor(9, fmt.unit_roundoff, 0.05) / float(fmt.unit_roundoff)
+    errors = np.array([[0.99 * law, -1.01 * law, 1.01 * law, 0.0]])
+    assert experiment.Growth(fmt, "constant", (9,), errors).beyond_probabilistic(0.05).tolist() == [0.5]
+
+
+# -- counterexamples ------------------------------------------------------------------------------
+
+
+def test_three_numbers_exceed_18_of_1982():
+    trial = experiment.sum_trial(FloatFormat(10, 2).array(["5.6", "5.9", "-11"]))
+    assert trial.computed.to_fractions() == 1
+    assert trial.true == Fraction(1, 2)
+    assert trial.bounds["1982 (18)"] == Fraction(1, 20)
+    assert trial.ratio("1982 (18)") == 10
+    assert not trial.violates("1984 (18)")
+
+
+EVEN = [FloatFormat(*each) for each in ((2, 1), (2, 2), (2, 3), (2, 11), (10, 1), (10, 2), (10, 8), (16, 1), (16, 6))]
+
+
+@pytest.mark.parametrize("fmt", EVEN)
+def test_ties_exceed_18_of_1984_by_the_closed_form(fmt):
+    beta = fmt.unit_roundoff
+    ratio_of = derivation.tie_sum_ratio()
+    for n in (2, 3, 4, 5, 6, 7, 9, 20, 60):
+        trial = experiment.tie_sum(fmt, n)
+        assert trial.computed.to_fractions() == 1 + 2 * beta
+        assert trial.error == (n - 1) * beta
+        ratio = trial.error / trial.bounds["1984 (18)"]
+        if (n - 3) * beta <= 1:
+            expected = ratio_of.subs({derivation.N: n, derivation.BETA: sp.Rational(beta.numerator, beta.denominator)})
+            assert ratio == Fraction(int(expected.p), int(expected.q)) == 2 / (2 - (n - 4) * beta)
+        assert trial.violates("1984 (18)") == (n >= 5 and (3 * n - 8) * beta < 4)
+        assert not trial.violates("weights")
+        if "strict" in trial.bounds:
+            assert not trial.violates("strict")
+    assert experiment.tie_sum(fmt, 5).violates("1984 (18)")
+    assert experiment.tie_sum(fmt, 4).bounds["1984 (18)"] == 3 * beta  # just reached
+
+
+def test_ties_exceed_18_nearly_twice():
+    trial = experiment.tie_sum(FloatFormat(2, 8), 2**8 + 3)  # the sum is zero
+    assert trial.true == 0
+    assert 1.9 < trial.ratio("1984 (18)") < 2
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 4), (16, 3)) for r in Rounding])
+def test_a_product_that_cancels_exceeds_31_by_the_base_to_the_digits(fmt):
+    unit = Fraction(1, fmt.base ** (fmt.precision - 1))
+    row, column = fmt.array([[1 + unit, -(1 + 2 * unit)]]), fmt.array([[1 + unit], [1]])
+    trial = experiment.chain_trial([row, column])
+    assert trial.computed.to_fractions().tolist() == [[0]]
+    assert trial.error == unit**2
+    assert trial.error / trial.bounds["(31)"] == 1 / (2 * fmt.unit_roundoff)
+    assert not trial.violates("(32)")
+
+
+def test_four_digits_exceed_31_a_thousand_times_and_the_examples_four_hundred_times():
+    row, column = FOUR.array([["1.001", "-1.002"]]), FOUR.array([["1.001"], ["1"]])
+    assert experiment.chain_trial([row, column]).ratio("(31)") == 1000
+    a, b = FOUR.array([["1.001", "-1.002"], [0, 0]]), FOUR.array([["1.001", 0], [1, 0]])
+    one = FOUR.array([[1, 0], [0, 1]])
+    trial = experiment.example_trial(a, b, one, one * 0)
+    assert trial.error / trial.bounds["Examples"] == 400
+    assert not trial.violates("corrected")
+    assert not trial.violates("strict")
+
+
+def test_cancelling_chains_exceed_31_the_more_the_more_they_cancel():
+    fmt = FloatFormat(10, 6)
+    trials = experiment.cancelling_chains(fmt, 10, np.random.default_rng(8))
+    assert 40 < len(trials) <= 60
+    assert all(trial.true.item() for trial in trials)
+    assert not any(trial.violates("(32)") for trial in trials)
+    lost = [float(math.prod(map(column_sum_norm, t.inputs)) / column_sum_norm(t.true)) for t in trials]
+    assert min(lost) < 10
+    assert max(lost) > 10**4
+    assert max(t.ratio("(31)") for t in trials) > 10**3
+    # The two bounds differ by the cancellation.
+    for t, factor in zip(trials, lost, strict=True):
+        assert float(t.bounds["(32)"] / t.bounds["(31)"]) == pytest.approx(factor)
+
+
+# -- refusals -------------------------------------------------------------------------------------
+
+RNG = np.random.default_rng(0)
+TWO = FloatFormat(2, 3)
+REFUSED = [
+    (lambda: experiment.random_numbers(RNG, TWO, (3,), "odd"), r"got kind 'odd'; needed one of like signs, mixed"),
+    (
+        lambda: experiment.random_numbers(RNG, FloatFormat(10, 19), (3,)),
+        r"got FloatFormat.*19.*; needed signif",
+    ),
+    (lambda: experiment.sweep("mean", TWO, (2,), 1, RNG), r"got trial 'mean'; needed one of 'sum', 'product', 'dot'"),
+    (lambda: experiment.survey("mean"), r"got trial 'mean'; needed one of"),
+    (lambda: experiment.growth(TWO, "odd", (2,), 1, RNG), r"got kind 'odd'; needed"),
+    (lambda: experiment.growth(TWO, "constant", (1, 5), 1, RNG), r"got lengths \(1, 5\), 1 repeats; needed lengths of"),
+    (lambda: experiment.growth(TWO, "constant", (), 1, RNG), r"got lengths \(\), 1 repeats; needed"),
+    (lambda: experiment.growth(TWO, "constant", (5,), 0, RNG), r"got lengths \(5,\), 0 repeats; needed .* 1 repeat"),
+    (lambda: experiment.tie_sum(FloatFormat(3, 4), 5), r"got FloatFormat\(base=3.*, 5 terms; needed an even base, NEA"),
+    (lambda: experiment.tie_sum(FloatFormat(2, 4, CHOP), 5), r"CHOP.*; needed an even base, NEAREST"),
+    (lambda: experiment.tie_sum(TWO, 1), r"1 terms; needed an even base, NEAREST, at least 2 terms"),
+    (lambda: experiment.worst_product(TWO, 1), r"got 1 factors; needed at least 2"),
+    (lambda: experiment.worst_product(FloatFormat(10, 4), 5), r"got FloatFormat.*; needed at most 1000 numbers"),
+    (lambda: experiment.worst_sum(TWO, 1, [0]), r"got 1 terms, 1 exponents; needed at least 2 and 1"),
+    (lambda: experiment.worst_sum(TWO, 3, []), r"got 3 terms, 0 exponents; needed at least 2 and 1"),
+    (
+        lambda: experiment.product_trial(TWO.array([1, 0]), TWO.array([])),
+        r"got the factors .*none of them zero",
+    ),
+    (lambda: experiment.product_trial(TWO.array([]), TWO.array([2])), r"got the factors .*; needed at least one"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), REFUSED)
+def test_refused_with_what_came_and_what_was_needed(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_a_division_by_zero_and_mixed_formats_are_refused():
+    with pytest.raises(ZeroDivisionError, match="got a division by zero"):
+        experiment.product_trial(TWO.array([1, 2]), TWO.array([0]))
+    with pytest.raises(ValueError, match="needed one format"):
+        experiment.dot_trial(TWO.array([1, 2]), FOUR.array([1, 2]))

@@ -1,0 +1,148 @@
+"""gpbnb.rounding.figures: what is drawn is the result; axes, legends and colours say what it is."""
+
+from __future__ import annotations
+
+import re
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from gpbnb import plotting
+from gpbnb.bounds import column_sum_norm
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rounding import experiment, figures, theory
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+TWO = FloatFormat(10, 2)
+
+
+@pytest.fixture
+def ax():
+    _, axes = plotting.figure()
+    yield axes[0]
+    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    plt.close("all")
+
+
+def legend_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def check_names(ax, x, y):
+    assert x in ax.get_xlabel()
+    assert y in ax.get_ylabel()
+    assert "no unit" in ax.get_ylabel()
+
+
+def colour(artist):
+    return to_hex(artist.get_color()).upper()
+
+
+@pytest.mark.parametrize("rule", Rounding)
+def test_sawtooth(ax, rule):
+    result = experiment.sawtooth(FloatFormat(10, 2, rule), 300)
+    points, line, *sharp = figures.sawtooth(result, ax)
+    assert np.array_equal(points.get_xdata(), result.x)
+    assert np.array_equal(points.get_ydata(), result.error)
+    assert points.get_linestyle() == "None"
+    assert colour(points) == plotting.OBSERVED
+    beta = float(result.fmt.unit_roundoff)
+    assert list(line.get_ydata()) == [beta, beta]
+    assert colour(line) == plotting.BOUND
+    assert ax.get_xscale() == "log"
+    assert ax.get_ylim()[0] == 0
+    assert max(result.error.max(), beta) < ax.get_ylim()[1]
+    names = legend_of(ax)
+    if rule is NEAREST:
+        assert list(sharp[0].get_ydata()) == [beta / (1 + beta)] * 2
+        assert names[1] == "unit error, (8)"
+        assert len(names) == 3
+    else:
+        assert not sharp
+        assert names == ["error", "unit error, (13)"]
+    check_names(ax, "number $x$ (no unit)", "relative error")
+    assert ax.get_title(loc="left") == f"{rule.value}, 2 decimal digits"
+
+
+def test_worst_ratios(ax):
+    curves = [[experiment.worst_product(fmt, n) for n in (2, 3, 5)] for fmt in (FloatFormat(10, 1), FloatFormat(2, 4))]
+    *lines, bound = figures.worst_ratios(curves, "1982 (20)", ax, "factors", "bound (20)")
+    for line, curve in zip(lines, curves, strict=True):
+        assert list(line.get_xdata()) == [2, 3, 5]
+        assert list(line.get_ydata()) == [trial.ratio("1982 (20)") for trial in curve]
+        assert line.get_marker() not in ("", "None")
+    assert len({colour(line) for line in lines}) == 2
+    assert list(bound.get_ydata()) == [1, 1]
+    assert colour(bound) == plotting.BOUND
+    assert legend_of(ax) == ["1 decimal digit", "4 bits", "bound"]
+    check_names(ax, "factors $n$", "worst error / bound (20)")
+
+
+def test_growth(ax):
+    lengths = (2, 10, 40)
+    results = [
+        experiment.growth(FloatFormat(2, 8, rule), kind, lengths, 9, np.random.default_rng(3))
+        for kind, rule in (("like signs", NEAREST), ("like signs", CHOP), ("constant", NEAREST))
+    ]
+    *drawn, bound, law = figures.growth(results, ax)
+    for result, points, line in zip(results, drawn[::2], drawn[1::2], strict=True):
+        assert list(points.get_xdata()) == list(line.get_xdata()) == list(lengths)
+        assert np.array_equal(points.get_ydata(), np.median(abs(result.errors), axis=1))
+        assert np.array_equal(line.get_ydata(), abs(result.errors).max(axis=1))
+        assert points.get_linestyle() == "None"
+        assert colour(points) == colour(line)
+    assert list(bound.get_ydata()) == [1, 9, 39]
+    beta = results[0].fmt.unit_roundoff
+    assert list(law.get_ydata()) == [theory.probabilistic_sum_factor(n, beta) / float(beta) for n in lengths]
+    assert legend_of(ax)[:3] == ["like signs, nearest", "like signs, chop", "constant, nearest"]
+    assert "fails in 1 %" in legend_of(ax)[-1]
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    check_names(ax, "terms $n$", r"error of the sum / $\beta\sum|x_j|$")
+
+
+def test_cancellation(ax):
+    trials = experiment.cancelling_chains(FloatFormat(10, 5), 4, np.random.default_rng(4))
+    inexact = [trial for trial in trials if trial.error]
+    lost = [
+        float(column_sum_norm(t.inputs[0]) * column_sum_norm(t.inputs[1]) / column_sum_norm(t.true)) for t in inexact
+    ]
+    *points, bound = figures.cancellation(trials, ax)
+    for artist, name in zip(points, ("(31)", "(32)"), strict=True):
+        assert list(artist.get_xdata()) == lost
+        assert list(artist.get_ydata()) == [trial.ratio(name) for trial in inexact]
+    assert list(bound.get_ydata()) == [1, 1]
+    assert legend_of(ax) == ["error / (31)", "error / (32)", "bound"]
+    check_names(ax, "cancellation", "error / bound")
+    assert "no unit" in ax.get_xlabel()
+
+
+def test_pessimism(ax):
+    rng = np.random.default_rng(5)
+    groups = [(str(n), experiment.sweep("dot", FloatFormat(2, 24), [n], 6, rng)) for n in (3, 8)]
+    artists = figures.pessimism(groups, "strict", ax, "products", "the strict bound")
+    medians = [line for line in artists if getattr(line, "get_linewidth", lambda: 0)() == 2]
+    assert [line.get_ydata()[0] for line in medians] == [
+        np.median([trial.ratio("strict") for trial in trials]) for _, trials in groups
+    ]
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["3", "8"]
+    assert any(colour(line) == plotting.BOUND and list(line.get_ydata()) == [1, 1] for line in ax.lines)
+    assert ax.get_yscale() == "log"
+    check_names(ax, "products $n$", "error / the strict bound")
+
+
+def test_every_function_returns_the_artists_it_drew(ax):
+    result = experiment.sawtooth(TWO, 50)
+    artists = figures.sawtooth(result, ax)
+    assert artists == ax.lines[: len(artists)]
+    assert all(re.match(r"\w", line.get_label()) for line in artists)
+
+
+def test_no_more_curves_than_can_be_told_apart(ax):
+    curve = [experiment.worst_product(TWO, 2)]
+    with pytest.raises(ValueError, match="got 6 curves; needed at most 5, or colours repeat; draw two figures"):
+        figures.worst_ratios([curve] * 6, "1982 (20)", ax, "factors", "bound")
+    growth = experiment.growth(TWO, "constant", (2, 3), 2, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="got 6 curves; needed at most 5"):
+        figures.growth([growth] * 6, ax)

@@ -1,0 +1,61 @@
+"""gpbnb.rounding.tables: every number in a cell is that of the trials."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from gpbnb.formats import FloatFormat
+from gpbnb.rounding import experiment, tables
+
+TWO = FloatFormat(10, 2)
+FOUR = FloatFormat(10, 4)
+
+
+def test_tallies_have_a_line_a_bound():
+    trials = {sort: experiment.sweep(sort, TWO, [3], 2, np.random.default_rng(1)) for sort in ("sum", "dot")}
+    table = tables.tallies(trials)
+    found = [(sort, each) for sort, group in trials.items() for each in experiment.tally(group)]
+    assert len(table.body) == len(found) == 6
+    for (sort, each), cells in zip(found, table.body, strict=True):
+        assert cells[:4] == (sort, each.bound, str(each.trials), str(each.violations))
+        assert (float(cells[4]), float(cells[5])) == (float(f"{each.largest:.3g}"), float(f"{each.median:.3g}"))
+    assert len(table.header) == 6
+    assert table.title == "6 bounds in random trials"
+
+
+def test_worked_examples_show_operands_and_results():
+    trial = experiment.sum_trial(TWO.array(["5.6", "5.9", "-11"]))
+    table = tables.worked({"a sum": trial}, ["1982 (18)", "1984 (18)"])
+    assert table.header == (
+        "example",
+        "operands",
+        "format",
+        "computed",
+        "exact",
+        "error / 1982 (18)",
+        "error / 1984 (18)",
+    )
+    name, operands, fmt, computed, exact, *ratios = table.body[0]
+    assert (name, operands, fmt) == ("a sum", "5.6, 5.9, -11", "2 decimal digits")
+    assert (float(computed), float(exact)) == (1, 0.5)
+    assert ratios == ["10", f"{trial.ratio('1984 (18)'):.4g}"]
+
+
+def test_worked_examples_of_matrices_products_and_many_terms():
+    chain = experiment.chain_trial([FOUR.array([["1.001", "-1.002"]]), FOUR.array([["1.001"], ["1"]])])
+    square = experiment.matrix_sum_trial(FOUR.array([[1, 2], [3, 4]]), FOUR.array([[5, 6], [7, 8]]))
+    product = experiment.product_trial(FOUR.array([2, 3]), FOUR.array([]))
+    long = experiment.tie_sum(FOUR, 100)
+    trials = {"chain": chain, "square": square, "product": product, "long": long}
+    rows = {cells[0]: cells for cells in tables.worked(trials, ["(31)", "(24)", "strict"]).body}
+    assert rows["chain"][1] == "1.001, -1.002; 1.001; 1"
+    assert rows["chain"][4:] == ("1e-06", "1000", "none", f"{chain.ratio('strict'):.4g}")
+    assert rows["square"][4] == "a matrix"
+    assert rows["square"][1] == "1, 2; 3, 4; 5, 6; 7, 8"
+    assert rows["square"][-1] == "none"
+    assert rows["product"][1] == "2, 3"
+    assert "…" in rows["long"][1]
+    assert len(rows["long"][1]) <= 60
+    assert Fraction(rows["long"][4]) == long.true

@@ -1,0 +1,297 @@
+"""gpbnb.rounding.theory: each bound as printed or derived, and whether it is one."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import oracles
+import pytest
+
+from gpbnb.bounds import column_sum_norm, gamma
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rounding import theory
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+BETA = Fraction(1, 2000)
+X = [Fraction(3), Fraction(-5), Fraction(7, 2), Fraction(-11)]  # sum -19/2
+A = np.array([[1, -2, 3], [4, 5, -6]], dtype=object)
+B = np.array([[2, -1], [3, 7], [-4, 1]], dtype=object)
+C = np.array([[1, -3], [2, 5]], dtype=object)
+D = np.array([[100, -7], [1, 2]], dtype=object)
+ONE = np.array([[1]], dtype=object)
+
+
+def g(n):
+    return n * BETA / (1 - n * BETA)
+
+
+# -- as printed -----------------------------------------------------------------------------------
+
+
+def test_sums_as_printed():
+    s = Fraction(19, 2)
+    assert theory.printed_sum_bound_1982(X, BETA) == 3 * BETA * s
+    assert theory.printed_sum_bound(X, BETA) == 3 * BETA * s + BETA * Fraction(7, 2) + 2 * BETA * 11
+    assert theory.printed_sum_bound_coarse(X, BETA) == 3 * BETA * s + 3 * BETA * 11
+    five = [*X, Fraction(1, 4)]
+    s = Fraction(37, 4)
+    assert theory.printed_sum_bound_1982(five, BETA) == 4 * BETA * s
+    assert theory.printed_sum_bound(five, BETA) == BETA * (4 * s + Fraction(7, 2) + 2 * 11 + Fraction(3, 4))
+    assert theory.printed_sum_bound_coarse(five, BETA) == BETA * (4 * s + 6 * 11)
+
+
+def test_products_as_printed():
+    assert theory.printed_product_bound(2, 1, BETA) == 4 * BETA
+    assert theory.product_bound(2, 1, BETA) == 2 * BETA
+    assert theory.printed_product_bound(5, 3, BETA) == 9 * BETA
+    assert theory.product_bound(5, 3, BETA) == 7 * BETA
+    assert theory.strict_product_bound(5, 3, BETA) == g(7)
+    assert theory.product_bound(1, 0, BETA) == theory.strict_product_bound(1, 0, BETA) == 0
+
+
+def test_inner_products_as_printed():
+    a, b = [1, -2, 3], [4, 5, -6]
+    assert theory.dot_bound(a, b, BETA) == BETA * (3 * 4 + 3 * 10 + 2 * 18)
+    assert theory.strict_dot_bound(a, b, BETA) == g(3) * 32
+    assert theory.relative_dot_bound(a, b, BETA) == g(3) * Fraction(32, 24)
+    assert theory.dot_weights(4) == [4, 4, 3, 2]
+    assert theory.dot_weights(1) == [1]
+
+
+def test_matrix_products_as_printed():
+    # (27): n |a1||b1| + n |a2||b2| + (n - 1) |a3||b3|, entry by entry.
+    expected = [
+        [BETA * (3 * abs(A[i, 0] * B[0, j]) + 3 * abs(A[i, 1] * B[1, j]) + 2 * abs(A[i, 2] * B[2, j])) for j in (0, 1)]
+        for i in (0, 1)
+    ]
+    assert theory.matmul_entry_bounds(A, B, BETA).tolist() == expected
+    norms = [9, 9, 8]  # of A, B and C
+    assert [column_sum_norm(m) for m in (A, B, C)] == norms
+    assert theory.chain_bound([A, B], BETA) == 3 * BETA * 81
+    assert theory.chain_bound([A, B, C], BETA) == 5 * BETA * 648
+    assert theory.strict_chain_bound([A, B, C], BETA) == g(5) * 648
+    assert theory.chain_bound([A], BETA) == theory.strict_chain_bound([A], BETA) == 0
+    assert theory.matrix_sum_bound(C, D, BETA) == BETA * 104
+
+
+def test_chains_and_examples_as_printed():
+    abc = A @ B @ C
+    assert theory.printed_chain_claim([A, B, C], BETA) == 5 * BETA * column_sum_norm(abc)
+    assert theory.printed_example_bound(A, B, C, D, BETA) == BETA * (6 * column_sum_norm(abc) + 101)
+    whole = column_sum_norm(abc + D)
+    assert theory.example_bound(A, B, C, D, BETA) == BETA * (5 * 648 + whole)
+    assert theory.strict_example_bound(A, B, C, D, BETA) == (1 + BETA) * g(5) * 648 + BETA * whole
+    square = [C, C, C, C]
+    ccc = column_sum_norm(C @ C @ C)
+    assert theory.printed_example_bound(*square, BETA) == BETA * ((2 * 2 + 1) * ccc + 8)
+
+
+def test_interfaces_and_products_of_many():
+    assert theory.interfaces([A, B, C]) == [3, 2]
+    assert theory.interfaces([A]) == []
+    assert theory.product([A, B, C]).tolist() == (A @ B @ C).tolist()
+    assert theory.product([A]).tolist() == A.tolist()
+
+
+# -- what the weights mean ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", range(8))
+def test_weights_count_the_roundings_of_each_term(n):
+    """Add symbols: a term is the list of the additions that it went through."""
+    passed = dict.fromkeys(range(n), 0)
+    inside = [0] if n else []
+    for j in range(1, n):
+        inside.append(j)
+        for term in inside:
+            passed[term] += 1
+    assert theory.sum_weights(n) == [passed[j] for j in range(n)]
+    assert theory.dot_weights(n) == [passed[j] + 1 for j in range(n)]
+
+
+def test_bounds_are_ordered():
+    weights = sum(w * abs(x) for w, x in zip([3, 3, 2, 1], X, strict=True))
+    assert theory.sum_bound(X, BETA) == BETA * weights
+    assert theory.strict_sum_bound(X, BETA) == sum(g(w) * abs(x) for w, x in zip([3, 3, 2, 1], X, strict=True))
+    assert theory.sum_bound(X, BETA) < theory.strict_sum_bound(X, BETA) < g(3) * sum(map(abs, X))
+    assert theory.printed_sum_bound(X, BETA) <= theory.printed_sum_bound_coarse(X, BETA)
+    # Of equal terms the two forms of the sum bound differ by what cancels: nothing here.
+    assert theory.sum_bound([1, 1, 1], BETA) == 5 * BETA
+    assert theory.printed_sum_bound([1, 1, 1], BETA) == 7 * BETA
+
+
+def test_bounds_of_nothing():
+    for bound in (theory.sum_bound, theory.strict_sum_bound, theory.printed_sum_bound):
+        assert bound([], BETA) == 0
+        assert bound([5], BETA) == 0
+    assert theory.strict_dot_bound([], [], BETA) == theory.dot_bound([], [], BETA) == 0
+
+
+def test_everything_stays_exact():
+    tiny = FloatFormat(10, 60)
+    x = tiny.array(["1", "1e-50"])
+    assert theory.sum_bound(x, tiny.unit_roundoff) == (1 + Fraction(1, 10**50)) * Fraction(1, 2 * 10**59)
+    assert theory.strict_dot_bound(x, x, tiny.unit_roundoff) == gamma(2, tiny.unit_roundoff) * (
+        1 + Fraction(1, 10**100)
+    )
+
+
+# -- the root-n law -------------------------------------------------------------------------------
+
+
+def test_the_probabilistic_factor_shares_its_failure_among_the_terms():
+    n, failure, u = 100, 0.05, float(BETA)
+    spread = math.sqrt(2 * math.log(2 * n / failure)) / (1 - u)
+    exponent = spread * math.sqrt(n - 1) * u + (n - 1) * u * u / (1 - u)
+    assert theory.probabilistic_sum_factor(n, BETA, failure) == pytest.approx(math.exp(exponent) - 1, rel=1e-12)
+    assert theory.probabilistic_sum_factor(1, BETA) == 0
+
+
+# -- exhaustive: all tuples of a small format -----------------------------------------------------
+
+SMALL = [(2, 1, (-2, -1, 0, 1), 4), (2, 2, (-1, 0, 1), 3), (3, 1, (-1, 0, 1), 3), (10, 1, (0,), 3)]
+
+
+def numbers(base, precision, exponents):
+    digits = range(base ** (precision - 1), base**precision)
+    return [Fraction(0), *(s * m * Fraction(base) ** e for e in exponents for m in digits for s in (1, -1))]
+
+
+def all_sums(base, precision, exponents, n, rounding):
+    """Every tuple of n terms and its computed sum."""
+    fl = cache(lambda x: oracles.rounded(x, base, precision, rounding is NEAREST))
+    for terms in itertools.product(numbers(base, precision, exponents), repeat=n):
+        total = terms[0]
+        for term in terms[1:]:
+            total = fl(total + term)
+        yield terms, total
+
+
+@pytest.mark.parametrize(("base", "precision", "exponents", "n"), SMALL)
+def test_chopping_makes_the_first_order_sum_bounds_strict(base, precision, exponents, n):
+    beta = FloatFormat(base, precision, CHOP).unit_roundoff
+    weights = theory.sum_weights(n)
+    largest = Fraction(0)
+    for terms, computed in all_sums(base, precision, exponents, n, CHOP):
+        error = abs(computed - sum(terms))
+        if error:
+            bound = beta * sum(w * abs(x) for w, x in zip(weights, terms, strict=True))
+            printed = beta * ((n - 1) * abs(sum(terms)) + sum((j - 2) * abs(terms[j - 1]) for j in range(3, n + 1)))
+            assert error <= bound
+            assert error <= printed
+            largest = max(largest, error / bound)
+    assert largest > Fraction(1, 5)
+
+
+@pytest.mark.parametrize(("base", "precision", "exponents", "n"), SMALL)
+def test_equal_weights_are_strict_for_rounding_to_nearest(base, precision, exponents, n):
+    """(n - 1) β Σ|x_j| needs no second-order term (Jeannerod & Rump 2013)."""
+    beta = FloatFormat(base, precision).unit_roundoff
+    largest = Fraction(0)
+    for terms, computed in all_sums(base, precision, exponents, n, NEAREST):
+        error = abs(computed - sum(terms))
+        if error:
+            bound = (n - 1) * beta * sum(map(abs, terms))
+            assert error <= bound
+            largest = max(largest, error / bound)
+    assert largest > Fraction(1, 4)
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+@pytest.mark.parametrize(("base", "precision", "n"), [(2, 2, 4), (2, 3, 3), (3, 1, 4), (10, 1, 3)])
+def test_products_and_quotients_of_all_significands(base, precision, n, rounding):
+    """n factors, of which the last is also tried as a divisor."""
+    fmt = FloatFormat(base, precision, rounding)
+    fl = cache(lambda x: oracles.rounded(x, base, precision, rounding is NEAREST))
+    digits = range(base ** (precision - 1), base**precision)
+    strict = (1 + fmt.unit_roundoff) ** (n - 1) - 1
+    largest = Fraction(0)
+    for factors in itertools.product(map(Fraction, digits), repeat=n):
+        partial = factors[0]
+        for factor in factors[1:-1]:
+            partial = fl(partial * factor)
+        for computed, true in (
+            (fl(partial * factors[-1]), math.prod(factors)),
+            (fl(partial / factors[-1]), math.prod(factors[:-1]) / factors[-1]),
+        ):
+            error = abs(computed / true - 1)
+            assert error <= strict
+            if rounding is CHOP:
+                assert error <= theory.product_bound(n - 1, 1, fmt.unit_roundoff)
+            largest = max(largest, error / ((n - 1) * fmt.unit_roundoff))
+    assert largest > Fraction(1, 7)
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+def test_inner_products_of_all_small_vectors(rounding):
+    """(26) with chopping, and nβ|a||b| in both, over all vectors of three in two bits."""
+    fmt = FloatFormat(2, 2, rounding)
+    fl = cache(lambda x: oracles.rounded(x, 2, 2, rounding is NEAREST))
+    # A product of two numbers of two bits is 4, 6 or 9 times a power of two, or zero.
+    products = [Fraction(0), *(s * p * Fraction(2) ** e for p in (4, 6, 9) for e in (-2, -1, 0) for s in (1, -1))]
+    largest = Fraction(0)
+    for terms in itertools.product(products, repeat=3):
+        total = fl(terms[0])
+        for term in terms[1:]:
+            total = fl(total + fl(term))
+        error = abs(total - sum(terms))
+        if error:
+            coarse = 3 * fmt.unit_roundoff * sum(map(abs, terms))
+            assert error <= coarse
+            if rounding is CHOP:
+                assert error <= fmt.unit_roundoff * sum(w * abs(p) for w, p in zip((3, 3, 2), terms, strict=True))
+            largest = max(largest, error / coarse)
+    assert largest > Fraction(3, 10)
+
+
+# -- refusals -------------------------------------------------------------------------------------
+
+VECTOR, MATRIX = [1, 2], [[1, 2], [3, 4]]
+REFUSED = [
+    *(
+        (bound, (MATRIX, BETA), ValueError, r"got terms of shape \(2, 2\); needed a vector \(n,\); sum a matrix row")
+        for bound in (
+            theory.printed_sum_bound_1982,
+            theory.printed_sum_bound,
+            theory.printed_sum_bound_coarse,
+            theory.sum_bound,
+            theory.strict_sum_bound,
+        )
+    ),
+    *(
+        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of 2 and 1; needed equal lengths")
+        for bound in (theory.dot_bound, theory.strict_dot_bound, theory.relative_dot_bound)
+    ),
+    *(
+        (bound, (0, 2, BETA), ValueError, r"got 0 factors and 2 divisors; needed at least 1 and 0; write 1/y")
+        for bound in (theory.printed_product_bound, theory.product_bound, theory.strict_product_bound)
+    ),
+    (theory.product_bound, (2, -1, BETA), ValueError, r"got 2 factors and -1 divisors"),
+    (theory.strict_product_bound, (3, 0, Fraction(1, 2)), ValueError, r"got 2 roundings .*; needed less than 1; use"),
+    (theory.strict_sum_bound, ([1, 1, 1], Fraction(1, 2)), ValueError, r"got 2 roundings"),
+    (theory.relative_dot_bound, ([1, 1], [1, -1], BETA), ZeroDivisionError, r"got an inner product of zero; .*use str"),
+    (theory.probabilistic_sum_factor, (0, BETA), ValueError, r"got a sum of 0 terms; needed at least 1"),
+    (theory.probabilistic_sum_factor, (3, BETA, 0), ValueError, r"got failure = 0.0; needed a probability"),
+    (theory.product, ([],), ValueError, r"got shapes none; needed matrices"),
+    (theory.chain_bound, ([A, C], BETA), ValueError, r"got shapes \(2, 3\), \(2, 2\); needed matrices, each with as m"),
+    (theory.strict_chain_bound, ([A, C], BETA), ValueError, r"got shapes"),
+    (theory.printed_chain_claim, ([A, C], BETA), ValueError, r"got shapes"),
+    (theory.interfaces, ([A, VECTOR],), ValueError, r"got shapes \(2, 3\), \(2,\); .*transpose or reshape"),
+    (theory.matmul_entry_bounds, (A, A, BETA), ValueError, r"got shapes \(2, 3\), \(2, 3\)"),
+    (theory.matrix_sum_bound, (A, ONE, BETA), ValueError, r"got a sum of shapes \(2, 3\) and \(1, 1\); needed equal"),
+    *(
+        (bound, (A, B, C, ONE, BETA), ValueError, r"got a sum of shapes \(2, 2\) and \(1, 1\); needed equal")
+        for bound in (theory.printed_example_bound, theory.example_bound, theory.strict_example_bound)
+    ),
+    (theory.sum_bound, ([1, float("nan")], BETA), ValueError, r"entry 1: got nan; needed a finite number"),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments", "error", "message"), REFUSED)
+def test_refused_with_what_came_and_what_was_needed(function, arguments, error, message):
+    with pytest.raises(error, match=message):
+        function(*arguments)

@@ -1,0 +1,60 @@
+"""gpbnb.plotting: the one figure style."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from gpbnb import plotting
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3])
+def test_panels_side_by_side_in_the_width_of_the_page(columns):
+    fig, axes = plotting.figure(columns, height=4.2)
+    assert axes.shape == (columns,)
+    assert fig.axes == list(axes)
+    assert tuple(fig.get_size_inches()) == (8.0, 4.2)
+
+
+def test_the_style_is_that_of_the_figure_only():
+    before = dict(plt.rcParams)
+    fig, axes = plotting.figure()
+    assert dict(plt.rcParams) == before
+    assert fig.get_layout_engine() is not None
+    assert to_rgb(fig.get_facecolor()) == (1, 1, 1)
+    assert not axes[0].spines["top"].get_visible()
+    assert not axes[0].spines["right"].get_visible()
+    assert axes[0].get_axisbelow()
+    assert axes[0].xaxis.get_gridlines()[0].get_visible()
+
+
+def test_axes_are_named():
+    _, (ax,) = plotting.figure()
+    plotting.label(ax, "time (s)", "length (m)")
+    assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_title(loc="left")) == ("time (s)", "length (m)", "")
+    plotting.label(ax, "time (s)", "length (m)", "a title")
+    assert ax.get_title(loc="left") == "a title"
+
+
+def test_the_legend_has_no_frame():
+    _, (ax,) = plotting.figure()
+    ax.plot([1, 2], label="a line")
+    plotting.legend(ax, loc="upper left")
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["a line"]
+    assert not ax.get_legend().get_frame_on()
+
+
+def test_no_two_colours_are_alike_and_all_stand_out_from_white():
+    colours = [plotting.OBSERVED, *plotting.OBSERVED_OTHERS, plotting.BOUND, plotting.STRICT, plotting.REFERENCE]
+    rgb = np.array([to_rgb(colour) for colour in colours])
+    distance = np.abs(rgb[:, None] - rgb).sum(axis=2)[np.triu_indices(len(rgb), 1)]
+    assert distance.min() > 0.25
+    assert (np.abs(rgb - 1).max(axis=1) > 0.5).all()
