@@ -114,7 +114,7 @@ class FloatArray:
 
     @property
     def T(self) -> FloatArray:
-        """The transpose: axes in reverse order."""
+        """The transpose, with the axes in reverse order."""
         return self._moved(np.transpose)
 
     def reshape(self, *shape: Any) -> FloatArray:

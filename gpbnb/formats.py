@@ -23,13 +23,11 @@ if TYPE_CHECKING:
 
 
 class Rounding(Enum):
-    """How a number with more digits than the format holds is fitted into it.
+    """How a number with more digits than the format holds is fitted into it."""
 
-    NEAREST : to the nearest, half away from zero; hung1984, II (3).
-    CHOP : towards zero, the further digits dropped; hung1984, II (9).
-    """
-
+    #: To the nearest, half away from zero; hung1984, ch. II, (3).
     NEAREST = "nearest"
+    #: Towards zero, the further digits dropped; hung1984, ch. II, (9).
     CHOP = "chop"
 
 

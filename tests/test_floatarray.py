@@ -272,6 +272,11 @@ class TestText:
         found = [str(D4.array(v)) for v in values]
         assert found == ["0", "1", "1000000000000000", "1e+16", "1.2e+16", "0.0001", "1.2e-5", "-0.05", "120"]
 
+    def test_digits_are_the_nearest_or_chop_to_the_number(self) -> None:
+        # 171 / 512 = 0.333984375 in five digits
+        assert str(B8.array("1/3")) == "0.33398"
+        assert str(FloatFormat(2, 8, CHOP).array(Fraction(171, 512))) == "0.33399"
+
     def test_a_value_too_far_for_decimal_digits_has_a_repr_too(self) -> None:
         x = B8.array(3)
         for _ in range(30):

@@ -56,19 +56,19 @@ def _record(row: Row) -> tuple[str, str, str, str, str, bool | None, str | None,
 
 
 def table(rows: Iterable[Row]) -> Table:
-    """Tabulate `rows` in reading order: item, printed, recomputed, verdict, note."""
+    """Tabulate `rows` in reading order: item, verdict, printed, recomputed, note."""
     rows = in_reading_order(rows)
     body = tuple(
         (
             _place(row.entry),
+            _outcome(row),
             row.entry.printed,
             row.finding.recomputed if row.finding else "",
-            _outcome(row),
             row.finding.note if row.finding else "",
         )
         for row in rows
     )
-    return Table(_title(rows), ("Item", "Printed", "Recomputed", "Verdict", "Note"), body)
+    return Table(_title(rows), ("Item", "Verdict", "Printed", "Recomputed", "Note"), body)
 
 
 def summary_table(rows: Iterable[Row]) -> Table:

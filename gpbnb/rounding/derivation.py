@@ -35,7 +35,7 @@ def one_rounding() -> Derivation:
         (
             Step("(8): the bound (5) over the least $|x|$ of (6)", over(half, smallest), unit),
             Step("(13): the same for chopping", over(b ** (e - t), smallest), b ** (1 - t)),
-            Step("(14): chopping costs one bit, in any base", over(b ** (1 - t), unit), sp.Integer(2)),
+            Step("(14): chopping doubles the unit error, in any base", over(b ** (1 - t), unit), sp.Integer(2)),
             Step(
                 "sharper than (8): an error of $b^{e-t}/2$ needs $|x| \\ge b^{e-1} + b^{e-t}/2$",
                 over(half, smallest + half),

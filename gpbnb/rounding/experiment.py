@@ -95,7 +95,7 @@ def sum_trial(x: FloatArray) -> Trial:
 def product_trial(x: FloatArray, y: FloatArray) -> Trial:
     """Multiply the (n,) factors from left to right, then divide by each of the (m,) divisors.
 
-    The error is relative, |Q~/Q|; bounds of section 6.
+    The error is the relative one; bounds of section 6.
     """
     fmt, n, m = x.format, len(x), len(y)
     if not n or np.any(x == 0):
@@ -195,6 +195,7 @@ def _trial(
 
 # -- data -----------------------------------------------------------------------------------------
 
+#: The kinds of random data, see :func:`random_numbers`.
 KINDS = ("like signs", "mixed signs", "far exponents", "cancelling")
 
 
@@ -253,7 +254,7 @@ def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng:
     return trials
 
 
-#: Formats of the surveys: few digits and many, the bases of computers old and new, and base 3.
+#: The formats of a survey, with few digits and many, in the bases of computers old and new and in base 3.
 SURVEYED = tuple(
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 3), (2, 11), (2, 24), (3, 3), (10, 2), (10, 4), (10, 8), (16, 6))

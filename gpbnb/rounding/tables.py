@@ -38,7 +38,7 @@ def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
             digits(trial.fmt),
             _short(trial.computed),
             _number(trial.true),
-            *(f"{trial.ratio(bound):.4g}" if bound in trial.bounds else "none" for bound in bounds),
+            *(f"{trial.ratio(bound):.5g}" if bound in trial.bounds else "none" for bound in bounds),
         )
         for name, trial in trials.items()
     ]

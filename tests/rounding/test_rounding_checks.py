@@ -232,6 +232,7 @@ def wrongly_rounded_sum(n):
 
 
 TENTH = Fraction(1, 10)
+NO_VIOLATION = experiment.Tally("(31)", 5, 0, 0.5, 0.1, checks.cancelling_product())
 #: For each check that agrees, changes of the code under which it must not.
 DISAGREE = [
     ("approach", replace(experiment.theory, "probabilistic_sum_factor", lambda n, beta, failure=0.01: n * beta)),
@@ -382,6 +383,30 @@ def test_a_check_that_disagrees_can_agree(rows, patch, name, change):
     finding = FUNCTIONS[name]()
     assert finding.agrees is True
     assert finding.verdict is Verdict.VERIFIED
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        replace(theory, "printed_chain_claim", times(theory.chain_bound, 10**9)),
+        replace(derivation, "chain_shortcut", lambda: 0),
+        both_of(
+            replace(derivation, "chain_shortcut", lambda: 0),
+            replace(checks, "tallies", lambda trial: {"(31)": NO_VIOLATION}),
+        ),
+    ],
+)
+def test_the_claim_on_chains_needs_the_algebra_the_sweep_and_the_worked_example(patch, change):
+    change(patch)
+    assert FUNCTIONS["chain_shortcut"]().verdict is Verdict.WRONG
+
+
+def test_a_split_is_the_printed_one_in_all_its_parts():
+    assert checks.split_is("765.4567", ".7654", ".567e-1", 3)
+    assert not checks.split_is("765.4567", ".7655", ".567e-1", 3)
+    assert not checks.split_is("765.4567", ".7654", ".568e-1", 3)
+    assert not checks.split_is("765.4567", ".7654", ".567e-2", 2)
+    assert not checks.split_is("765.4567", ".07654", ".567e-1", 4)
 
 
 @pytest.mark.parametrize(

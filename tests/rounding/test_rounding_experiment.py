@@ -136,6 +136,17 @@ def test_a_strict_bound_is_absent_only_where_gamma_is(sort):
         assert ("strict" in trial.bounds) == exists
 
 
+def test_only_a_strict_bound_may_be_absent(monkeypatch):
+    def refuse(*_):
+        raise ValueError("no such bound")
+
+    monkeypatch.setattr(theory, "strict_sum_bound", refuse)
+    assert "strict" not in experiment.sum_trial(FOUR.array([1, 2])).bounds
+    monkeypatch.setattr(theory, "sum_bound", refuse)
+    with pytest.raises(ValueError, match="no such bound"):
+        experiment.sum_trial(FOUR.array([1, 2]))
+
+
 def test_a_survey_is_the_same_again_and_another_with_another_seed():
     first = survey("sum")
     experiment.survey.cache_clear()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 import numpy as np
+import pytest
 
 from gpbnb.formats import FloatFormat
 from gpbnb.rounding import experiment, tables
@@ -40,7 +41,8 @@ def test_worked_examples_show_operands_and_results():
     name, operands, fmt, computed, exact, *ratios = table.body[0]
     assert (name, operands, fmt) == ("a sum", "5.6, 5.9, -11", "2 decimal digits")
     assert (float(computed), float(exact)) == (1, 0.5)
-    assert ratios == ["10", f"{trial.ratio('1984 (18)'):.4g}"]
+    assert ratios[0] == "10"
+    assert float(ratios[1]) == pytest.approx(trial.ratio("1984 (18)"), rel=5e-4)  # four digits or more
 
 
 def test_worked_examples_of_matrices_products_and_many_terms():
@@ -51,7 +53,8 @@ def test_worked_examples_of_matrices_products_and_many_terms():
     trials = {"chain": chain, "square": square, "product": product, "long": long}
     rows = {cells[0]: cells for cells in tables.worked(trials, ["(31)", "(24)", "strict"]).body}
     assert rows["chain"][1] == "1.001, -1.002; 1.001; 1"
-    assert rows["chain"][4:] == ("1e-06", "1000", "none", f"{chain.ratio('strict'):.4g}")
+    assert rows["chain"][4:7] == ("1e-06", "1000", "none")
+    assert float(rows["chain"][7]) == pytest.approx(chain.ratio("strict"), rel=5e-4)
     assert rows["square"][4] == "a matrix"
     assert rows["square"][1] == "1, 2; 3, 4; 5, 6; 7, 8"
     assert rows["square"][-1] == "none"

@@ -201,6 +201,23 @@ def test_equal_weights_are_strict_for_rounding_to_nearest(base, precision, expon
     assert largest > Fraction(1, 4)
 
 
+@pytest.mark.parametrize(
+    ("base", "precision", "exponents", "n", "largest"),
+    [
+        (2, 2, (-1, 0, 1), 3, Fraction(8, 9)),
+        (2, 1, (-3, -2, -1, 0, 1), 4, Fraction(1)),
+        (2, 1, (-3, -2), 5, Fraction(4, 3)),
+    ],
+)
+def test_18_of_1984_is_reached_with_four_terms_and_exceeded_with_five(base, precision, exponents, n, largest):
+    beta = FloatFormat(base, precision).unit_roundoff
+    ratios = []
+    for terms, computed in all_sums(base, precision, exponents, n, NEAREST):
+        if computed != sum(terms):
+            ratios.append(abs(computed - sum(terms)) / theory.printed_sum_bound(terms, beta))
+    assert max(ratios) == largest
+
+
 @pytest.mark.parametrize("rounding", Rounding)
 @pytest.mark.parametrize(("base", "precision", "n"), [(2, 2, 4), (2, 3, 3), (3, 1, 4), (10, 1, 3)])
 def test_products_and_quotients_of_all_significands(base, precision, n, rounding):
