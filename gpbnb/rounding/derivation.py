@@ -189,6 +189,27 @@ def quotient_error(n: int, m: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...]]:
     return first_order(factor, (*eps, *eta)), (*eps, *eta)
 
 
+# -- matrix sums, (23)-(25) -----------------------------------------------------------------------
+
+
+def matrix_sums() -> Derivation:
+    r"""The rounded sum of two matrices: (15) for each entry, summed over the largest column.
+
+    For an entry with :math:`c = |a_{ij}+b_{ij}|`, let :math:`|\epsilon_{ij}| = \beta - w`, w ≥ 0.
+    """
+    c, w = sp.symbols("c w", nonnegative=True)
+    return Derivation(
+        (
+            Step(
+                "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, without anything left out",
+                BETA * c,
+                held(c) * held(BETA - w),
+                c * w,
+            ),
+        )
+    )
+
+
 # -- inner products and matrix products, (26)-(28) ------------------------------------------------
 
 

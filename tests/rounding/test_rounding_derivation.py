@@ -19,6 +19,7 @@ DERIVATIONS = {
         derivation.sums,
         derivation.ties,
         derivation.roundings,
+        derivation.matrix_sums,
         derivation.dots,
         derivation.chains,
         derivation.examples,
