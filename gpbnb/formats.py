@@ -134,7 +134,7 @@ class FloatFormat:
 
         Raises
         ------
-        As :meth:`round`.
+        TypeError, ValueError, OverflowError : as :meth:`round`.
 
         References
         ----------
