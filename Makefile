@@ -1,13 +1,12 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test test-pages notebooks lint format bench environment screenshots serve clean
+.PHONY: help book test test-pages notebooks lint format exactness bench environment screenshots serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
 HTML := _build/html
-UV_COMPILE := uv --no-config pip compile pyproject.toml --group book --group test --group pages --group dev \
-	--universal --python-version 3.11 --fork-strategy fewest --only-binary :all: --generate-hashes \
-	--no-emit-index-url --custom-compile-command "make environment" --quiet --output-file environment.txt
+UV_COMPILE := uv --no-config pip compile pyproject.toml --universal --python-version 3.11 --fork-strategy fewest \
+	--only-binary :all: --generate-hashes --no-emit-index-url --custom-compile-command "make environment" --quiet
 
 # Caches and settings that would else go to the home folder, or come from it and change a result.
 export PIP_CACHE_DIR := $(HERE)/.cache/pip
@@ -25,7 +24,8 @@ export JUPYTER_PLATFORM_DIRS := 1
 export JUPYTER_PREFER_ENV_PATH := 1
 export PYTEST_DEBUG_TEMPROOT := $(HERE)/.cache/tmp
 export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
-export NUMBA_CACHE_DIR := $(HERE)/.cache/numba
+# numba sees when the file of a compiled function changes, but not when those of the kernels that it calls do.
+export NUMBA_CACHE_DIR := $(HERE)/.cache/numba/$(shell cat gpbnb/_kernels/*.py | cksum | cut -d' ' -f1)
 export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
 export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1
@@ -74,11 +74,19 @@ format: .venv/made-for ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
+exactness: .venv/made-for ## forty million operations compared with independent arithmetic, digit for digit
+	$(PY) -m benchmarks.exactness
+
+# pychop has no wheel.
 bench: .venv/made-for ## timings against peers, side by side
+	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r benchmarks/environment.txt
 	$(PY) -m benchmarks
 
-environment: .venv/made-for ## compile environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
-	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade)
+environment: .venv/made-for ## compile both environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
+	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group book --group test --group pages --group dev \
+		--output-file environment.txt
+	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group bench --no-binary pychop \
+		--constraints environment.txt --output-file benchmarks/environment.txt
 
 screenshots: .venv/made-for ## pictures of every page: light, dark, phone
 	@test -f $(HTML)/index.html || $(MAKE) book

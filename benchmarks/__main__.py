@@ -1,67 +1,50 @@
-"""Time multiply-adds with two roundings each in gpbnb and its peers, in one run on one machine."""
+"""Time gpbnb beside its peers, in one run on one machine; write the table and its figure to ``benchmarks/results``."""
 
 from __future__ import annotations
 
-import decimal
-import platform
-import statistics
+import csv
+import json
 import sys
-import time
-from collections.abc import Callable
+from pathlib import Path
 
-import mpmath
-import numpy as np
+from benchmarks import kalman, multiply_add, rounding
+from benchmarks.figure import draw
+from benchmarks.timing import Row, machine
 
-from gpbnb.formats import FloatFormat
-
-COUNT = 20_000
-REPEATS = 5
+RESULTS = Path(__file__).parent / "results"
 
 
-def median_seconds(work: Callable[[], object]) -> float:
-    """Median wall time of `work` over REPEATS runs, after one that is not counted."""
-    work()
-    times = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
+def in_units(seconds: float) -> str:
+    """Three digits and a unit."""
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds / 1e-6:.3g} µs"
 
 
-def multiply_add(precision: int) -> dict[str, float]:
-    """Seconds for COUNT decimal ``a * b + c`` in each library."""
-    limit = 10**precision
-    triples = np.random.default_rng(precision).integers(limit // 10, limit, (3, COUNT)).tolist()
-    a, b, c = (FloatFormat(10, precision).array(row) for row in triples)
-    context = decimal.Context(prec=precision, rounding=decimal.ROUND_HALF_UP)
-    decimals = [[decimal.Decimal(x) for x in row] for row in triples]
-    floats = [[mpmath.mpf(x) for x in row] for row in triples]
-
-    def with_decimal() -> list[decimal.Decimal]:
-        return [context.add(context.multiply(x, y), z) for x, y, z in zip(*decimals, strict=True)]
-
-    def with_mpmath() -> list[mpmath.mpf]:
-        with mpmath.workdps(precision):
-            return [x * y + z for x, y, z in zip(*floats, strict=True)]
-
-    computed = [int(x) for x in (a * b + c).to_fractions()]
-    assert computed == [int(x) for x in with_decimal()], "gpbnb and decimal differ"
-    return {
-        "gpbnb": median_seconds(lambda: a * b + c),
-        "decimal": median_seconds(with_decimal),
-        "mpmath (binary)": median_seconds(with_mpmath),
-    }
+def line(row: Row) -> str:
+    task = row.task if row.library == "gpbnb" else ""
+    return f"{task:<38} {row.library:<17} {in_units(row.seconds):>9} {row.ratio:>9.2f}× {row.reach:>7} {row.reached}"
 
 
-def main() -> None:
-    print(f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}, numpy {np.__version__}")
-    print(f"{COUNT} multiply-adds, two roundings each; median of {REPEATS} runs")
-    print(f"{'digits':>6}  {'library':<16} {'time':>9}  {'ratio to gpbnb':>14}")
-    for precision in (8, 17):
-        times = multiply_add(precision)
-        for name, seconds in times.items():
-            print(f"{precision:>6}  {name:<16} {1e3 * seconds:>6.1f} ms  {seconds / times['gpbnb']:>14.2f}")
+def main() -> int:
+    about = machine()
+    print(", ".join(f"{name} {value}" for name, value in about.items()), flush=True)
+    table: list[Row] = []
+    for part in (rounding, multiply_add, kalman):
+        found = part.measure()
+        print("\n".join(map(line, found)), flush=True)
+        table += found
+    RESULTS.mkdir(exist_ok=True)
+    with (RESULTS / "timings.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(Row._fields)
+        writer.writerows((*row[:2], f"{row.seconds:.4g}", f"{row.ratio:.4g}", *row[4:]) for row in table)
+    (RESULTS / "machine.json").write_text(json.dumps(about, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    draw(table, RESULTS / "timings.svg")
+    missed = sum(row.reached == "no" for row in table)
+    print(f"{sum(row.reached == 'yes' for row in table)} reached, {missed} missed; written to benchmarks/results")
+    return 1 if missed else 0
 
 
 if __name__ == "__main__":

@@ -6,12 +6,13 @@ import inspect
 import math
 import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb._kernels import carriers
+from gpbnb._kernels.carriers import Carrier, Parts
 from gpbnb._kernels.exact import integer_text
 from gpbnb.formats import FloatFormat, Rounding, exact_ratio
 
@@ -36,24 +37,45 @@ class FloatArray:
     hung1984, ch. II, (15): fl(x * y) is the exact x * y, rounded once.
     """
 
-    __slots__ = ("_e", "_format", "_m")
+    __slots__ = ("_carrier", "_format", "_parts")
     __hash__ = None  # type: ignore[assignment]
 
     _format: FloatFormat
-    _m: NDArray[Any]
-    _e: NDArray[Any]
+    _carrier: Carrier
+    _parts: Parts
 
     def __init__(self) -> None:
         raise TypeError("got FloatArray(...); needed a format; write fmt.array(values)")
 
     @classmethod
     def _make(cls, m: Any, e: Any, fmt: FloatFormat) -> FloatArray:
-        """Wrap significands and exponents that are already normalized numbers of `fmt`."""
+        """Hold significands and exponents that are already normalized numbers of `fmt`."""
+        pair = _frozen(m, object), _frozen(e, object)
+        parts = fmt.carrier.from_exact(*pair)
+        return cls._wrap(_exact_carrier(fmt), pair, fmt) if parts is None else cls._wrap(fmt.carrier, parts, fmt)
+
+    @classmethod
+    def _wrap(cls, carrier: Carrier, parts: Any, fmt: FloatFormat) -> FloatArray:
+        """Hold what a carrier has made, or moved."""
         self = object.__new__(cls)
         self._format = fmt
-        self._m = _frozen(m)
-        self._e = _frozen(e)
+        self._carrier = carrier
+        self._parts = tuple(_frozen(part, carrier.dtype) for part in parts)
         return self
+
+    def _exactly(self) -> FloatArray:
+        """The same numbers, held by the exact carrier."""
+        return self._wrap(_exact_carrier(self._format), self._carrier.to_exact(self._parts), self._format)
+
+    @property
+    def _m(self) -> NDArray[Any]:
+        """The significands, Python's integers."""
+        return self._exactly()._parts[0]
+
+    @property
+    def _e(self) -> NDArray[Any]:
+        """The exponents, Python's integers."""
+        return self._exactly()._parts[1]
 
     @classmethod
     def from_values(cls, values: Any, fmt: FloatFormat) -> FloatArray:
@@ -66,8 +88,10 @@ class FloatArray:
             if values.format == fmt:
                 return values
             if values.format.base == fmt.base:
-                m, e = _ufunc(fmt, "from_ratio", 3, 2)(values._m, 1, values._e)
+                m, e = np.frompyfunc(fmt.kernel.from_ratio, 3, 2)(values._m, 1, values._e)
                 return cls._make(m, e, fmt)
+        if type(values) is np.ndarray and (parts := fmt.carrier.from_numbers(values, exactly)) is not None:
+            return cls._wrap(fmt.carrier, parts, fmt)
         entries = _entries(values)
         m, e = np.empty(entries.shape, object), np.empty(entries.shape, object)
         kernel = fmt.kernel
@@ -100,17 +124,17 @@ class FloatArray:
     @property
     def shape(self) -> tuple[int, ...]:
         """Length of each axis."""
-        return self._m.shape
+        return self._parts[0].shape
 
     @property
     def ndim(self) -> int:
         """Number of axes; 0 for a single number."""
-        return self._m.ndim
+        return self._parts[0].ndim
 
     @property
     def size(self) -> int:
         """Number of entries."""
-        return self._m.size
+        return self._parts[0].size
 
     @property
     def T(self) -> FloatArray:
@@ -124,7 +148,7 @@ class FloatArray:
     def __len__(self) -> int:
         if not self.ndim:
             raise TypeError("got a FloatArray of a single number; needed one with a length")
-        return len(self._m)
+        return len(self._parts[0])
 
     def __getitem__(self, index: Any) -> FloatArray:
         return self._moved(lambda a: a[index])
@@ -145,8 +169,8 @@ class FloatArray:
         return bool(np.any(self == value))
 
     def _moved(self, move: Callable[[NDArray[Any]], Any]) -> FloatArray:
-        """Apply to significands and exponents a function that only moves entries."""
-        return self._make(move(self._m), move(self._e), self._format)
+        """Apply to each part a function that only moves entries."""
+        return self._wrap(self._carrier, map(move, self._parts), self._format)
 
     # -- arithmetic ----------------------------------------------------------------------------
 
@@ -163,22 +187,23 @@ class FloatArray:
     def _binary(self, name: str, left: Any, right: Any) -> FloatArray:
         a, b = self._operand(left), self._operand(right)
         _broadcast(name, a.shape, b.shape)
-        if name == "divide" and (zero := _first(b._m == 0)) is not None:
+        if name == "divide" and (zero := _first(b._parts[0] == 0)) is not None:
             at = f" at {_place(zero)} of the divisor" if zero else ""
             raise ZeroDivisionError(
                 f"got a division by zero{at}; needed a divisor other than zero; test x == 0 before dividing"
             )
-        m, e = _ufunc(self._format, name, 4, 2)(a._m, a._e, b._m, b._e)
-        return self._make(m, e, self._format)
+        carrier, (a, b) = _common((a, b))
+        parts = carrier.apply(name, a._parts, b._parts)
+        return self._binary(name, a._exactly(), b) if parts is None else self._wrap(carrier, parts, self._format)
 
     def _unary(self, name: str) -> FloatArray:
-        if name == "sqrt" and (negative := _first(self._m < 0)) is not None:
+        if name == "sqrt" and (negative := _first(self._parts[0] < 0)) is not None:
             at = f" at {_place(negative)}" if negative else ""
             raise ValueError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
-        m, e = _ufunc(self._format, name, 2, 2)(self._m, self._e)
-        return self._make(m, e, self._format)
+        parts = self._carrier.apply(name, self._parts)
+        return self._exactly()._unary(name) if parts is None else self._wrap(self._carrier, parts, self._format)
 
     def __add__(self, other: Any) -> FloatArray:
         return self._binary("add", self, other)
@@ -264,6 +289,8 @@ class FloatArray:
         lines = self.reshape(-1) if axis is None else self._moved(lambda a: np.moveaxis(a, axis, 0))
         if not len(lines):
             return self._zeros(lines.shape[1:]) + of_none
+        if (parts := self._carrier.fold(name, lines._parts)) is not None:
+            return self._wrap(self._carrier, parts, self._format)
         total = lines[0]
         for i in range(1, len(lines)):
             total = self._binary(name, total, lines[i])
@@ -277,8 +304,8 @@ class FloatArray:
     def _compare(self, other: Any, holds: Callable[[Any], Any]) -> Any:
         b = self._operand(other)
         _broadcast("compare", self.shape, b.shape)
-        order = _ufunc(self._format, "compare", 4, 1)(self._m, self._e, b._m, b._e)
-        return holds(np.asarray(order, dtype=np.int8))[()]
+        carrier, (a, b) = _common((self, b))
+        return holds(carrier.compare(a._parts, b._parts))[()]
 
     def __eq__(self, other: object) -> Any:
         return self._compare(other, lambda order: order == 0)
@@ -298,13 +325,18 @@ class FloatArray:
     def __ge__(self, other: Any) -> Any:
         return self._compare(other, lambda order: order >= 0)
 
+    def _pair(self) -> Any:
+        """Significand and exponent of a single number."""
+        m, e = self._exactly()._parts
+        return m.item(), e.item()
+
     def __bool__(self) -> bool:
         if self.size != 1:
             raise ValueError(
                 f"got the truth value of a FloatArray of shape {self.shape}; needed one number; "
                 "compare, then use np.all or np.any"
             )
-        return bool(self._m.item() != 0)
+        return bool(self._parts[0].item() != 0)
 
     # -- conversion ----------------------------------------------------------------------------
 
@@ -315,8 +347,7 @@ class FloatArray:
         ------
         OverflowError : an entry would become infinite, or is not zero and would become so.
         """
-        to_float = _ufunc(self._format, "to_float", 2, 1)
-        return np.asarray(to_float(self._m, self._e), dtype=np.float64)[()]
+        return self._carrier.to_float(self._parts)[()]
 
     def to_fractions(self) -> Any:
         """The exact value of each entry: an object array of Fractions, or one Fraction.
@@ -325,8 +356,8 @@ class FloatArray:
         ------
         OverflowError : an entry is too long to write out.
         """
-        to_fraction = _ufunc(self._format, "to_fraction", 2, 1)
-        return np.asarray(to_fraction(self._m, self._e), dtype=object)[()]
+        to_fraction = np.frompyfunc(self._format.kernel.to_fraction, 2, 1)
+        return np.asarray(to_fraction(*self._exactly()._parts), dtype=object)[()]
 
     def __float__(self) -> float:
         if self.size != 1:
@@ -392,7 +423,7 @@ class FloatArray:
         )
 
     def _move(self, func: Any, args: Any, kwargs: Any) -> FloatArray:
-        """Call a NumPy function that only moves entries, on the significands and on the exponents."""
+        """Call a NumPy function that only moves entries, on each part."""
         if refused := {"out", "dtype", "casting", "like"} & kwargs.keys():
             raise TypeError(
                 f"got np.{func.__name__} of a FloatArray with {', '.join(sorted(refused))}; "
@@ -400,9 +431,9 @@ class FloatArray:
             )
         first, rest = (args[0], args[1:]) if args else (None, ())
         if func.__name__ in _JOINERS and isinstance(first, Sequence):
-            parts = [self._operand(part) for part in first]
-            m = func([part._m for part in parts], *rest, **kwargs)
-            return self._make(m, func([part._e for part in parts], *rest, **kwargs), self._format)
+            carrier, arrays = _common([self._operand(part) for part in first])
+            parts = zip(*(array._parts for array in arrays), strict=True)
+            return self._wrap(carrier, (func(part, *rest, **kwargs) for part in parts), self._format)
         if not isinstance(first, FloatArray) or any(isinstance(value, FloatArray) for value in rest):
             raise TypeError(
                 f"got np.{func.__name__} with a FloatArray in an unexpected place; needed it as the first argument, "
@@ -426,13 +457,14 @@ class FloatArray:
 
     def _text(self, quote: str, separator: str, prefix: str) -> str:
         """Decimal digits from which ``fmt.array`` makes the same numbers again, in columns."""
-        m, e = self._m.reshape(-1), self._e.reshape(-1)
+        entries = self.reshape(-1)
         shown: dict[int, str] = {}
 
         def entry(place: Any) -> str:
             i = int(place)
             if i not in shown:
-                shown[i] = f"{quote}{_decimal_text(m[i], e[i], self._format)}{quote}"
+                m, e = entries[i]._pair()
+                shown[i] = f"{quote}{_decimal_text(m, e, self._format)}{quote}"
             return shown[i].rjust(width)
 
         width = 0
@@ -453,9 +485,9 @@ def _single(value: Any) -> NDArray[Any]:
     return array.reshape(())
 
 
-def _frozen(a: Any) -> NDArray[Any]:
-    """An object array that cannot be written to."""
-    array = a if isinstance(a, np.ndarray) else _single(a)
+def _frozen(a: Any, dtype: Any) -> NDArray[Any]:
+    """An array that cannot be written to."""
+    array = a if isinstance(a, np.ndarray) else np.asarray(a, dtype=dtype)
     array.flags.writeable = False
     return array
 
@@ -495,9 +527,16 @@ def _entries(values: Any) -> NDArray[Any]:
     return _single(values)
 
 
-@lru_cache(maxsize=1024)
-def _ufunc(fmt: FloatFormat, name: str, inputs: int, outputs: int) -> Any:
-    return np.frompyfunc(getattr(fmt.kernel, name), inputs, outputs)
+def _exact_carrier(fmt: FloatFormat) -> Carrier:
+    return carriers.exact(fmt.base, fmt.precision, fmt.rounding is Rounding.NEAREST)
+
+
+def _common(arrays: Sequence[FloatArray]) -> tuple[Carrier, Sequence[FloatArray]]:
+    """One carrier that holds all the arrays."""
+    carrier = arrays[0]._carrier
+    if all(array._carrier is carrier for array in arrays):
+        return carrier, arrays
+    return _exact_carrier(arrays[0]._format), [array._exactly() for array in arrays]
 
 
 def _broadcast(name: str, a: tuple[int, ...], b: tuple[int, ...]) -> None:
@@ -540,6 +579,8 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
     if n == 0:
         stack = np.broadcast_shapes(rows.shape[:-2], columns.shape[:-2])
         c = a._zeros((*stack, rows.shape[-2], columns.shape[-1]))
+    elif rows.ndim == columns.ndim == 2 and (parts := _product(rows, columns)) is not None:
+        c = a._wrap(a._carrier, parts, a._format)
     else:
         c = rows[..., :, 0, np.newaxis] * columns[..., np.newaxis, 0, :]
         for k in range(1, n):
@@ -547,6 +588,11 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
     if a.ndim == 1:
         c = c[..., 0, :]
     return c if b.ndim > 1 else c[..., 0]
+
+
+def _product(rows: FloatArray, columns: FloatArray) -> Parts | None:
+    """The parts of the product of two matrices, where their carrier can form it."""
+    return rows._carrier.matmul(rows._parts, columns._parts) if rows._carrier is columns._carrier else None
 
 
 def _decimal_text(m: int, e: int, fmt: FloatFormat) -> str:
@@ -638,7 +684,9 @@ def _where(x: FloatArray, condition: Any, a: Any, b: Any) -> FloatArray:
     a, b = x._operand(a), x._operand(b)
     _broadcast("where", condition.shape, a.shape)
     _broadcast("where", np.broadcast_shapes(condition.shape, a.shape), b.shape)
-    return x._make(np.where(condition, a._m, b._m), np.where(condition, a._e, b._e), x._format)
+    carrier, (a, b) = _common((a, b))
+    parts = zip(a._parts, b._parts, strict=True)
+    return x._wrap(carrier, (np.where(condition, p, q) for p, q in parts), x._format)
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

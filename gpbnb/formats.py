@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpbnb._kernels.carriers import Carrier, carrier
 from gpbnb._kernels.exact import LARGEST_BITS, ExactKernel, kernel
 
 if TYPE_CHECKING:
@@ -90,6 +91,11 @@ class FloatFormat:
     def kernel(self) -> ExactKernel:
         """The scalar operations of this format."""
         return kernel(self.base, self.precision, self.rounding is Rounding.NEAREST)
+
+    @property
+    def carrier(self) -> Carrier:
+        """What holds the numbers of an array of this format, compiled where the format allows."""
+        return carrier(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
     @property
     def unit_roundoff(self) -> Fraction:

@@ -1,4 +1,4 @@
-"""environment.txt is what `make environment` compiles from pyproject.toml, and nothing else."""
+"""Each environment.txt is what `make environment` compiles from pyproject.toml, and nothing else."""
 
 from __future__ import annotations
 
@@ -6,12 +6,17 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-LOCK = (ROOT / "environment.txt").read_text(encoding="utf-8")
+# Each file that pins, and the groups of requirements that it pins; "" is the package itself.
+GROUPS = set(PROJECT["dependency-groups"])
+LOCKS = {"environment.txt": {"", *GROUPS} - {"bench"}, "benchmarks/environment.txt": {"", "bench"}}
+
+every_lock = pytest.mark.parametrize("name", LOCKS)
 
 # One entry: the pin, its hashes, and who asked for it.
 ENTRY = re.compile(
@@ -19,10 +24,14 @@ ENTRY = re.compile(
 )
 
 
-def pins() -> dict[str, list[str]]:
+def lock(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def pins(name: str) -> dict[str, list[str]]:
     """Versions by name; a package may be pinned once for each of several markers."""
     found: dict[str, list[str]] = {}
-    for entry in ENTRY.finditer(LOCK):
+    for entry in ENTRY.finditer(lock(name)):
         requirement = Requirement(entry["pin"])
         (specifier,) = requirement.specifier
         assert specifier.operator == "=="
@@ -30,44 +39,55 @@ def pins() -> dict[str, list[str]]:
     return found
 
 
-def asked_for() -> dict[str, set[str]]:
-    """Names that environment.txt says pyproject.toml asked for, by group; "" is the package itself."""
+def asked_for(name: str) -> dict[str, set[str]]:
+    """Names that the file says pyproject.toml asked for, by group."""
     found: dict[str, set[str]] = {}
-    for entry in ENTRY.finditer(LOCK):
+    for entry in ENTRY.finditer(lock(name)):
         for group in re.findall(r"gpbnb \(pyproject\.toml(?::([\w-]+))?\)", entry["via"]):
             found.setdefault(group, set()).add(canonicalize_name(Requirement(entry["pin"]).name))
     return found
 
 
-def requirements() -> dict[str, list[Requirement]]:
+def requirements(name: str) -> dict[str, list[Requirement]]:
     groups = {"": PROJECT["project"]["dependencies"], **PROJECT["dependency-groups"]}
-    return {group: [Requirement(text) for text in texts] for group, texts in groups.items()}
+    return {group: [Requirement(text) for text in texts] for group, texts in groups.items() if group in LOCKS[name]}
 
 
-def test_every_line_of_the_lock_is_a_pin_with_hashes():
-    assert ENTRY.sub("", LOCK) == "".join(line for line in LOCK.splitlines(keepends=True) if line.startswith("#"))
-    assert len(pins()) > 50
+@every_lock
+def test_every_line_of_the_lock_is_a_pin_with_hashes(name: str):
+    text = lock(name)
+    assert ENTRY.sub("", text) == "".join(line for line in text.splitlines(keepends=True) if line.startswith("#"))
+    assert len(pins(name)) > 20
 
 
-def test_the_lock_names_no_address():
-    assert not re.search(r"://|--index-url|--extra-index-url|--find-links|@ |file:", LOCK)
+@every_lock
+def test_the_lock_names_no_address(name: str):
+    assert not re.search(r"://|--index-url|--extra-index-url|--find-links|@ |file:", lock(name))
 
 
-def test_every_requirement_is_pinned_within_its_range():
-    locked = pins()
-    for requirement in [r for group in requirements().values() for r in group]:
+@every_lock
+def test_every_requirement_is_pinned_within_its_range(name: str):
+    locked = pins(name)
+    for requirement in [r for group in requirements(name).values() for r in group]:
         versions = locked[canonicalize_name(requirement.name)]
         assert all(requirement.specifier.contains(version) for version in versions), requirement
 
 
-def test_the_lock_was_compiled_from_these_requirements():
-    wanted = {group: {canonicalize_name(r.name) for r in group_} for group, group_ in requirements().items()}
-    assert asked_for() == wanted
+@every_lock
+def test_the_lock_was_compiled_from_these_requirements(name: str):
+    wanted = {group: {canonicalize_name(r.name) for r in group_} for group, group_ in requirements(name).items()}
+    assert asked_for(name) == wanted
+
+
+def test_the_locks_agree():
+    locked = pins("environment.txt")
+    for package, versions in pins("benchmarks/environment.txt").items():
+        assert versions == locked.get(package, versions)
 
 
 def test_the_build_backend_is_in_the_lock():
     for requirement in map(Requirement, PROJECT["build-system"]["requires"]):
-        assert requirement in requirements()["dev"]
+        assert requirement in requirements("environment.txt")["dev"]
 
 
 def test_make_compiles_every_group():

@@ -1,0 +1,172 @@
+"""One step of a Kalman filter, n = 10, m = 2, each of its seven thousand operations rounded."""
+
+from __future__ import annotations
+
+import decimal
+from collections.abc import Callable
+from fractions import Fraction
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from benchmarks.timing import Row, medians, rows
+from gpbnb._kernels.carriers import Compiled
+from gpbnb._kernels.scalar import add, divide, load, matmul, multiply, negative, store, subtract
+from gpbnb.floatarray import FloatArray
+from gpbnb.formats import FloatFormat
+
+N, M = 10, 2
+STEPS = 20  # in one call of the compiled loop
+
+
+@njit(cache=True, nogil=True)
+def _sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+
+
+@njit(cache=True, nogil=True)
+def _difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+
+
+@njit(cache=True, nogil=True)
+def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps: int) -> None:
+    """Several times the same step, from x0 and P0 to x and P; the model and its transposes as arrays of the tag."""
+    Phi, PhiT, Q, H, HT, R, z, identity = model
+    T, V, W = np.empty_like(P0), np.empty_like(P0), np.empty_like(P0)
+    PHt, K, S, HP = np.empty_like(HT), np.empty_like(HT), np.empty_like(R), np.empty_like(R)
+    y, g, u = np.empty_like(z), np.empty_like(z), np.empty_like(x0)
+    for _ in range(steps):
+        matmul(fmt, Phi, P0, T)
+        matmul(fmt, T, PhiT, V)
+        _sum(fmt, V, Q, V)
+        matmul(fmt, V, HT, PHt)
+        matmul(fmt, H, PHt, HP)
+        _sum(fmt, HP, R, S)
+        a, b = load(fmt, S, (0, 0)), load(fmt, S, (0, 1))
+        c, d = load(fmt, S, (1, 0)), load(fmt, S, (1, 1))
+        determinant = subtract(fmt, multiply(fmt, a, d), multiply(fmt, b, c))
+        store(fmt, S, (0, 0), divide(fmt, d, determinant))
+        store(fmt, S, (0, 1), negative(fmt, divide(fmt, b, determinant)))
+        store(fmt, S, (1, 0), negative(fmt, divide(fmt, c, determinant)))
+        store(fmt, S, (1, 1), divide(fmt, a, determinant))
+        matmul(fmt, PHt, S, K)
+        matmul(fmt, Phi, x0, u)
+        matmul(fmt, H, u, y)
+        _difference(fmt, z, y, g)
+        matmul(fmt, K, g, x)
+        _sum(fmt, u, x, x)
+        matmul(fmt, K, H, T)
+        _difference(fmt, identity, T, W)
+        matmul(fmt, W, V, P)
+
+
+def numpy_step(model: Any, x0: Any, P0: Any) -> tuple[Any, Any]:
+    """The same in float64, unrounded, as one writes it in NumPy."""
+    Phi, PhiT, Q, H, HT, R, z, identity = model
+    V = Phi @ P0 @ PhiT + Q
+    PHt = V @ HT
+    S = H @ PHt + R
+    (a, b), (c, d) = S.tolist()
+    K = PHt @ (np.array([[d, -b], [-c, a]]) / (a * d - b * c))
+    u = Phi @ x0
+    return u + K @ (z - H @ u), (identity - K @ H) @ V
+
+
+def plain_step(model: Any, x0: Any, P0: Any) -> tuple[Any, Any]:
+    """The same on nested lists of any numbers with operators, in the order of the compiled loop."""
+    Phi, PhiT, Q, H, HT, R, z, identity = model
+
+    def product(A: Any, B: Any) -> Any:
+        columns = list(zip(*B, strict=True))
+        result = []
+        for row in A:
+            line = []
+            for column in columns:
+                s = row[0] * column[0]
+                for p, q in zip(row[1:], column[1:], strict=True):
+                    s = s + p * q
+                line.append(s)
+            result.append(line)
+        return result
+
+    def total(A: Any, B: Any) -> Any:
+        return [[p + q for p, q in zip(r, s, strict=True)] for r, s in zip(A, B, strict=True)]
+
+    def difference(A: Any, B: Any) -> Any:
+        return [[p - q for p, q in zip(r, s, strict=True)] for r, s in zip(A, B, strict=True)]
+
+    V = total(product(product(Phi, P0), PhiT), Q)
+    PHt = product(V, HT)
+    (a, b), (c, d) = total(product(H, PHt), R)
+    determinant = a * d - b * c
+    K = product(PHt, [[d / determinant, -(b / determinant)], [-(c / determinant), a / determinant]])
+    u = product(Phi, x0)
+    x = total(u, product(K, difference(z, product(H, u))))
+    return x, product(difference(identity, product(K, H)), V)
+
+
+def model() -> tuple[Any, ...]:
+    """A stable model with no zeros in it, and where to start."""
+    rng = np.random.default_rng(10)
+    Phi = 0.9 * np.eye(N) + 0.03 * rng.standard_normal((N, N))
+    H = rng.standard_normal((M, N))
+    A = rng.standard_normal((N, N))
+    Q, R = 0.01 * np.eye(N) + 1e-3, np.array([[1.0, 0.1], [0.1, 1.0]])
+    parts = (Phi, Phi.T, Q, H, H.T, R, rng.standard_normal((M, 1)), np.eye(N))
+    return parts, rng.standard_normal((N, 1)), A @ A.T / N + np.eye(N)
+
+
+def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
+    """A call of the compiled loop in a format, and its operands as nested lists of Fractions."""
+    carrier = fmt.carrier
+    if not isinstance(carrier, Compiled):
+        raise TypeError(f"got {fmt}; needed a format with compiled loops")
+    given, x0, P0 = model()
+    arrays = [fmt.array(a) for a in (*given, x0, P0)]
+    packed = [carrier.pack(a._parts) for a in arrays]
+    x, P = np.empty_like(packed[-2]), np.empty_like(packed[-1])
+
+    def run(steps: int) -> Any:
+        compiled_steps(carrier.tag, tuple(packed[:-2]), packed[-2], packed[-1], x, P, steps)
+        return tuple(FloatArray._wrap(carrier, carrier.unpack(p), fmt).to_fractions() for p in (x, P))
+
+    return run, [a.to_fractions().tolist() for a in arrays]
+
+
+def as_decimal(x: Fraction) -> decimal.Decimal:
+    """Exact; the number has a decimal expansion."""
+    with decimal.localcontext(prec=200):
+        return decimal.Decimal(x.numerator) / decimal.Decimal(x.denominator)
+
+
+def measure() -> list[Row]:
+    """Base 2 at 24 bits beside NumPy unrounded, base 10 beside ``decimal`` in the same order."""
+    given, x0, P0 = model()
+    run, _ = compiled(FloatFormat(2, 24))
+    times = medians({"gpbnb": partial(run, STEPS), "empty": partial(run, 0)}, 200)
+    step = {"gpbnb": (times["gpbnb"] - times["empty"]) / STEPS}
+    step |= medians({"numpy, unrounded": lambda: numpy_step(given, x0, P0)}, 2000)
+    table = rows("Kalman step, 24 bits", step, "gpbnb", {"numpy, unrounded": 1})
+    for precision, least in ((8, 30), (17, 10)):
+        run, operands = compiled(FloatFormat(10, precision))
+        exact = [[[as_decimal(x) for x in row] for row in a] for a in operands]
+        context = decimal.Context(prec=precision, rounding=decimal.ROUND_HALF_UP)
+
+        def with_decimal(context: Any = context, exact: Any = exact) -> Any:
+            with decimal.localcontext(context):
+                return plain_step(exact[:-2], exact[-2], exact[-1])
+
+        for computed, expected in zip(run(1), with_decimal(), strict=True):
+            if computed.tolist() != [[Fraction(x) for x in row] for row in expected]:
+                raise RuntimeError("gpbnb and decimal differ")
+        times = medians({"gpbnb": partial(run, STEPS), "empty": partial(run, 0), "decimal": with_decimal}, 100)
+        step = {"gpbnb": (times["gpbnb"] - times["empty"]) / STEPS, "decimal": times["decimal"]}
+        table += rows(f"Kalman step, {precision} decimal digits", step, "gpbnb", {"decimal": least})
+    return table

@@ -1,0 +1,74 @@
+"""Medians of wall times, measured in turns, so that a disturbance of the machine meets every library."""
+
+from __future__ import annotations
+
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import NamedTuple
+
+PACKAGES = ("numpy", "numba", "gfloat", "pychop", "mpmath")
+
+
+class Row(NamedTuple):
+    """One library at one task."""
+
+    task: str
+    library: str
+    seconds: float
+    ratio: float  # to the time of gpbnb
+    reach: str  # what gpbnb is to reach beside it
+    reached: str  # "yes", "no" or nothing
+
+
+def medians(works: dict[str, Callable[[], object]], turns: int, once: frozenset[str] = frozenset()) -> dict[str, float]:
+    """Median wall seconds of each work over `turns` turns, after one that is not counted; `once`: the slow ones."""
+    times: dict[str, list[float]] = {name: [] for name in works}
+    for name, work in works.items():
+        if name not in once:
+            work()
+    for turn in range(turns):
+        for name, work in works.items():
+            if name in once and turn:
+                continue
+            start = time.perf_counter()
+            work()
+            times[name].append(time.perf_counter() - start)
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def rows(task: str, times: dict[str, float], own: str, faster: dict[str, float]) -> list[Row]:
+    """A row for each library; `faster`: the least ratio to reach, below 1 for an allowed slowdown."""
+    table = []
+    for name, seconds in times.items():
+        ratio, least = seconds / times[own], faster.get(name)
+        reach = "" if least is None else f"≥ {least:g}×"
+        table.append(Row(task, name, seconds, ratio, reach, "" if least is None else "yes" if ratio >= least else "no"))
+    return table
+
+
+def machine() -> dict[str, str]:
+    """What it ran on."""
+    found = {
+        "processor": _processor(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+    }
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or "unknown"
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return f"{names[0]}, {len(names)} cores" if names else platform.processor() or "unknown"
