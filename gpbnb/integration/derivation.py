@@ -1,0 +1,381 @@
+"""The algebra of savage2016, derived again from (1) and (2); and what each slip of the print would have led to.
+
+Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\\infty} = \\sigma_x^2`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import sympy as sp
+
+from gpbnb.derivation import Derivation, Step, over, together
+
+OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
+MU = sp.Symbol("mu", positive=True)
+L, PHI = sp.symbols("L varphi", positive=True)
+N = sp.Symbol("n", integer=True, nonnegative=True)
+
+#: States and noises of (10) before a step, and the covariances of the states.
+X1, X2, X3, Q1, Q2 = sp.symbols("x_1 x_2 x_3 q_1 q_2")
+P11, P12, P22, P31, P32, P33 = sp.symbols("P_11 P_12 P_22 P_31 P_32 P_33")
+PHI11, PHI21, P11N, P12N, P22N = sp.symbols("phi_11 phi_21 P_11n P_12n P_22n")
+
+DECAY = sp.exp(-OMEGA * T)
+
+
+# -- the transition, (5)-(9) ----------------------------------------------------------------------
+
+
+@cache
+def transition_matrix() -> sp.ImmutableMatrix:
+    """The matrix exponential of A T, from (4) alone."""
+    return sp.ImmutableMatrix((sp.Matrix([[-OMEGA, 0], [1, 0]]) * T).exp().applyfunc(sp.simplify))
+
+
+def printed_transition() -> sp.Matrix:
+    """(7)."""
+    return sp.Matrix([[DECAY, 0], [(1 - DECAY) / OMEGA, 1]])
+
+
+def transition_residual(identity: bool) -> sp.Matrix:
+    r"""(7) less :math:`\int_0^T A\Phi\,d\tau`, the right side of (6); and less the identity that (6) lacks."""
+    a = sp.Matrix([[-OMEGA, 0], [1, 0]])
+    integrand = (a * printed_transition()).subs(T, TAU)
+    integral = integrand.applyfunc(lambda entry: sp.integrate(entry, (TAU, 0, T)))
+    return (printed_transition() - integral - (sp.eye(2) if identity else sp.zeros(2))).applyfunc(sp.simplify)
+
+
+def transition() -> Derivation:
+    """From (6), with the identity that it lacks, to (7) and (9)."""
+    ours = transition_matrix()
+    integral = sp.Integral(sp.exp(-OMEGA * TAU), (TAU, 0, T))
+    return Derivation(
+        (
+            Step(
+                "(6) with $I$ added, first row: $\\phi_{11}$ solves it",
+                together(1, -OMEGA * integral),
+                ours[0, 0],
+            ),
+            Step("second row: $\\phi_{21}$ of (7) and (9)", integral, ours[1, 0]),
+            Step("(9): $\\phi_{21}$ by $\\phi_{11}$", ours[1, 0], over(1 - ours[0, 0], OMEGA)),
+        )
+    )
+
+
+@cache
+def noise(kernel: str = "right") -> sp.ImmutableMatrix:
+    r"""Covariance of q_n of (6), from white noise of density :math:`N = 2\omega P`.
+
+    Parameters
+    ----------
+    kernel : "right", :math:`\int\Phi(t_n-\tau)n_p(\tau)d\tau`; "reversed", with :math:`\Phi(\tau-t_{n-1})`; "printed",
+        with :math:`\Phi(\tau)`, τ counted from the start of all cycles, t = t_{n-1}.
+    """
+    arguments = {"right": T - TAU, "reversed": TAU, "printed": TIME + TAU}
+    if kernel not in arguments:
+        raise ValueError(f"got kernel {kernel!r}; needed one of {', '.join(arguments)}")
+    column = printed_transition()[:, 0].subs(T, arguments[kernel])
+    density = 2 * OMEGA * P * column * column.T
+    return sp.ImmutableMatrix(density.applyfunc(lambda entry: sp.expand(sp.integrate(sp.expand(entry), (TAU, 0, T)))))
+
+
+def discretization() -> Derivation:
+    r"""The joint covariance of process and integral over a cycle, which the document does not need."""
+    q = noise()
+    lost = 1 - DECAY
+    kernel = (1 - sp.exp(-OMEGA * TAU)) / OMEGA
+    density = 2 * OMEGA * P
+    walk = (1 + DECAY) / (1 - DECAY) - 2 / (OMEGA * T)
+    bridge = P * T * walk * 2 / OMEGA * over(lost, 1 + DECAY)
+    return Derivation(
+        (
+            Step("$q_{11}$", sp.Integral(density * sp.exp(-2 * OMEGA * TAU), (TAU, 0, T)), P * (1 - DECAY**2)),
+            Step("$q_{12}$", sp.Integral(density * sp.exp(-OMEGA * TAU) * kernel, (TAU, 0, T)), P * lost**2 / OMEGA),
+            Step(
+                "$q_{22}$",
+                sp.Integral(sp.expand(density * kernel**2), (TAU, 0, T)),
+                P * (2 * OMEGA * T - 3 + 4 * DECAY - DECAY**2) / OMEGA**2,
+            ),
+            Step(
+                "$q_{22}$ from positive terms: what $q_1$ does not explain, and what it does",
+                q[1, 1],
+                together(bridge, over(q[0, 1] ** 2, q[0, 0])),
+            ),
+        )
+    )
+
+
+# -- covariances from cycle to cycle, (10)-(18) ---------------------------------------------------
+
+
+def expected(expression: sp.Expr) -> sp.Expr:
+    """Expected value of a product of states before a step and noises of the step; noises are new in every step."""
+    moments = {
+        (2, 0, 0, 0, 0): P11,
+        (1, 1, 0, 0, 0): P12,
+        (0, 2, 0, 0, 0): P22,
+        (1, 0, 1, 0, 0): P31,
+        (0, 1, 1, 0, 0): P32,
+        (0, 0, 2, 0, 0): P33,
+        (0, 0, 0, 2, 0): P11N - PHI11**2 * P11,
+        (0, 0, 0, 1, 1): P12N - PHI11 * (P12 + PHI21 * P11),
+        (0, 0, 0, 0, 2): P22N - P22 - 2 * PHI21 * P12 - PHI21**2 * P11,
+    }
+    polynomial = sp.Poly(sp.expand(expression), X1, X2, X3, Q1, Q2)
+    return sp.expand(sum(c * moments.get(powers, 0) for powers, c in polynomial.terms()))
+
+
+def after() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """The states after a step, (10)."""
+    x1 = PHI11 * X1 + Q1
+    return x1, X2 + PHI21 * X1 + Q2, X3 + (x1 + X1) * T / 2
+
+
+def printed_18(half: bool) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """P31, P32 and P33 after a step as in (18), the last term of P32 with the half that it lacks, or as printed."""
+    weight = sp.Rational(1, 2) if half else sp.Integer(1)
+    quarter = sp.Rational(1, 4)
+    return (
+        PHI11 * P31 + P11N * T / 2 + PHI11 * P11 * T / 2,
+        P32 + PHI21 * P31 + P12N * T / 2 + P12 * T / 2 + weight * PHI21 * P11 * T,
+        P33 + (1 + PHI11) * P31 * T + quarter * P11N * T**2 + (quarter + PHI11 / 2) * P11 * T**2,
+    )
+
+
+def covariances() -> Derivation:
+    """(16)-(18): products of (10), expected values, and what is left."""
+    x1, x2, x3 = after()
+    printed = printed_18(half=True)
+    names = (
+        "(18), $P_{31_n}=E(x_{3n}x_{1n})$",
+        "(18), $P_{32_n}$, with $\\frac12$ in its last term",
+        "(18), $P_{33_n}$",
+    )
+    products = (x3 * x1, x3 * x2, x3**2)
+    return Derivation(
+        tuple(
+            Step(name, expected(product), right) for name, product, right in zip(names, products, printed, strict=True)
+        )
+    )
+
+
+# -- the continuous covariances, (19)-(28) --------------------------------------------------------
+
+
+def p12(t: sp.Expr) -> sp.Expr:
+    """P12 of (23) at the time t."""
+    return P * (1 - sp.exp(-OMEGA * t)) / OMEGA
+
+
+def p22(t: sp.Expr) -> sp.Expr:
+    """P22 of (23) at the time t."""
+    return 2 * P / OMEGA * (t - (1 - sp.exp(-OMEGA * t)) / OMEGA)
+
+
+def p22_change(printed: bool) -> sp.Expr:
+    r"""(25) less :math:`P_{22_{n-1}}`, t = t_{n-1}; as printed it lacks a factor :math:`1/\omega`."""
+    factor = 1 if printed else 1 / OMEGA
+    return 2 * P / OMEGA * (T - factor * (1 - DECAY) * sp.exp(-OMEGA * TIME))
+
+
+def continuous() -> Derivation:
+    """(19)-(25): the covariance equation in components, and its solution from zero."""
+    a = sp.Matrix([[-OMEGA, 0], [1, 0]])
+    covariance = sp.Matrix([[P11, P12], [P12, P22]])
+    density = sp.Symbol("N_P11")
+    rate = a * covariance + covariance * a.T + sp.Matrix([[density, 0], [0, 0]])
+    return Derivation(
+        (
+            Step("(21), $\\dot P_{11}$", rate[0, 0], -2 * OMEGA * P11 + density),
+            Step("(21), $\\dot P_{12}$", rate[0, 1], P11 - OMEGA * P12),
+            Step("(21), $\\dot P_{22}$", rate[1, 1], 2 * P12),
+            Step("(22) is solved by $P_{12}$ of (23)", sp.Derivative(p12(TIME), TIME) + OMEGA * p12(TIME), P),
+            Step("(22) is solved by $P_{22}$ of (23)", sp.Derivative(p22(TIME), TIME), 2 * p12(TIME)),
+            Step("both begin at zero", together(p12(sp.Integer(0)), p22(sp.Integer(0))), sp.Integer(0)),
+            Step(
+                "(25) with the $1/\\omega$ that it lacks",
+                together(p22(TIME + T), -p22(TIME)),
+                p22_change(printed=False),
+            ),
+        )
+    )
+
+
+# -- the steady state, (30)-(35) ------------------------------------------------------------------
+
+
+def steady_changes(half: bool = True) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """ΔP32, ΔP33 and ΔP22 of (32) from (18) and (25) for large n."""
+    p31 = P * T / 2 * (1 + DECAY) / (1 - DECAY)
+    steady = {P11: P, P11N: P, P12: P / OMEGA, P12N: P / OMEGA, P31: p31, PHI11: DECAY, PHI21: (1 - DECAY) / OMEGA}
+    _, second, third = printed_18(half)
+    return (second - P32).subs(steady), (third - P33).subs(steady), 2 * P / OMEGA * T
+
+
+def walk() -> sp.Expr:
+    """(35) squared, over P T, in μ."""
+    return (1 + sp.exp(-MU)) / (1 - sp.exp(-MU)) - 2 / MU
+
+
+def steady_state() -> Derivation:
+    """(30)-(35), each as printed."""
+    quotient = (1 + DECAY) / (1 - DECAY)
+    phi21 = (1 - DECAY) / OMEGA
+    p31 = P * T / 2 * quotient
+    d32, d33, d22 = steady_changes()
+    last = quotient * T - 2 / OMEGA
+    return Derivation(
+        (
+            Step(
+                "(31) solves (30)",
+                together(DECAY * p31, P * T / 2 * (1 + DECAY)),
+                p31,
+            ),
+            Step("(32), $\\Delta P_{32}$", d32, (phi21 / (1 - DECAY) + 1 / OMEGA) * P * T),
+            Step("(32), $\\Delta P_{33}$", d33, quotient * P * T**2),
+            Step(
+                "(33)",
+                over(together(d33, d22, -2 * d32), T),
+                P * over((1 + DECAY) * T - 2 * phi21, 1 - DECAY),
+            ),
+            Step("(34) with the $T$ that its second member lacks", over((1 + DECAY) * T - 2 * phi21, 1 - DECAY), last),
+            Step("(35), squared, in units of $P\\,T$", (last / T).subs(OMEGA, MU / T), walk()),
+            Step("a Langevin function", walk(), sp.coth(MU / 2).rewrite(sp.exp) - 2 / MU),
+        )
+    )
+
+
+def independent() -> Derivation:
+    r"""The same from the errors of single cycles, without (10)-(34).
+
+    With :math:`R(\tau) = Pe^{-\omega|\tau|}`, the error of one cycle has the variance r_0; the error that follows k
+    cycles later has the covariance :math:`r_1e^{-\omega(k-1)T}` with it; and the variance of the sum grows by
+    :math:`r_0 + 2r_1 + 2r_2 + \dots` in a cycle.
+    """
+    s = sp.Symbol("s", positive=True)
+    along = sp.Integral(P * sp.exp(-OMEGA * TAU), (TAU, 0, T))
+    inner = sp.Integral(2 * P * (T - s) * sp.exp(-OMEGA * s), (s, 0, T))
+    r0 = P * (1 + DECAY) * T**2 / 2 + inner.doit() - T * 2 * along.doit()
+    drawn = T * (1 + DECAY) / 2 - (1 - DECAY) / OMEGA
+    r1 = P * drawn**2
+    grow = walk().subs(MU, OMEGA * T)
+    return Derivation(
+        (
+            Step(
+                "$r_0$: variance of the trapezoid, of the integral, and their covariance",
+                together(P * T**2 * (1 + DECAY) / 2, inner, -2 * T * along),
+                r0,
+            ),
+            Step(
+                "what a sample $x$ lets one expect of the next error is $gTx$",
+                drawn / T,
+                (1 - DECAY) / 2 * grow,
+            ),
+            Step(
+                "the sum $r_0 + 2r_1/(1-e^{-\\omega T})$ is (35)",
+                together(r0, over(2 * r1, 1 - DECAY)),
+                P * T**2 * grow,
+            ),
+        )
+    )
+
+
+def transient() -> Derivation:
+    r"""The variance at every n, for an input in its steady state; L is the Langevin function, φ is :math:`e^{-\mu}`."""
+    pee = N * L - L**2 / 2 * (1 - PHI**N)
+    c = L / 2 * (1 - PHI**N)
+    g = (1 - PHI) * L / 2
+    r = L - (1 - PHI) * L**2 / 2
+    r0, r1 = sp.symbols("r_0 r_1")
+    grown = {r0: r, r1: g**2}
+    k = sp.Symbol("k", integer=True, positive=True)
+    total = N * r0 + 2 * r1 * (N / (1 - PHI) - (1 - PHI**N) / (1 - PHI) ** 2)
+    return Derivation(
+        (
+            Step("$c_n = E(e_nx_{1n})$ in units of $\\sigma_x^2T$: its recursion", PHI * c + g, c.subs(N, N + 1)),
+            Step("$P_{n+1}$ from $P_n$, in units of $\\sigma_x^2T^2$", together(pee, 2 * g * c, r), pee.subs(N, N + 1)),
+            Step("it begins at zero", pee.subs(N, 0), sp.Integer(0)),
+            Step(
+                "the same from $n\\,r_0 + 2\\sum_{k<n}(n-k)\\,r_1\\varphi^{k-1}$, summed",
+                total.subs(grown),
+                pee,
+            ),
+            Step(
+                "that sum, by induction over $n$: one more cycle adds $r_0 + 2r_1(1-\\varphi^n)/(1-\\varphi)$",
+                together(total.subs(N, k + 1), -total.subs(N, k)),
+                r0 + 2 * r1 * (1 - PHI**k) / (1 - PHI),
+            ),
+        )
+    )
+
+
+# -- the expansion for small μ, (36)-(39) ---------------------------------------------------------
+
+
+def expansion(terms: int) -> list[sp.Expr]:
+    """Coefficients of μ⁻¹ … of the walk, from power series of e^{-μ} alone: the first `terms` from μ¹ on."""
+    order = terms + 3
+    numerator = [sp.Rational((-1) ** k, sp.factorial(k)) + int(k == 0) for k in range(order)]
+    denominator = [-sp.Rational((-1) ** (k + 1), sp.factorial(k + 1)) for k in range(order)]
+    quotient: list[sp.Expr] = []
+    for k in range(order):
+        quotient.append((numerator[k] - sum(quotient[j] * denominator[k - j] for j in range(k))) / denominator[0])
+    if quotient[0] != 2 or quotient[1] != 0:
+        raise ArithmeticError(f"got {quotient[:2]} for the terms in 1/μ and 1; needed 2 and 0")
+    return quotient[2 : terms + 2]
+
+
+def printed_37(cubic: sp.Expr) -> sp.Expr:
+    r"""The walk from the quotient in (37), its numerator :math:`1-\frac12\mu+\frac14\mu^2-c\mu^3`, to order μ²."""
+    numerator = 1 - MU / 2 + MU**2 / 4 - cubic * MU**3
+    denominator = 1 - MU / 2 + MU**2 / 6 - MU**3 / 24
+    return sp.series(2 / MU * (numerator / denominator - 1), MU, 0, 3).removeO()
+
+
+def small_mu() -> Derivation:
+    """(36)-(39), term by term."""
+    twelfth = sp.Rational(1, 12)
+    cubic = 2 - MU + MU**2 / 2 - MU**3 / 6
+    sigma, f = sp.symbols("sigma_x f_c", positive=True)
+    return Derivation(
+        (
+            Step(
+                "(36)",
+                sp.series(sp.exp(-MU), MU, 0, 4).removeO(),
+                1 - MU + MU**2 / 2 - MU**3 / 6,
+            ),
+            Step(
+                "(37), numerator: its cubic term is $\\frac1{12}\\mu^3$, printed $\\frac16\\mu^3$",
+                cubic,
+                2 * (1 - MU / 2 + MU**2 / 4 - twelfth * MU**3),
+            ),
+            Step("(37), result", sp.Limit(walk() / MU, MU, 0), sp.Rational(1, 6)),
+            Step("the next term", expansion(3)[2], sp.Rational(-1, 360)),
+            Step("(38) to (39)", sigma * sp.sqrt(OMEGA / f / f / 6), sp.sqrt(OMEGA / 6) / f * sigma),
+        )
+    )
+
+
+# -- what the slips would have led to -------------------------------------------------------------
+
+
+def slips() -> dict[str, sp.Expr]:
+    """The steady-state rate, over P T, in μ, had the print been used: 0 where the document uses it and is right.
+
+    "(12)": without P22, of which the print takes the square of a mean. "(18)": with the full last term of P32. "(25)":
+    large n. "(34)": without T, taken in seconds as 1. "(37)": its expansion to μ².
+    """
+    d32, d33, d22 = steady_changes()
+    wrong32 = steady_changes(half=False)[0]
+
+    def rate(expression: sp.Expr) -> sp.Expr:
+        return sp.simplify((expression / (P * T**2)).subs(OMEGA, MU / T))
+
+    return {
+        "(12)": rate(d33 - 2 * d32),
+        "(18)": rate(d33 + d22 - 2 * wrong32),
+        "(25)": rate(d33 + sp.limit(p22_change(printed=True), TIME, sp.oo) - 2 * d32),
+        "(34)": sp.simplify(((1 + DECAY - 2 / OMEGA * (1 - DECAY)) / (1 - DECAY) / T).subs(OMEGA, MU / T)),
+        "(37)": printed_37(sp.Rational(1, 6)),
+    }

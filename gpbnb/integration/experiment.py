@@ -1,0 +1,465 @@
+"""What does happen: integrals simulated exactly at the sampling times, and run in t-digit arithmetic."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import mpmath
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from gpbnb._kernels.carriers import Compiled
+from gpbnb._kernels.scalar import add, load, multiply, round_, store
+from gpbnb._kernels.tags import Double
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.integration import theory
+from gpbnb.integration.theory import Process, Rule, Step
+
+Floats = NDArray[np.float64]
+
+CHUNK = 1 << 20  # normal numbers held at a time
+
+# -- how exactly the closed form is evaluated -----------------------------------------------------
+
+
+class Accuracy(NamedTuple):
+    """Errors of an evaluation in float64 against one of many digits, in units of the last place of the result."""
+
+    mu: Floats
+    ulp: Floats
+
+
+def _exact(name: str, mu: float) -> Any:
+    """A value of (35), or of the discretization, in as many digits as it cancels."""
+    with mpmath.workdps(60 + 3 * max(0, math.ceil(-math.log10(mu)))):
+        m = mpmath.mpf(mu)
+        phi = mpmath.exp(-m)
+        walk = (1 + phi) / (1 - phi) - 2 / m
+        return {
+            "walk": lambda: walk,
+            "phi11": lambda: phi,
+            "phi21": lambda: (1 - phi) / m,
+            "q11": lambda: 1 - phi**2,
+            "q12": lambda: (1 - phi) ** 2 / m,
+            "q22": lambda: (2 * m - 3 + 4 * phi - phi**2) / m**2,
+            "bridge": lambda: walk * mpmath.tanh(m / 2) / (m / 2),
+        }[name]()
+
+
+def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
+    """Compare an evaluation with mpmath.
+
+    Parameters
+    ----------
+    name : "walk" for (35), or a field of :class:`gpbnb.integration.theory.Discretization`.
+    mu : (k,), positive.
+    printed : the form that cancels instead of the stable one; for "walk" and "q22".
+    """
+    if name != "walk" and name not in theory.Discretization._fields:
+        raise ValueError(f"got name {name!r}; needed 'walk' or one of {', '.join(theory.Discretization._fields)}")
+    if printed and name not in ("walk", "q22"):
+        raise ValueError(f"got name {name!r} as printed; needed 'walk' or 'q22'")
+    values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
+    if name == "walk":
+        found = theory.printed_walk_factor(values) if printed else theory.walk_factor(values)
+    else:
+        found = theory.printed_discretization_q22(values) if printed else getattr(theory.discretize(values), name)
+    errors = []
+    for one, value in zip(values.tolist(), found.tolist(), strict=True):
+        exact = _exact(name, one)
+        size = abs(float(exact))
+        away = abs(mpmath.mpf(value) - exact) if math.isfinite(value) else mpmath.inf
+        errors.append(float(away / mpmath.mpf(float(np.spacing(max(size, np.finfo(float).tiny))))))
+    return Accuracy(values, np.array(errors))
+
+
+# -- simulation, exact at the sampling times ------------------------------------------------------
+
+
+@njit(cache=True, nogil=True)
+def _advance(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
+    """Move all paths; x[k] and d[k] are the new sample and the error of the trapezoid that ends there."""
+    cycles, paths, size = normal.shape
+    m = size - 1
+    new = np.empty(size)
+    for k in range(cycles):
+        for path in range(paths):
+            for i in range(size):
+                total = 0.0
+                for j in range(m):
+                    total += a[i, j] * state[path, j]
+                for j in range(i + 1):
+                    total += b[i, j] * normal[k, path, j]
+                new[i] = total
+            for i in range(m):
+                state[path, i] = new[i]
+            x[k, path] = new[0]
+            d[k, path] = new[m]
+
+
+@njit(cache=True, nogil=True)
+def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
+    """The same for an input of first order, digit for digit."""
+    phi, h, b00, b10, b11 = a[0, 0], a[1, 0], b[0, 0], b[1, 0], b[1, 1]
+    cycles, paths, _ = normal.shape
+    for k in range(cycles):
+        for path in range(paths):
+            old, first = state[path, 0], normal[k, path, 0]
+            new = phi * old + b00 * first
+            d[k, path] = h * old + b10 * first + b11 * normal[k, path, 1]
+            x[k, path] = new
+            state[path, 0] = new
+
+
+def advance(step: Step, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
+    """Samples and errors of the trapezoids, cycle by cycle, from standard normal numbers.
+
+    Parameters
+    ----------
+    step : from :func:`gpbnb.integration.theory.exact_step`.
+    state : (paths, m), at the start; at the end afterwards.
+    normal : (cycles, paths, m + 1).
+
+    Returns
+    -------
+    x, d : (cycles, paths) each.
+    """
+    x, d = np.empty(normal.shape[:2]), np.empty(normal.shape[:2])
+    (_advance_one if state.shape[1] == 1 else _advance)(step.a, step.b, state, normal, x, d)
+    return x, d
+
+
+class Piece(NamedTuple):
+    """Some cycles of a simulation: `first` is the number of the first one, x and d are (cycles, paths).
+
+    x begins `memory` samples before those of d, so that ``x[memory + k]`` is the sample at the end of cycle
+    ``first + k``.
+    """
+
+    first: int
+    x: Floats
+    d: Floats
+
+
+def pieces(
+    process: Process, f_c: float, cycles: int, rng: np.random.Generator, paths: int = 1, memory: int = 1
+) -> Iterator[Piece]:
+    """Simulate a process and the error of the trapezoidal rule, exact in distribution at the sampling times.
+
+    No step is subdivided: the sample and the integral over a cycle are drawn from their joint distribution, given what
+    was before. It begins in the steady state. Memory is bounded, whatever the number of cycles, and the numbers do
+    not depend on how they are cut into pieces.
+
+    Parameters
+    ----------
+    f_c : iteration rate, Hz.
+    memory : samples before the first of a piece that come with it.
+
+    Yields
+    ------
+    piece : the cycles 1, 2, … in order.
+
+    Raises
+    ------
+    ValueError : fewer than 1 cycle, path or sample of memory.
+    """
+    if min(cycles, paths, memory) < 1:
+        raise ValueError(f"got {cycles} cycles, {paths} paths, a memory of {memory}; needed at least 1 of each")
+    step = theory.exact_step(process, f_c)
+    m = len(process.drift)
+    state = process.sigma * rng.standard_normal((paths, m))
+    before = [state[:, 0].copy()]
+    for _ in range(memory - 1):
+        x, _ = advance(step, state, rng.standard_normal((1, paths, m + 1)))
+        before.append(x[0])
+    past = np.array(before)
+    length = max(1, CHUNK // (paths * (m + 1)))
+    for first in range(1, cycles + 1, length):
+        x, d = advance(step, state, rng.standard_normal((min(length, cycles + 1 - first), paths, m + 1)))
+        x = np.concatenate([past, x])
+        past = x[-memory:]
+        yield Piece(first, x, d)
+
+
+def rule_errors(rule: Rule, f_c: float, piece: Piece) -> Floats:
+    """Error that each cycle of a piece adds when integrated by a rule; (cycles, paths)."""
+    memory, cycles = len(piece.x) - len(piece.d), len(piece.d)
+    if memory < rule.memory:
+        raise ValueError(f"got a memory of {memory} samples; needed {rule.memory} for the rule {rule.name!r}")
+    added = piece.d.copy()
+    period = 1 / f_c
+    for r, weights in enumerate(rule.weights):
+        rows = np.arange((r + 1 - piece.first) % rule.period, cycles, rule.period)
+        for j in range(max(2, len(weights))):
+            w = (float(weights[j]) if j < len(weights) else 0.0) - (0.5 if j < 2 else 0.0)
+            if w:
+                added[rows] += period * w * piece.x[memory + rows - j]
+    return added
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """Errors of an integrator after `n` cycles: `errors` is (len(n), paths), in the unit of the input times seconds."""
+
+    process: Process
+    f_c: float
+    rule: Rule
+    n: tuple[int, ...]
+    errors: Floats
+
+    @property
+    def variance(self) -> Floats:
+        """Mean square of the errors; their mean is known to be zero."""
+        return np.asarray(np.mean(self.errors**2, axis=1))
+
+    @property
+    def relative_standard_error(self) -> float:
+        r"""Of :attr:`variance`: :math:`\\sqrt{2/\\mathrm{paths}}`, since the errors are normal."""
+        return math.sqrt(2 / self.errors.shape[1])
+
+    def deviations(self, variance: ArrayLike) -> Floats:
+        """How far the observed variance is from a theoretical one, in standard errors."""
+        expected = np.asarray(variance, dtype=np.float64)
+        return np.asarray((self.variance / expected - 1) / self.relative_standard_error)
+
+
+def simulate(
+    process: Process,
+    f_c: float,
+    n: Sequence[int],
+    rng: np.random.Generator,
+    paths: int = 1,
+    rule: Rule = theory.RULES["trapezoidal"],
+) -> Simulation:
+    """Simulate the error of an integrator, and keep it after each of some numbers of cycles.
+
+    Parameters
+    ----------
+    n : cycles, rising, at least 1; multiples of the period of the rule, or its unfinished period counts as error.
+    """
+    wanted = tuple(int(k) for k in n)
+    if not wanted or wanted[0] < 1 or list(wanted) != sorted(set(wanted)):
+        raise ValueError(f"got n = {tuple(n)}; needed rising numbers of cycles, at least 1")
+    total, kept = np.zeros(paths), []
+    for piece in pieces(process, f_c, wanted[-1], rng, paths, rule.memory):
+        added = piece.d if rule.name == "trapezoidal" else rule_errors(rule, f_c, piece)
+        last = piece.first + len(added) - 1
+        cuts = [k for k in wanted if piece.first <= k <= last]
+        begin = 0
+        for k in cuts:
+            end = k - piece.first + 1
+            total = total + added[begin:end].sum(axis=0)
+            kept.append(total)
+            begin = end
+        total = total + added[begin:].sum(axis=0)
+    return Simulation(process, f_c, rule, wanted, np.array(kept))
+
+
+@dataclass(frozen=True)
+class Sweep:
+    r"""Random walks observed at many :math:`\mu`, as variance per cycle over :math:`\sigma_x^2T^2`."""
+
+    mu: Floats
+    cycles: int
+    paths: int
+    walk: Floats
+
+    @property
+    def standard_error(self) -> float:
+        """Relative, of `walk`."""
+        return math.sqrt(2 / self.paths)
+
+    def deviations(self) -> Floats:
+        """From the exact variance after as many cycles, in standard errors."""
+        exact = np.array([float(theory.error_variance(self.cycles, mu)) for mu in self.mu.tolist()]) / self.cycles
+        return np.asarray((self.walk / exact - 1) / self.standard_error)
+
+    def deviations_from(self, factor: Floats) -> Floats:
+        """From another theory of the variance per cycle, in standard errors."""
+        return np.asarray((self.walk / factor - 1) / self.standard_error)
+
+
+def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> Sweep:
+    """Simulate the random walk of the trapezoidal rule at many ratios of bandwidth to iteration rate.
+
+    Parameters
+    ----------
+    cycles : in each run; the variance per cycle is short of the steady one by at most 1/(2 cycles) of itself.
+    paths : independent runs; the relative standard error of a variance is √(2/paths).
+    """
+    values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
+    runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in values.tolist()]
+    return Sweep(values, cycles, paths, np.array([run.variance[0] for run in runs]) / cycles)
+
+
+# -- the integrator in t-digit arithmetic ---------------------------------------------------------
+
+
+@njit(cache=True, nogil=True)
+def _integrate(fmt: Any, half: Any, x: Any, total: Any) -> None:
+    """(2) for each path: add half T times the sum of two samples to the accumulator, every operation rounded.
+
+    x is (samples, paths) in the format, its first row the sample before; `half` and `total` are (1,) and (paths,).
+    """
+    factor = load(fmt, half, 0)
+    for path in range(x.shape[1]):
+        s = load(fmt, total, path)
+        old = load(fmt, x, (0, path))
+        for k in range(1, x.shape[0]):
+            new = load(fmt, x, (k, path))
+            s = add(fmt, s, multiply(fmt, factor, add(fmt, new, old)))
+            old = new
+        store(fmt, total, path, s)
+
+
+@njit(cache=True, nogil=True)
+def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
+    """The same for samples in float64, each of which is rounded as it comes in."""
+    factor = load(fmt, half, 0)
+    for path in range(x.shape[1]):
+        s = load(fmt, total, path)
+        old = round_(fmt, x[0, path])
+        for k in range(1, x.shape[0]):
+            new = round_(fmt, x[k, path])
+            s = add(fmt, s, multiply(fmt, factor, add(fmt, new, old)))
+            old = new
+        store(fmt, total, path, s)
+
+
+class Accumulator:
+    """The trapezoidal rule (2) in a format, fed piece by piece.
+
+    Parameters
+    ----------
+    fmt : one with compiled loops: base 2, 10 or 16.
+    period : T, s; T/2 is rounded to the format.
+    paths : integrals that run side by side.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops.
+    """
+
+    def __init__(self, fmt: FloatFormat, period: float, paths: int) -> None:
+        carrier = fmt.carrier
+        if not isinstance(carrier, Compiled):
+            raise ValueError(f"got {fmt}; needed base 2 to 53 bits, base 10 to 18 digits, or base 16 to 13 digits")
+        self.fmt, self.carrier = fmt, carrier
+        self._half = carrier.pack(fmt.array([period / 2])._parts)
+        self._total = carrier.pack(fmt.array(np.zeros(paths))._parts)
+
+    def feed(self, x: Floats) -> None:
+        """Go on with the samples x, (samples, paths); the first row is the last one of the piece before."""
+        if self.fmt.base == 10:
+            packed = self.carrier.pack(self.fmt.array(x)._parts)
+            _integrate(self.carrier.tag, self._half, packed, self._total)
+        else:
+            _integrate_rounding(self.carrier.tag, self._half, x, self._total)
+
+    @property
+    def value(self) -> Floats:
+        """The integrals so far, (paths,), nearest float64."""
+        return self.carrier.to_float(self.carrier.unpack(self._total))
+
+
+@dataclass(frozen=True)
+class Emulation:
+    """Integrals in a format beside the true ones; errors are (paths,), in the unit of the input times seconds."""
+
+    fmt: FloatFormat
+    omega_bw: float
+    f_c: float
+    duration: float
+    discretization: Floats
+    rounding: Floats
+
+    @property
+    def rms(self) -> theory.Errors:
+        """Root mean squares of the two errors."""
+        return theory.Errors(*(math.sqrt(float(np.mean(e**2))) for e in (self.discretization, self.rounding)))
+
+    @property
+    def rms_total(self) -> float:
+        """Root mean square of the error of the integral."""
+        return math.sqrt(float(np.mean((self.discretization + self.rounding) ** 2)))
+
+
+def emulate(
+    omega_bw: float,
+    f_c: float,
+    duration: float,
+    formats: Sequence[FloatFormat],
+    rng: np.random.Generator,
+    paths: int = 64,
+    sigma_x: float = 1.0,
+) -> tuple[Emulation, ...]:
+    """Run the integrator in some formats on the same samples, beside float64 and the true integral.
+
+    The rounding error is the difference from the same rule in float64 on unrounded samples, whose own rounding is
+    left out: formats of up to 40 bits, or 12 decimal digits.
+
+    Parameters
+    ----------
+    duration : s; rounded to whole cycles.
+    """
+    for fmt in formats:
+        if fmt.precision * math.log2(fmt.base) > 41:
+            raise ValueError(f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer digits")
+    process = theory.first_order(sigma_x, omega_bw)
+    cycles = round(theory._scalar("duration", duration) * theory._scalar("f_c", f_c))
+    running = [Accumulator(fmt, 1 / f_c, paths) for fmt in formats]
+    error, reference, half = np.zeros(paths), np.zeros(paths), np.array([0.5 / f_c])
+    for piece in pieces(process, f_c, cycles, rng, paths):
+        error = error + piece.d.sum(axis=0)
+        _integrate_rounding(Double(), half, piece.x, reference)
+        for one in running:
+            one.feed(piece.x)
+    return tuple(
+        Emulation(one.fmt, omega_bw, f_c, duration, error, np.asarray(one.value - reference)) for one in running
+    )
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """Both errors over the iteration rate, in several formats: what was observed, (formats, rates)."""
+
+    omega_bw: float
+    duration: float
+    paths: int
+    formats: tuple[FloatFormat, ...]
+    rates: Floats
+    discretization: Floats
+    rounding: Floats
+    total: Floats
+
+    def theory(self, fmt: FloatFormat, rates: Floats) -> Floats:
+        """Discretization, rounding and total as they may be; (3, rates)."""
+        found = [theory.two_errors(1.0, self.omega_bw, f, self.duration, fmt) for f in rates.tolist()]
+        return np.array([(e.discretization, e.rounding, e.total) for e in found]).T
+
+    def ratios(self) -> Floats:
+        """Observed over theoretical rounding error, (formats, rates)."""
+        expected = np.array([self.theory(fmt, self.rates)[1] for fmt in self.formats])
+        return np.asarray(self.rounding / expected)
+
+
+def meet(
+    omega_bw: float,
+    duration: float,
+    formats: Sequence[FloatFormat],
+    rates: Sequence[float],
+    rng: np.random.Generator,
+    paths: int = 64,
+) -> Meeting:
+    """Emulate an integrator over iteration rates and formats; rates are powers of two, so that T/2 is exact."""
+    runs = [emulate(omega_bw, f_c, duration, formats, rng, paths) for f_c in rates]
+    table = np.array([[(*run.rms, run.rms_total) for run in at_rate] for at_rate in runs]).transpose(2, 1, 0)
+    return Meeting(omega_bw, duration, paths, tuple(formats), np.array(rates, dtype=np.float64), *table)
+
+
+#: The formats of the chapter's figure.
+FORMATS = (FloatFormat(2, 11), FloatFormat(2, 16), FloatFormat(2, 16, Rounding.CHOP), FloatFormat(2, 24))

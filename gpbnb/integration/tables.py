@@ -1,0 +1,97 @@
+"""Tables of the chapter on digital integration."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.integration import derivation, theory
+from gpbnb.integration.theory import Process
+from gpbnb.tables import Table, digits
+
+
+def sensor(sigma_x: float, bandwidth_hz: float, unit: str, rates: Sequence[float]) -> Table:
+    """Random walk of an integrated sensor at some iteration rates.
+
+    Parameters
+    ----------
+    sigma_x : rms of what the sensor sees, in `unit` per second.
+    bandwidth_hz : of it, Hz; times 2π for rad/s.
+    unit : of the integral, as "°".
+    rates : Hz.
+    """
+    omega = 2 * math.pi * bandwidth_hz
+    body: list[tuple[str, ...]] = []
+    for f_c in rates:
+        exact, printed = (walk(sigma_x, omega, f_c) for walk in (theory.random_walk, theory.printed_random_walk))
+        body.append(
+            (
+                f"{f_c:g}",
+                f"{omega / f_c:.3g}",
+                f"{exact:.3g}",
+                f"{printed:.3g}",
+                f"{printed / exact - 1:.2g}",
+                f"{exact * 60:.3g}",
+            )
+        )
+    header = (
+        "$f_c$, Hz",
+        "$\\mu$",
+        f"(35), {unit}/√s",
+        f"(39), {unit}/√s",
+        "(39)/(35) − 1",
+        f"(35), {unit}/√h, and {unit} after an hour",
+    )
+    return Table(f"random walk at {len(body)} rates", header, tuple(body))
+
+
+def rules(processes: Sequence[tuple[Process, float]]) -> Table:
+    """Random walk of every rule over that of the trapezoidal one, for pairs of a process and a rate in Hz."""
+    body: list[tuple[str, ...]] = []
+    for rule in theory.RULES.values():
+        cells = [rule.name, str(rule.period)]
+        for process, f_c in processes:
+            ratio = theory.walk_rate(process, f_c, rule) / theory.walk_rate(process, f_c)
+            cells.append(f"{math.sqrt(ratio):.4g}")
+        body.append(tuple(cells))
+    names = (f"{process.name}, $|p|T = {max(abs(p) for p in process.poles) / f_c:.3g}$" for process, f_c in processes)
+    return Table(f"{len(body)} rules", ("rule", "cycles a period", *names), tuple(body))
+
+
+def slips(mu: float = 0.1, period: float = 0.01) -> Table:
+    """What each slip of the print would have made of the rate, at one μ and a cycle time in s."""
+    right = float(derivation.walk().subs(derivation.MU, mu))
+    body: list[tuple[str, ...]] = []
+    for place, rate in derivation.slips().items():
+        value = float(rate.subs({derivation.MU: mu, derivation.T: period}))
+        spoiled = "no" if math.isclose(value, right, rel_tol=1e-9) else "yes"
+        body.append((place, f"{value:.5g}", f"{right:.5g}", spoiled))
+    header = ("slip in", f"rate over $\\sigma_x^2T$ if used, $\\mu = {mu:g}$", "right", "spoils (35)")
+    return Table(f"{len(body)} slips", header, tuple(body))
+
+
+def design(omega_bw: float, duration: float, precisions: Sequence[int], base: int = 2) -> Table:
+    """The best rate of formats and the two errors there, over the input's rms; "none" where no rate will do."""
+    body: list[tuple[str, ...]] = []
+    for t in precisions:
+        for rounding in Rounding:
+            fmt = FloatFormat(base, t, rounding)
+            try:
+                rate = theory.best_rate(omega_bw, duration, fmt)
+            except ValueError:
+                body.append((digits(fmt), rounding.value, "none", "", "", ""))
+                continue
+            errors = theory.two_errors(1.0, omega_bw, rate, duration, fmt)
+            body.append(
+                (
+                    digits(fmt),
+                    rounding.value,
+                    f"{rate:,.3g}",
+                    f"{theory.independent_best_rate(omega_bw, duration, fmt):,.3g}",
+                    f"{errors.discretization:.2g}",
+                    f"{errors.rounding:.2g}",
+                )
+            )
+    header = ("format", "rounding", "best $f_c$, Hz", "closed form, Hz", "discretization, s", "rounding, s")
+    return Table(f"{len(body)} formats", header, tuple(body))
