@@ -9,7 +9,7 @@ from functools import cache
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, over, together
+from gpbnb.derivation import Derivation, Step, held, over, together
 
 OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
 MU = sp.Symbol("mu", positive=True)
@@ -335,24 +335,23 @@ def printed_37(cubic: sp.Expr) -> sp.Expr:
 
 def small_mu() -> Derivation:
     """(36)-(39), term by term."""
-    twelfth = sp.Rational(1, 12)
-    cubic = 2 - MU + MU**2 / 2 - MU**3 / 6
+    cubic = 1 - MU + MU**2 / 2 - MU**3 / 6
     sigma, f = sp.symbols("sigma_x f_c", positive=True)
     return Derivation(
         (
             Step(
-                "(36)",
-                sp.series(sp.exp(-MU), MU, 0, 4).removeO(),
-                1 - MU + MU**2 / 2 - MU**3 / 6,
+                "(36): what it leaves out is of a higher order",
+                sp.Limit((sp.exp(-MU) - cubic) / MU**3, MU, 0),
+                sp.Integer(0),
             ),
             Step(
                 "(37), numerator: its cubic term is $\\frac1{12}\\mu^3$, printed $\\frac16\\mu^3$",
-                cubic,
-                2 * (1 - MU / 2 + MU**2 / 4 - twelfth * MU**3),
+                together(1, cubic),
+                sp.Mul(2, held(1 - MU / 2 + MU**2 / 4 - MU**3 / 12), evaluate=False),
             ),
             Step("(37), result", sp.Limit(walk() / MU, MU, 0), sp.Rational(1, 6)),
-            Step("the next term", expansion(3)[2], sp.Rational(-1, 360)),
-            Step("(38) to (39)", sigma * sp.sqrt(OMEGA / f / f / 6), sp.sqrt(OMEGA / 6) / f * sigma),
+            Step("the next term", sp.Limit((walk() - MU / 6) / MU**3, MU, 0), sp.Rational(-1, 360)),
+            Step("(38) to (39)", sigma * sp.sqrt(held(OMEGA / f) / (6 * f)), sp.sqrt(OMEGA / 6) / f * sigma),
         )
     )
 

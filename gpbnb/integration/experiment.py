@@ -436,6 +436,16 @@ class Meeting:
     rounding: Floats
     total: Floats
 
+    @property
+    def standard_error(self) -> float:
+        r"""Relative, of a rounding error's rms over the paths.
+
+        Given its path an error is normal, with a variance V that goes with :math:`\int x_3^2dt`. For a random walk
+        :math:`E(V^2) = \frac73E(V)^2`, so that the mean square has the relative variance
+        :math:`(3\cdot\frac73-1)/\mathrm{paths}`.
+        """
+        return math.sqrt(6 / self.paths) / 2
+
     def theory(self, fmt: FloatFormat, rates: Floats) -> Floats:
         """Discretization, rounding and total as they may be; (3, rates)."""
         found = [theory.two_errors(1.0, self.omega_bw, f, self.duration, fmt) for f in rates.tolist()]

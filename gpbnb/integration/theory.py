@@ -69,7 +69,7 @@ def walk_factor(mu: ArrayLike) -> Floats:
 
 
 def printed_walk_factor(mu: ArrayLike) -> Floats:
-    """The same, evaluated in float64 just as (35) is printed; NaN where that divides zero by zero."""
+    """The same, evaluated in float64 just as (35) is printed; infinite where that divides by zero."""
     mu = _positive("mu", mu)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.asarray((1 + np.exp(-mu)) / (1 - np.exp(-mu)) - 2 / mu)

@@ -1,0 +1,463 @@
+"""gpbnb.integration.theory: closed forms against mpmath, quadrature, recursions and each other."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import integrate
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.integration import experiment, theory
+
+RULES = list(theory.RULES.values())
+each_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+FIRST = theory.first_order(1.7, 3.0)
+RINGING = theory.resonant(1.3, 3.0, 0.2)
+TRAPEZOIDAL = theory.RULES["trapezoidal"]
+CHOP = Rounding.CHOP
+
+
+# -- the stable evaluation ------------------------------------------------------------------------
+
+MU = np.concatenate(
+    [
+        10.0 ** np.random.default_rng(1).uniform(-300, 300, 300),
+        10.0 ** np.random.default_rng(2).uniform(-3, 3, 500),
+        np.linspace(3.9, 4.1, 100),  # where the continued fraction ends
+        [1e-300, 1e300, 4.0, np.nextafter(4.0, 5.0), 1e-154, 1e154],
+    ]
+)
+#: Of few roundings each; the largest seen are 1.2, 0.7, 1.4, 0.5, 2.2, 2.6 and 2.3.
+MOST_ULP = {"walk": 1.5, "phi11": 1.0, "phi21": 2.0, "q11": 1.0, "q12": 3.0, "q22": 4.0, "bridge": 4.0}
+
+
+@pytest.mark.parametrize("name", MOST_ULP)
+def test_right_to_a_few_units_in_the_last_place_everywhere(name):
+    assert experiment.accuracy(name, MU).ulp.max() <= MOST_ULP[name]
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(1e-300, 1e300))
+def test_any_ratio_is_evaluated_stably(mu):
+    assert experiment.accuracy("walk", mu).ulp.max() <= 1.5
+
+
+def test_as_printed_nothing_is_left_for_small_ratios():
+    printed = experiment.accuracy("walk", [1e-2, 1e-4, 1e-8, 1e-20], printed=True).ulp
+    # Each subtraction of 2/μ leaves an absolute error near 2**-53 · 2/μ beside μ/6.
+    assert 1e2 < printed[0] < 1e7
+    assert 1e7 < printed[1] < 1e11
+    assert np.all(printed[2:] > 1e15)
+    assert experiment.accuracy("q22", [1e-3], printed=True).ulp[0] > 1e6
+
+
+def test_langevin_is_the_function_of_that_name():
+    x = np.array([0.1, 1.0, 2.0, 3.0, 30.0, 800.0])
+    assert theory.langevin(x) == pytest.approx(1 / np.tanh(x) - 1 / x, rel=2e-14)
+    slope = (theory.langevin(x + 1e-5) - theory.langevin(x - 1e-5)) / 2e-5
+    value = theory.langevin(x)
+    assert slope == pytest.approx(1 - value**2 - 2 * value / x, abs=1e-9)
+    assert theory.langevin(np.array([[1.0], [2.0]])).shape == (2, 1)
+    assert theory.langevin(0.7).shape == ()
+
+
+def test_the_printed_form_agrees_where_it_does_not_cancel():
+    mu = np.array([5.0, 10.0, 100.0, 1000.0])
+    assert theory.walk_factor(mu) == pytest.approx(theory.printed_walk_factor(mu), rel=1e-15)
+    assert math.isinf(theory.printed_walk_factor(1e-300))
+
+
+def test_the_series_is_that_of_the_function():
+    coefficients = theory.series(12)
+    assert coefficients[:3] == (Fraction(1, 6), Fraction(-1, 360), Fraction(1, 15120))
+    mu = 0.9
+    total = sum(float(c) * mu ** (2 * k + 1) for k, c in enumerate(coefficients))
+    assert total == pytest.approx(float(theory.walk_factor(mu)), rel=1e-15)
+    # Its radius is 2π: the ratio of the coefficients tends to -1/4π².
+    assert float(coefficients[-1] / coefficients[-2]) == pytest.approx(-1 / (4 * math.pi**2), rel=1e-5)
+
+
+# -- (35) and (39) --------------------------------------------------------------------------------
+
+
+def test_random_walk_scales_as_its_units_do():
+    base = theory.random_walk(2.0, 3.0, 7.0)
+    assert theory.random_walk(6.0, 3.0, 7.0) == pytest.approx(3 * base, rel=1e-15)
+    assert theory.random_walk(2.0, 12.0, 28.0) == pytest.approx(base / 2, rel=1e-15)
+    assert base == pytest.approx(2 * math.sqrt((1 / math.tanh(3 / 14) - 14 / 3) / 7), rel=1e-13)
+
+
+def test_the_approximation_is_the_small_limit_and_too_large():
+    assert theory.printed_random_walk(2.0, 3.0, 7.0) == pytest.approx(2 / 7 * math.sqrt(0.5), rel=1e-15)
+    mu = np.geomspace(1e-3, 1e3, 50)
+    ratio = theory.approximation_ratio(mu)
+    assert np.all(np.diff(ratio) > 0)
+    assert ratio[0] - 1 == pytest.approx(1e-6 / 120, rel=1e-3)
+    for excess in (1e-6, 0.01, 0.1, 2.0):
+        assert theory.approximation_ratio(theory.validity(excess)) - 1 == pytest.approx(excess, rel=1e-6)
+
+
+def test_exponents_go_from_those_of_the_abstract_to_others():
+    width, rate = theory.exponents([1e-3, 1e4])
+    # xL'/2L = 1/2 - μ²/120 + …, and 1/μ beyond; differences have errors of 1e-12 or so.
+    assert width == pytest.approx([0.5, 1e-4], abs=1e-6)
+    assert rate == pytest.approx(-0.5 - width, abs=1e-15)
+    mu, h = 2.0, 1e-5
+    by_rate = math.log(theory.random_walk(1, mu, math.exp(h)) / theory.random_walk(1, mu, math.exp(-h))) / (2 * h)
+    assert float(theory.exponents(mu)[1]) == pytest.approx(by_rate, abs=1e-8)
+
+
+@pytest.mark.parametrize("limit", [1e-6, 0.01, 0.3, 50.0])
+def test_the_required_rate_meets_the_limit(limit):
+    rate = theory.required_rate(2.0, 30.0, limit)
+    assert theory.random_walk(2.0, 30.0, rate) == pytest.approx(limit, rel=1e-9)
+
+
+# -- the discretization ---------------------------------------------------------------------------
+
+
+def test_covariances_are_the_integrals_that_they_stand_for():
+    omega, sigma, period = 3.0, 1.7, 0.4
+    one = theory.discretize(omega * period)
+    density = 2 * omega * sigma**2
+    first = integrate.quad(lambda s: math.exp(-2 * omega * s), 0, period)[0]
+    mixed = integrate.quad(lambda s: math.exp(-omega * s) * (1 - math.exp(-omega * s)) / omega, 0, period)[0]
+    second = integrate.quad(lambda s: ((1 - math.exp(-omega * s)) / omega) ** 2, 0, period)[0]
+    assert float(one.q11) * sigma**2 == pytest.approx(density * first, rel=1e-12)
+    assert float(one.q12) * sigma**2 * period == pytest.approx(density * mixed, rel=1e-12)
+    assert float(one.q22) * sigma**2 * period**2 == pytest.approx(density * second, rel=1e-12)
+    assert float(one.phi21) * period == pytest.approx((1 - math.exp(-omega * period)) / omega, rel=1e-14)
+    assert float(one.bridge) == pytest.approx(float(one.q22 - one.q12**2 / one.q11), rel=1e-12)
+
+
+@pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0, 1e5])
+def test_the_closed_step_is_the_one_of_the_matrix_exponential(f_c):
+    closed = theory.exact_step(FIRST, f_c)
+    a, b = theory._van_loan(FIRST, 1 / f_c)
+    assert closed.a == pytest.approx(a, rel=1e-13)
+    assert closed.b == pytest.approx(b, rel=1e-12, abs=0)
+
+
+@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+def test_a_step_keeps_the_steady_state_and_the_autocovariance(process):
+    m = len(process.drift)
+    step = theory.exact_step(process, 5.0)
+    a, b = step.a[:m], step.b[:m]
+    assert a @ a.T * process.sigma**2 + b @ b.T == pytest.approx(process.sigma**2 * np.eye(m), abs=1e-14)
+    covariance = process.sigma**2 * np.eye(m)
+    for k in range(4):
+        assert covariance[0, 0] == pytest.approx(process.autocovariance(k / 5.0), rel=1e-12)
+        covariance = a @ covariance
+
+
+@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+def test_a_step_has_the_variance_of_one_trapezoid(process):
+    period = 0.35
+    step = theory.exact_step(process, 1 / period)
+    observed = process.sigma**2 * step.a[-1] @ step.a[-1] + step.b[-1] @ step.b[-1]
+    r = process.autocovariance
+    along = integrate.quad(r, 0, period, epsabs=1e-13)[0]
+    twice = 2 * integrate.quad(lambda s: (period - s) * r(s), 0, period, epsabs=1e-13)[0]
+    expected = period**2 * (r(0.0) + r(period)) / 2 - 2 * period * along + twice
+    assert observed == pytest.approx(float(expected), rel=1e-8)  # the quadrature's errors over a small difference
+
+
+# -- the build-up ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mu", [1e-6, 0.1, 1.0, 30.0, 1e4])
+def test_recursion_and_closed_form(mu):
+    n = np.arange(200)
+    closed = theory.error_variance(n, mu)
+    assert theory.error_variance_recursion(199, mu) == pytest.approx(closed, rel=1e-12)
+    assert closed[0] == 0
+    # The rate is between half of the steady one and all of it.
+    rate = np.diff(closed) / float(theory.walk_factor(mu))
+    assert np.all(rate < 1 + 1e-12)
+    assert np.all(rate > 0.5)
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.7, 8.0])
+def test_closed_forms_are_what_the_covariance_recursion_gives(mu):
+    process, n = theory.first_order(1.3, mu * 2.5), np.arange(41)
+    unit = (1.3 / 2.5) ** 2
+    assert theory.rule_variance(process, 2.5, TRAPEZOIDAL, 40) == pytest.approx(
+        unit * theory.error_variance(n, mu), rel=1e-11
+    )
+    for name in ("rectangular, old sample", "rectangular, new sample"):
+        found = theory.rule_variance(process, 2.5, theory.RULES[name], 40)
+        assert found == pytest.approx(unit * theory.rectangle_error_variance(n, mu), rel=1e-11)
+
+
+def test_another_start():
+    """Against the recursion with the covariance of the input at the start set by hand."""
+    mu, start = 0.8, 0.3
+    step = theory.exact_step(theory.first_order(1.0, mu), 1.0)
+    a = np.array([[step.a[0, 0], 0.0], [step.a[1, 0], 1.0]])
+    state, expected = np.diag([start, 0.0]), [0.0]
+    for _ in range(30):
+        state = a @ state @ a.T + step.b @ step.b.T
+        expected.append(state[1, 1])
+    assert theory.error_variance(np.arange(31), mu, start) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("mu", [0.5, 5.0])
+def test_the_documents_recursion_mended_and_as_printed(mu):
+    exact = theory.error_variance(np.arange(31), mu)
+    assert theory.savage_recursion(30, mu).pee == pytest.approx(exact, abs=1e-10)
+    for slips in ({"p32_weight": 1.0}, {"p22_slip": True}):
+        assert abs(theory.savage_recursion(30, mu, **slips).pee[1] / exact[1] - 1) > 0.2
+    # (25) is harmless in the end, (18) is not.
+    harmless, harmful = (
+        np.diff(theory.savage_recursion(30, mu, **slips).pee)[-1] for slips in ({"p22_slip": True}, {"p32_weight": 1.0})
+    )
+    assert harmless == pytest.approx(np.diff(exact)[-1], abs=1e-5)
+    assert abs(harmful - np.diff(exact)[-1]) > 0.1
+
+
+@pytest.mark.parametrize("rectangle", [False, True])
+@pytest.mark.parametrize("mu", [0.01, 1.0, 50.0])
+def test_the_random_walk_takes_over_where_it_says(mu, rectangle):
+    variance = theory.rectangle_error_variance if rectangle else theory.error_variance
+    for share in (0.001, 0.05):
+        n = theory.takeover(mu, share, rectangle)
+        away = abs(float(variance(n, mu)) / (n * float(theory.walk_factor(mu))) - 1)
+        assert away <= share * (1 + 1e-9)
+        if n > 1:
+            assert away == pytest.approx(share, rel=1e-6)
+
+
+# -- other inputs and integrators -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+def test_spectrum_and_autocovariance_belong_together(process):
+    for omega in (0.0, 1.0, 2.9, 10.0):
+        transform = (
+            2 * integrate.quad(lambda t, w=omega: process.autocovariance(t) * math.cos(w * t), 0, 60, limit=400)[0]
+        )
+        assert process.psd(omega) == pytest.approx(transform, abs=1e-6)
+    assert process.autocovariance(0.0) == pytest.approx(process.sigma**2)
+    assert np.array_equal(process.autocovariance([-0.5]), process.autocovariance([0.5]))
+
+
+@pytest.mark.parametrize("theta", [Fraction(0), Fraction(1, 2), Fraction(1, 3)])
+@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+def test_folding_is_the_sum_over_the_spectrum(process, theta):
+    f_c, k = 2.0, np.arange(-400_000, 400_001)
+    if theta == 0:
+        k = k[k != 0]
+    total = float(np.sum(process.psd(2 * np.pi * f_c * (k + float(theta)))))
+    # What is left out falls as 1/k² or faster: below 2·S(k)·k.
+    assert theory.folded(process, 1 / f_c, theta) == pytest.approx(total, rel=1e-5)
+
+
+def test_folding_is_right_where_it_cancels_nearly_everything():
+    """Σ c p = 0: the random walk of a resonance is of fourth order in T, -T⁴ Σ Re(c p³)/360."""
+    process, f_c = theory.resonant(1.0, 1.0, 0.3), 1e9
+    with mpmath.workdps(50):
+        third = sum(mpmath.re(c * p**3) for c, p in theory._exact_modes(process))
+    assert theory.walk_rate(process, f_c) == pytest.approx(float(-third / 360) * f_c**-4, rel=1e-12)
+
+
+@each_rule
+@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+def test_the_rate_is_that_of_the_recursion(process, rule):
+    variance = theory.rule_variance(process, 2.0, rule, 2400)
+    grown = (variance[2400] - variance[1200]) / 600
+    assert grown == pytest.approx(theory.walk_rate(process, 2.0, rule), rel=1e-10)
+
+
+@each_rule
+def test_rules_that_weigh_alike_tie_and_no_rule_is_better(rule):
+    for process, f_c in ((FIRST, 30.0), (FIRST, 0.3), (RINGING, 4.0), (RINGING, 0.9)):
+        least = theory.walk_rate(process, f_c)
+        rate = theory.walk_rate(process, f_c, rule)
+        if rule.period == 1:
+            assert rate == least
+        else:
+            assert rate > least * 1.001
+        assert theory.best_possible_rate(process, f_c) < least
+
+
+@each_rule
+def test_rules_integrate_polynomials_to_their_order(rule):
+    """Exact for constants; for degree 1 but the rectangular ones; Simpson and 3/8 to 3, Boole to 5."""
+    order = {"rectangular, old sample": 0, "rectangular, new sample": 0, "trapezoidal": 1, "Adams-Bashforth 2": 1}
+    order |= {"Adams-Moulton 3": 2, "Simpson": 3, "Simpson 3/8": 3, "Boole": 5}
+    p = rule.period
+    for degree in range(order[rule.name] + 2):
+        total = sum(
+            w * Fraction(r + 1 - j) ** degree for r, step in enumerate(rule.weights) for j, w in enumerate(step)
+        )
+        exact = Fraction(p) ** (degree + 1) / (degree + 1)
+        assert (total == exact) == (degree <= order[rule.name])
+
+
+def test_harmonics():
+    assert theory.RULES["Adams-Bashforth 2"].harmonics() == (1.0,)
+    simpson = theory.RULES["Simpson"].harmonics()
+    assert simpson[0] == 1
+    assert abs(simpson[1] + 1 / 3) < 1e-15
+    for rule in RULES:
+        assert abs(rule.harmonics()[0] - 1) < 1e-15
+
+
+def test_simpson_in_closed_form():
+    """For the first order L(μ/2) + tanh(μ/2)/9, by Poisson's formula with alternating signs."""
+    for mu in (1e-3, 0.5, 20.0):
+        rate = theory.walk_rate(theory.first_order(1.0, mu), 1.0, theory.RULES["Simpson"])
+        assert rate == pytest.approx(float(theory.walk_factor(mu)) + math.tanh(mu / 2) / 9, rel=1e-13)
+
+
+def test_the_best_weight_of_the_samples():
+    """Scaled by c, the samples have the rate (1 - c)² S(0) + c² A; its least value is the bound."""
+    mu = 2.0
+    process = theory.first_order(1.0, mu)
+    walk, low = theory.walk_rate(process, 1.0), float(process.psd(0.0))
+    c = math.tanh(mu / 2) / (mu / 2)
+    at_best = (1 - c) ** 2 * low + c**2 * walk
+    assert theory.best_possible_rate(process, 1.0) == pytest.approx(at_best, rel=1e-12)
+    for other in (c - 0.01, c + 0.01):
+        assert (1 - other) ** 2 * low + other**2 * walk > at_best
+
+
+# -- t-digit arithmetic ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(16, 3)])
+def test_roundings_have_the_mean_squares_of_the_theory(fmt):
+    """Numbers whose logarithms are spread evenly; 20,000 of them, standard error below 1 %."""
+    x = float(fmt.base) ** (2 * (np.arange(20_000) + np.random.default_rng(3).random(20_000)) / 20_000)
+    relative = fmt.array(x).to_float() / x - 1
+    assert np.mean(relative**2) == pytest.approx(theory.mean_square_rounding(fmt), rel=0.04)
+    chopped = FloatFormat(fmt.base, fmt.precision, CHOP)
+    assert np.mean(1 - chopped.array(x).to_float() / x) == pytest.approx(theory.mean_chopping(chopped), rel=0.04)
+
+
+def test_correlated_roundings_add_up_as_they_do():
+    """The error of adding p to a multiple of the spacing is the sawtooth of p; p a random walk."""
+    rng, n, paths = np.random.default_rng(4), 400, 4000
+    for s in (0.1, 0.35, 2.0):
+        # Averages of two neighbouring samples have changes with the variance of one half of those two steps apart.
+        steps = rng.standard_normal((paths, n + 1)) * s * math.sqrt(2)
+        samples = np.cumsum(steps, axis=1) + rng.random((paths, 1)) * 100
+        p = (samples[:, 1:] + samples[:, :-1]) / 2
+        total = (np.round(p) - p).sum(axis=1)
+        observed = np.mean(total**2) / (n / 12)
+        # Standard error √(2/4000) = 2.2 %; ends of the run are worth a few correlation times of 400.
+        assert observed == pytest.approx(float(theory.correlation_factor(s)), rel=0.12)
+
+
+def test_correlation_fades_and_grows():
+    assert theory.correlation_factor(3.0) == 1
+    assert theory.correlation_factor(0.35) == pytest.approx(1.10, abs=0.01)
+    assert theory.correlation_factor(0.02) == pytest.approx(1 + 1 / (30 * 0.02**2), rel=0.01)
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), FloatFormat(16, 8, CHOP), FloatFormat(3, 15)])
+def test_errors_fall_and_grow_with_the_rate_as_the_closed_forms_say(fmt):
+    omega, duration = 100.0, 1000.0
+    slow, fast = 2000.0, 8000.0
+    first, second = (theory.two_errors(1.0, omega, f, duration, fmt) for f in (slow, fast))
+    assert first.discretization / second.discretization == pytest.approx(4, rel=1e-4)
+    if fmt.rounding is CHOP:
+        expected = theory.mean_chopping(fmt) * slow * math.sqrt(2 * duration**3 / (3 * omega))
+        assert first.rounding == pytest.approx(expected, rel=2e-3)  # a = 1.3e-3: 3a/8 of it leaks
+        assert second.rounding / first.rounding == pytest.approx(4, rel=5e-3)
+    else:
+        variance = theory.mean_square_rounding(fmt) * duration**2 * slow / omega
+        # The spacing averaged over a normal accumulator and over time is near, not at, that of evenly spread logarithms.
+        assert first.rounding**2 == pytest.approx(variance, rel=0.2 if fmt.base < 10 else 0.6)
+        assert second.rounding / first.rounding == pytest.approx(2, rel=0.05)
+    scaled = theory.two_errors(fmt.base**3, omega, slow, duration, fmt)
+    assert scaled.rounding == pytest.approx(fmt.base**3 * first.rounding, rel=1e-9)
+    assert scaled.total == pytest.approx(math.hypot(scaled.discretization, scaled.rounding))
+
+
+def test_odd_bases_have_no_ties():
+    """Without them the error is proportional to the square root of the rate; with them it has a floor."""
+    ratio = {}
+    for base in (2, 3):
+        slow, fast = (theory.two_errors(1.0, 1.0, f, 1e5, FloatFormat(base, 20)) for f in (2.0, 8.0))
+        ratio[base] = fast.rounding / slow.rounding
+    assert ratio[3] == pytest.approx(2, rel=0.03)
+    # κ t² f/ω = 0.18 f beside κ_1² t² (1 + φ)/2π = 0.13, in 2**-2t: √(1.57/0.49) = 1.8 between 2 and 8 Hz.
+    assert ratio[2] == pytest.approx(1.8, rel=0.05)
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 16), FloatFormat(2, 24), FloatFormat(10, 7), FloatFormat(2, 32, CHOP)])
+@pytest.mark.parametrize("omega", [10.0, 628.0])
+def test_the_best_rate_is_the_best(fmt, omega):
+    duration = 600.0
+    best = theory.best_rate(omega, duration, fmt)
+    least = theory.two_errors(1.0, omega, best, duration, fmt).total
+    for factor in np.geomspace(0.05, 20, 60):
+        assert theory.two_errors(1.0, omega, best * factor, duration, fmt).total >= least * (1 - 1e-9)
+    # The closed form leaves out that roundings are correlated, which lowers the rate, and averages over mantissas.
+    assert 0.6 < best / theory.independent_best_rate(omega, duration, fmt) < 1.3
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+@pytest.mark.parametrize("base", [2, 10])
+def test_the_needed_precision_is_the_least_that_suffices(base, rounding):
+    for f_c in (100.0, 5000.0):
+        for share in (0.1, 1.0):
+            t = theory.needed_precision(628.0, f_c, 3600.0, base, rounding, share)
+            enough, less = (
+                theory.two_errors(1.0, 628.0, f_c, 3600.0, FloatFormat(base, digits, rounding)) for digits in (t, t - 1)
+            )
+            assert enough.rounding <= share * enough.discretization
+            assert less.rounding > share * less.discretization
+
+
+def test_the_stall_rate_is_where_increments_are_half_a_spacing():
+    fmt, omega, duration = FloatFormat(2, 16), 64.0, 50.0
+    spacing = math.sqrt(12 * theory.mean_square_rounding(fmt) * 2 * duration / omega)
+    assert 1 / theory.stall_rate(omega, duration, fmt) == pytest.approx(spacing / 2)
+
+
+# -- what is refused ------------------------------------------------------------------------------
+
+NAN = float("nan")
+BAD = [
+    (lambda: theory.langevin(0.0), "got x = 0.0; needed a positive, finite number"),
+    (lambda: theory.walk_factor([1.0, -2.0]), r"got mu = -2.0; needed a positive"),
+    (lambda: theory.walk_factor(NAN), "got mu = nan"),
+    (lambda: theory.walk_factor(math.inf), "got mu = inf"),
+    (lambda: theory.discretize(-1.0), "got mu = -1.0"),
+    (lambda: theory.random_walk(-1.0, 1.0, 1.0), "got sigma_x = -1.0"),
+    (lambda: theory.random_walk(1.0, 0.0, 1.0), "got omega_bw = 0.0"),
+    (lambda: theory.random_walk(1.0, 1.0, math.inf), "got f_c = inf"),
+    (lambda: theory.random_walk(1.0, 1e-300, 1e300), "needed it within the range of float64; check the units"),
+    (lambda: theory.random_walk([1.0, 2.0], 1.0, 1.0), r"got sigma_x of shape \(2,\); needed one number"),
+    (lambda: theory.required_rate(1.0, 1.0, -0.1), "got limit = -0.1"),
+    (lambda: theory.validity(0.0), "got excess = 0.0; needed 1e-9 to 1e3"),
+    (lambda: theory.series(0), "got terms = 0; needed at least 1"),
+    (lambda: theory.error_variance(-1, 1.0), "needed cycles, at least 0"),
+    (lambda: theory.error_variance(1, 1.0, start=-0.1), "got start = -0.1"),
+    (lambda: theory.takeover(1.0, 0.0), "got share = 0.0"),
+    (lambda: theory.resonant(1.0, 1.0, 1.0), "got zeta = 1.0; needed 0 < zeta < 1; use first_order"),
+    (lambda: theory.first_order(1.0, NAN), "got omega_bw = nan"),
+    (lambda: theory.Rule("none", ()), "got a rule without steps"),
+    (lambda: theory.Rule("half", ((Fraction(1, 2),),)), "got weights that sum to 1/2 over 1 steps; needed 1"),
+    (lambda: theory.walk_rate(FIRST, 0.0), "got f_c = 0.0"),
+    (lambda: theory.correlation_factor(0.0), "got change = 0.0"),
+    (lambda: theory.two_errors(1.0, 1.0, 1.0, 1.5, FloatFormat(2, 24)), "got a duration of 1.5 cycles; needed"),
+    (lambda: theory.best_rate(628.0, 3600.0, FloatFormat(2, 16, CHOP)), "at some rate; use more digits"),
+    (lambda: theory.needed_precision(1.0, 1.0, 100.0, share=0.0), "got share = 0.0"),
+    (lambda: theory.needed_precision(1.0, 1.0, 1e3, share=1e-200), "needed at most 400 digits; allow a larger share"),
+    (lambda: theory.stall_rate(1.0, -1.0, FloatFormat(2, 24)), "got duration = -1.0"),
+]
+
+
+@pytest.mark.parametrize(("call", "message"), BAD)
+def test_bad_input_is_refused_with_the_cure(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
