@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tracemalloc
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -96,7 +97,7 @@ def test_pieces_follow_each_other(monkeypatch):
     monkeypatch.setattr(experiment, "CHUNK", 24)
     pieces = list(experiment.pieces(FIRST, 2.0, 20, rng(4), 2, memory=3))
     assert len(pieces) > 2
-    for before, after in zip(pieces[:-1], pieces[1:], strict=True):
+    for before, after in pairwise(pieces):
         assert after.first == before.first + len(before.d)
         assert np.array_equal(after.x[:3], before.x[-3:])
 

@@ -373,7 +373,7 @@ def test_errors_fall_and_grow_with_the_rate_as_the_closed_forms_say(fmt):
         assert second.rounding / first.rounding == pytest.approx(4, rel=5e-3)
     else:
         variance = theory.mean_square_rounding(fmt) * duration**2 * slow / omega
-        # The spacing averaged over a normal accumulator and over time is near, not at, that of evenly spread logarithms.
+        # The spacing averaged over a normal accumulator is near, not at, that of evenly spread logarithms.
         assert first.rounding**2 == pytest.approx(variance, rel=0.2 if fmt.base < 10 else 0.6)
         assert second.rounding / first.rounding == pytest.approx(2, rel=0.05)
     scaled = theory.two_errors(fmt.base**3, omega, slow, duration, fmt)

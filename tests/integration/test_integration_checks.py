@@ -1,0 +1,296 @@
+"""gpbnb.integration.checks: each entry of the document has a check, and each check can come out otherwise."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from gpbnb import ledger
+from gpbnb.derivation import Derivation, Step
+from gpbnb.findings import Verdict
+from gpbnb.integration import checks, derivation, experiment, theory
+from gpbnb.ledger.checking import load_checks
+
+INVENTORY = ledger.load_inventory()
+ENTRIES = ledger.select(INVENTORY, "savage2016")
+FUNCTIONS = {check.__name__: check for check in checks.CHECKS.values()}
+MAIN = checks.MAIN
+
+
+def clear():
+    for cached in (
+        checks.slips,
+        checks.mended,
+        checks.simulated,
+        derivation.noise,
+        derivation.transition_matrix,
+        theory.exact_step,
+    ):
+        getattr(cached, "cache_clear", lambda: None)()
+
+
+@pytest.fixture(scope="module")
+def rows():
+    clear()
+    return ledger.examine(ENTRIES, load_checks(INVENTORY))
+
+
+def finding(rows, key):
+    return next(row.finding for row in rows if row.entry.id == MAIN + key)
+
+
+def test_every_entry_of_the_document_has_a_check_here():
+    assert set(checks.CHECKS) == {entry.id for entry in ENTRIES}
+    assert len(ENTRIES) == 56
+    numbers = {n for n in range(1, 40) if not any(entry.item.split()[:2] == ["eq", f"({n})"] for entry in ENTRIES)}
+    assert numbers == set()
+
+
+def test_no_check_fails(rows):
+    assert [row.entry.id for row in rows if row.error is not None or row.finding is None] == []
+
+
+def test_verdicts(rows):
+    """The present state: to be changed knowingly."""
+    assert Counter(row.outcome for row in rows) == {
+        "verified": 41,
+        "typo": 8,
+        "wrong": 1,
+        "inconsistent": 1,
+        "unverifiable": 3,
+        "answered": 2,
+    }
+    places = {v: {row.entry.id.removeprefix(MAIN) for row in rows if row.finding.verdict is v} for v in Verdict}
+    assert places[Verdict.TYPO] == {"eq6-phi", "eq6-q-n", "eq12", "eq14", "eq18-p32", "eq25", "eq34", "eq37"}
+    assert places[Verdict.WRONG] == {"sanalysis.complete-set"}
+    assert places[Verdict.INCONSISTENT] == {"sabstract.abstract-claim"}
+    assert places[Verdict.ANSWERED] == {"sanalysis.transient", "sanalysis.numerical-example"}
+
+
+def test_differences_have_notes(rows):
+    for row in rows:
+        if row.finding.verdict is not Verdict.VERIFIED:
+            assert row.finding.note
+        if row.finding.agrees is not None:
+            assert row.finding.recomputed
+
+
+def test_findings_quote_the_computed_numbers(rows):
+    assert "-19.98 instead of 0.01666" in finding(rows, "eq12").note
+    assert "-0.935 instead of 0.01666" in finding(rows, "eq18-p32").note
+    assert "1982 instead" in finding(rows, "eq34").note
+    assert "1.10" in finding(rows, "sabstract.abstract-claim").note
+    assert "0.01 and -0.51" in finding(rows, "sabstract.abstract-claim").recomputed
+    assert "0.0102 °/√s" in finding(rows, "sanalysis.numerical-example").recomputed
+    assert "9.6 times" in finding(rows, "sanalysis.complete-set").recomputed
+
+
+def test_findings_are_the_same_again(rows):
+    clear()
+    for name in ("transient", "exact", "complete_set"):
+        keys = [key for key, check in checks.CHECKS.items() if check is FUNCTIONS[name]]
+        assert [row.finding for row in rows if row.entry.id in keys] == [FUNCTIONS[name]()] * len(keys)
+
+
+# -- each check can come out otherwise ------------------------------------------------------------
+
+
+@pytest.fixture
+def patch(monkeypatch):
+    """Change the code, with nothing remembered; undone, and forgotten, afterwards."""
+    clear()
+    yield monkeypatch
+    monkeypatch.undo()
+    clear()
+
+
+def replace(module, name, value):
+    return lambda patch: patch.setattr(module, name, value)
+
+
+def times(module, name, factor):
+    original = getattr(module, name)
+    return replace(module, name, lambda *arguments, **named: original(*arguments, **named) * factor)
+
+
+def plus(module, name, amount):
+    original = getattr(module, name)
+    return replace(module, name, lambda *arguments, **named: original(*arguments, **named) + amount)
+
+
+def breaks(name, place=None):
+    """A derivation of which one step, or every step, does not hold."""
+    wrong = Step("wrong", derivation.MU, derivation.T)
+
+    def apply(patch):
+        steps = list(getattr(derivation, name)().steps)
+        chosen = range(len(steps)) if place is None else [place]
+        for i in chosen:
+            steps[i] = wrong
+        patch.setattr(derivation, name, lambda: Derivation(tuple(steps)))
+
+    return apply
+
+
+def changed_after(patch):
+    """(10) with another x_3."""
+    x1, x2, x3 = derivation.after()
+    patch.setattr(derivation, "after", lambda: (x1, x2 + derivation.Q1, x3 + derivation.X1 * derivation.T))
+
+
+def changed_first(patch):
+    """(10) with another x_1."""
+    x1, x2, x3 = derivation.after()
+    patch.setattr(derivation, "after", lambda: (2 * x1, x2, x3))
+
+
+def changed_steady(place):
+    def apply(patch):
+        original = derivation.steady_changes
+
+        def other(half=True):
+            found = list(original(half))
+            found[place] *= 2
+            return tuple(found)
+
+        patch.setattr(derivation, "steady_changes", other)
+
+    return apply
+
+
+WALK = theory.walk_factor
+SMALL = sp.Rational(1, 7)
+#: For each check that agrees, changes of the code under which it must not.
+DISAGREE = [
+    ("model", plus(theory.Process, "autocovariance", 0.1)),
+    ("trapezoidal", replace(theory, "RULES", {"trapezoidal": theory.RULES["rectangular, old sample"]})),
+    ("trapezoidal", replace(experiment.Accumulator, "feed", lambda self, x: None)),
+    ("discrete", times(derivation, "p22", 2)),
+    ("discrete", times(derivation, "p12", 2)),
+    ("transition", times(derivation, "printed_transition", 2)),
+    ("transition", breaks("transition", 1)),
+    ("components", changed_after),
+    ("error_variance", plus(theory, "error_variance", 0.1)),
+    ("mixed_products", changed_first),
+    ("uncorrelated", replace(theory, "exact_step", lambda process, f: theory.Step(np.ones((3, 2)), np.ones((3, 3))))),
+    ("p31", changed_first),
+    ("p33", changed_after),
+    ("covariance_equation", times(derivation, "printed_transition", 2)),
+    ("covariance_components", breaks("continuous", 1)),
+    ("continuous_solution", breaks("continuous", 4)),
+    ("p22_at_cycles", times(derivation, "p22", 2)),
+    ("p12_at_cycles", times(derivation, "p12", 2)),
+    ("p11_at_cycles", times(derivation, "noise", 2)),
+    ("steady_p31", breaks("steady_state", 0)),
+    ("steady_p31", times(derivation, "p12", 2)),
+    ("steady_changes", changed_steady(0)),
+    ("steady_changes", changed_steady(1)),
+    ("steady_changes", changed_steady(2)),
+    ("steady_rate", breaks("steady_state", 3)),
+    ("random_walk", breaks("steady_state", 5)),
+    ("random_walk", times(theory, "random_walk", 1.001)),
+    ("exact", breaks("independent")),
+    ("exact", times(theory, "walk_rate", 1.001)),
+    ("exact", replace(experiment.Sweep, "deviations", lambda self: [5.0])),
+    ("large_n", times(theory, "takeover", 0.9)),
+    ("units", replace(theory, "random_walk", lambda sigma, omega, f: sigma * omega / f)),
+    ("exponential", breaks("small_mu", 0)),
+    ("approximation", breaks("small_mu", 2)),
+    ("approximation", breaks("small_mu", 3)),
+    ("approximation", times(theory, "approximation_ratio", 1.001)),
+    ("approximation", times(theory, "printed_random_walk", 1.001)),
+    ("transient", breaks("transient", 1)),
+    ("transient", plus(theory, "error_variance_recursion", 0.1)),
+    ("transient", replace(experiment.Simulation, "deviations", lambda self, variance: [5.0])),
+    ("numerical_example", times(theory, "walk_rate", 1.001)),
+    ("numerical_example", times(theory, "required_rate", 1.001)),
+]
+
+
+@pytest.mark.parametrize(("name", "change"), DISAGREE)
+def test_a_check_that_agrees_can_disagree(patch, name, change):
+    assert FUNCTIONS[name]().agrees is True
+    clear()
+    change(patch)
+    finding = FUNCTIONS[name]()
+    assert finding.agrees is False
+    assert finding.verdict not in (Verdict.VERIFIED, Verdict.ANSWERED)
+
+
+def half_is_one(patch):
+    """(18) with the factor as printed in the derivation too."""
+    original = derivation.printed_18
+    patch.setattr(derivation, "printed_18", lambda half: original(True))
+
+
+def with_slip(place, value):
+    def apply(patch):
+        found = dict(checks.slips())
+        found[place] = value
+        patch.setattr(checks, "slips", lambda: found)
+
+    return apply
+
+
+#: For each check that disagrees, changes under which print and code say the same.
+AGREE = [
+    ("abstract", replace(theory, "exponents", lambda mu: (0.5 + 0 * mu, -1 + 0 * mu))),
+    ("transition_integral", replace(derivation, "transition_residual", lambda identity: sp.zeros(2))),
+    ("noise_integral", replace(derivation, "noise", lambda kernel="right": sp.eye(2))),
+    ("squared_mean", with_slip("(12)", derivation.walk())),
+    ("rate", replace(derivation, "steady_changes", lambda half=True: (sp.S.Zero, sp.S.One, sp.S.Zero))),
+    ("p32", half_is_one),
+    (
+        "p22_recursion",
+        replace(
+            derivation,
+            "p22_change",
+            lambda printed: derivation.p22(derivation.TIME + derivation.T) - derivation.p22(derivation.TIME),
+        ),
+    ),
+    ("complete_set", replace(checks, "mended", lambda: (1e-13, 1e-13))),
+    ("rate_in_mu", replace(checks, "same", lambda *expressions: True)),
+    ("series", replace(checks, "same", lambda *expressions: True)),
+]
+
+
+@pytest.mark.parametrize(("name", "change"), AGREE)
+def test_a_check_that_disagrees_can_agree(rows, patch, name, change):
+    assert all(row.finding.agrees is False for row in rows if checks.CHECKS[row.entry.id] is FUNCTIONS[name])
+    change(patch)
+    found = FUNCTIONS[name]()
+    assert found.agrees is True
+    assert found.verdict is Verdict.VERIFIED
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "verdict"),
+    [
+        ("transition_integral", replace(derivation, "transition_residual", lambda identity: sp.eye(2)), Verdict.WRONG),
+        ("squared_mean", replace(checks, "mended", lambda: (0.1, 0.1)), Verdict.WRONG),
+        ("rate", changed_steady(0), Verdict.WRONG),
+        ("p32", changed_after, Verdict.WRONG),
+        ("p22_recursion", times(derivation, "p22_change", 2), Verdict.WRONG),
+        ("series", breaks("small_mu", 1), Verdict.WRONG),
+        ("abstract", replace(theory, "exponents", lambda mu: (0 * mu, 0 * mu)), Verdict.WRONG),
+        ("noise_integral", replace(derivation, "noise", lambda kernel="right": sp.eye(2) * len(kernel)), Verdict.WRONG),
+    ],
+)
+def test_a_slip_is_one_only_if_what_follows_is_right(patch, name, change, verdict):
+    change(patch)
+    assert FUNCTIONS[name]().verdict is verdict
+
+
+def test_expansions_are_compared():
+    assert checks.same((derivation.MU + 1) ** 2, derivation.MU**2 + 2 * derivation.MU + 1)
+    assert not checks.same(derivation.MU, derivation.MU + SMALL)
+    assert not checks.same(sp.eye(2), sp.eye(2), sp.zeros(2))
+    assert checks.same(sp.coth(derivation.MU / 2), (1 + sp.exp(-derivation.MU)) / (1 - sp.exp(-derivation.MU)))
+
+
+def test_every_check_is_among_those_that_can_come_out_otherwise():
+    tried = {name for name, *_ in (*DISAGREE, *AGREE)}
+    assert set(FUNCTIONS) - tried == {"date", "reference", "figure", "products"}

@@ -1,0 +1,126 @@
+"""gpbnb.integration.derivation: every step holds, and means what the numbers of the theory do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from gpbnb.integration import derivation, theory
+from gpbnb.integration.derivation import MU, OMEGA, TAU, TIME, P, T
+
+DERIVATIONS = {
+    function.__name__: function()
+    for function in (
+        derivation.transition,
+        derivation.discretization,
+        derivation.covariances,
+        derivation.continuous,
+        derivation.steady_state,
+        derivation.independent,
+        derivation.transient,
+        derivation.small_mu,
+    )
+}
+STEPS = [(name, i) for name, steps in DERIVATIONS.items() for i in range(len(steps.steps))]
+each_step = pytest.mark.parametrize(("name", "i"), STEPS)
+VALUES = {OMEGA: 3, T: sp.Rational(2, 5), P: sp.Rational(289, 100), MU: sp.Rational(6, 5)}
+
+
+@each_step
+def test_the_step_holds_and_a_wrong_one_would_not(name, i):
+    step = DERIVATIONS[name].steps[i]
+    assert step.holds
+    assert step.name
+    assert step.latex()
+    assert not replace(step, right=step.right + sp.Rational(1, 1000)).holds
+
+
+def test_there_are_as_many_steps_as_the_chapter_shows():
+    assert {name: len(steps.steps) for name, steps in DERIVATIONS.items()} == {
+        "transition": 3,
+        "discretization": 4,
+        "covariances": 3,
+        "continuous": 7,
+        "steady_state": 7,
+        "independent": 3,
+        "transient": 5,
+        "small_mu": 5,
+    }
+
+
+def test_noise_in_numbers():
+    one = theory.discretize(1.2)
+    expected = 2.89 * np.array([[one.q11, one.q12 * 0.4], [one.q12 * 0.4, one.q22 * 0.16]], dtype=float)
+    assert np.array(derivation.noise().subs(VALUES)).astype(float) == pytest.approx(expected, rel=1e-12)
+    turned = np.array(derivation.noise("reversed").subs(VALUES)).astype(float)
+    assert turned == pytest.approx(expected, rel=1e-12)
+    printed = np.array(derivation.noise("printed").subs({**VALUES, TIME: 1})).astype(float)
+    assert printed[0, 0] == pytest.approx(expected[0, 0] * np.exp(-6), rel=1e-12)
+
+
+def test_an_unknown_kernel_is_refused():
+    with pytest.raises(ValueError, match="got kernel 'left'; needed one of right, reversed, printed"):
+        derivation.noise("left")
+
+
+def test_noise_at_a_point_is_the_integral():
+    q = derivation.noise()
+    density = 2 * OMEGA * P * sp.exp(-2 * OMEGA * TAU)
+    assert sp.simplify(sp.integrate(density, (TAU, 0, T)) - q[0, 0]) == 0
+
+
+def test_the_integral_equation_as_printed_lacks_the_identity():
+    assert derivation.transition_residual(identity=True) == sp.zeros(2)
+    assert derivation.transition_residual(identity=False) == sp.eye(2)
+
+
+def test_expected_values():
+    x1, q1, p11 = derivation.X1, derivation.Q1, derivation.P11
+    assert derivation.expected(x1 * q1) == 0
+    assert derivation.expected(3 * x1**2) == 3 * p11
+    after = derivation.after()
+    assert sp.expand(derivation.expected(after[0] ** 2) - derivation.P11N) == 0
+    assert sp.expand(derivation.expected(after[0] * after[1]) - derivation.P12N) == 0
+    assert sp.expand(derivation.expected(after[1] ** 2) - derivation.P22N) == 0
+
+
+def test_the_walk_is_that_of_the_theory():
+    assert float(derivation.walk().subs(MU, sp.Rational(6, 5))) == pytest.approx(float(theory.walk_factor(1.2)))
+
+
+def test_the_expansion_is_the_series():
+    coefficients = derivation.expansion(9)
+    assert all(c == 0 for c in coefficients[1::2])
+    ours = [sp.Rational(c.numerator, c.denominator) for c in theory.series(5)]
+    assert coefficients[::2] == ours
+
+
+def test_slips():
+    slips = derivation.slips()
+    mu, period = sp.Rational(3, 10), sp.Rational(1, 50)
+    found = {place: float(rate.subs({MU: mu, T: period})) for place, rate in slips.items()}
+    right = float(theory.walk_factor(0.3))
+    assert found["(25)"] == pytest.approx(right)
+    # Without P22 the rate lacks 2/μ, and with the full last term of P32 twice half of φ21.
+    assert found["(12)"] == pytest.approx(right - 2 / 0.3)
+    assert found["(18)"] == pytest.approx(right - (1 - np.exp(-0.3)) / 0.3)
+    coth = 1 / np.tanh(0.15)
+    assert found["(34)"] == pytest.approx(coth * 50 - 2 / 0.3)
+    assert found["(37)"] == pytest.approx(0.3 / 6 - 0.3**2 / 6)
+    # With T = 1 the slip of (34) does not show.
+    assert float(slips["(34)"].subs({MU: mu, T: 1})) == pytest.approx(right)
+
+
+def test_the_right_numerator_gives_no_even_term():
+    assert derivation.printed_37(sp.Rational(1, 12)) == MU / 6
+    assert sp.expand(derivation.printed_37(sp.Rational(1, 6)) - MU / 6 + MU**2 / 6) == 0
+
+
+def test_the_slip_of_18_is_the_half():
+    with_half, without = derivation.printed_18(half=True), derivation.printed_18(half=False)
+    assert with_half[0] == without[0]
+    assert with_half[2] == without[2]
+    assert sp.expand(without[1] - with_half[1] - derivation.PHI21 * derivation.P11 * T / 2) == 0

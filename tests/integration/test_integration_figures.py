@@ -1,0 +1,216 @@
+"""gpbnb.integration.figures and tables: what is shown is the result; axes say what it is and in which unit."""
+
+from __future__ import annotations
+
+import math
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.patches import Circle, Rectangle
+
+from gpbnb import plotting
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.integration import experiment, figures, tables, theory
+
+
+@pytest.fixture
+def ax():
+    _, axes = plotting.figure()
+    yield axes[0]
+    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    plt.close("all")
+
+
+def names(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def line(ax, label):
+    (found,) = [each for each in ax.lines if each.get_label() == label]
+    return found
+
+
+def check_labels(ax, x, y):
+    assert x in ax.get_xlabel()
+    assert y in ax.get_ylabel()
+
+
+def test_block_diagram(ax):
+    artists = figures.block_diagram(ax)
+    words = " ".join(text.get_text() for text in ax.texts)
+    for part in ("n_{p1}", "omega_{bw}", "true integral", "trapezoidal", "$x_2$", "$e_n$", "−", "+"):
+        assert part in words
+    boxes = [a for a in artists if isinstance(a, Rectangle)]
+    sums = [a for a in artists if isinstance(a, Circle)]
+    assert (len(boxes), len(sums)) == (4, 2)
+    # Every text is within its box, or beside all of them.
+    ax.figure.canvas.draw()
+    inside = [
+        text
+        for text in ax.texts
+        for box in boxes
+        if box.contains_point(text.get_transform().transform(text.get_position()))
+    ]
+    assert len(inside) == 4
+    for text, box in zip(inside, boxes, strict=True):
+        extent, frame = text.get_window_extent(), box.get_window_extent()
+        assert frame.x0 < extent.x0 < extent.x1 < frame.x1
+
+
+def test_accuracy(ax):
+    mu = [1e-9, 1e-2, 10.0]
+    results = {"printed": experiment.accuracy("walk", mu, True), "stable": experiment.accuracy("walk", mu)}
+    figures.accuracy(results, ax)
+    for name, result in results.items():
+        assert line(ax, name).get_xdata().tolist() == mu
+        assert line(ax, name).get_ydata().tolist() == np.clip(result.ulp, 1e-2, 2.0**53).tolist()
+    assert names(ax) == ["printed", "stable", "no digit right"]
+    check_labels(ax, "rad", "units in the last place")
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return experiment.sweep([0.01, 1.0, 50.0], 100, 500, np.random.default_rng(1))
+
+
+def test_random_walk(ax, swept):
+    figures.random_walk(swept, ax)
+    assert line(ax, "simulation").get_ydata().tolist() == np.sqrt(swept.walk).tolist()
+    exact = line(ax, "(35), exact")
+    assert exact.get_ydata() == pytest.approx(np.sqrt(theory.walk_factor(exact.get_xdata())))
+    printed = line(ax, r"(39), small $\mu$")
+    assert printed.get_ydata() == pytest.approx(np.sqrt(printed.get_xdata() / 6))
+    low, high = ax.get_ylim()
+    assert low < exact.get_ydata().min()
+    assert high > printed.get_ydata().max()
+    check_labels(ax, "rad", "no unit")
+
+
+def test_deviations(ax, swept):
+    figures.deviations(swept, ax)
+    shown = line(ax, "from the exact variance")
+    assert shown.get_ydata().tolist() == swept.deviations().tolist()
+    low, high = ax.get_ylim()
+    assert low < min(shown.get_ydata())
+    assert max(shown.get_ydata()) < high
+    assert 50.0 not in line(ax, "from (39)").get_xdata()
+    check_labels(ax, "rad", "standard errors")
+
+
+def test_build_up(ax):
+    n, mu = [1, 10, 100], 0.2
+    runs = [
+        experiment.simulate(theory.first_order(3.0, 0.4), 2.0, n, np.random.default_rng(2), 50, theory.RULES[name])
+        for name in ("trapezoidal", "rectangular, new sample")
+    ]
+    figures.build_up(runs, mu, ax)
+    for run in runs:
+        assert line(ax, run.rule.name).get_ydata() == pytest.approx(np.sqrt(run.variance) / 1.5)
+    exact = line(ax, "exact, trapezoidal")
+    assert exact.get_ydata() == pytest.approx(np.sqrt(theory.error_variance(exact.get_xdata(), mu)))
+    walk = line(ax, "random walk (35)")
+    assert walk.get_ydata()[-1] == pytest.approx(math.sqrt(100 * float(theory.walk_factor(mu))))
+    check_labels(ax, "cycles $n$", "no unit")
+
+
+def test_rules(ax):
+    figures.rules_first_order(("trapezoidal", "Simpson"), ax)
+    assert line(ax, "trapezoidal").get_ydata() == pytest.approx(np.ones(60))
+    mu = line(ax, "Simpson").get_xdata()
+    assert line(ax, "Simpson").get_ydata() == pytest.approx(np.sqrt(1 + np.tanh(mu / 2) / 9 / theory.walk_factor(mu)))
+    assert np.all(line(ax, "scaled samples (bound)").get_ydata() < 1)
+    check_labels(ax, "rad", "no unit")
+
+
+def test_rules_resonant(ax):
+    figures.rules_resonant(("trapezoidal",), 0.05, ax)
+    shown = line(ax, "trapezoidal")
+    rate, walk = shown.get_xdata(), shown.get_ydata()
+    assert walk[0] ** 2 == pytest.approx(theory.walk_rate(theory.resonant(1.0, 2 * np.pi, 0.05), rate[0]))
+    peak = rate[(rate > 0.8) & (rate < 1.2)][np.argmax(walk[(rate > 0.8) & (rate < 1.2)])]
+    assert peak == pytest.approx(1, abs=0.02)
+
+
+@pytest.fixture(scope="module")
+def met():
+    formats = (FloatFormat(2, 8), FloatFormat(2, 12, Rounding.CHOP))
+    return experiment.meet(64.0, 2.0, formats, [32.0, 128.0], np.random.default_rng(3), 20)
+
+
+def test_meeting(ax, met):
+    figures.meeting(met, ax)
+    assert line(ax, "discretization").get_ydata().tolist() == met.discretization[0].tolist()
+    assert line(ax, "rounding, 12 bits, chopped").get_ydata().tolist() == met.rounding[1].tolist()
+    theories = [each for each in ax.lines if len(each.get_xdata()) == 40]
+    assert len(theories) == 3
+    expected = theory.two_errors(1.0, 64.0, 32.0, 2.0, met.formats[0])
+    assert theories[0].get_ydata()[0] == pytest.approx(expected.discretization)
+    assert theories[1].get_ydata()[0] == pytest.approx(expected.rounding)
+    check_labels(ax, "Hz", "unit of $x_1$")
+
+
+def test_totals(ax, met):
+    figures.totals(met, ax)
+    assert line(ax, "8 bits").get_ydata().tolist() == met.total[0].tolist()
+    best = theory.best_rate(64.0, 2.0, met.formats[0])
+    triangles = [each.get_xdata()[0] for each in ax.lines if len(each.get_xdata()) == 1]
+    assert (best in triangles) == (32.0 <= best <= 128.0)
+    check_labels(ax, "Hz", "total error")
+
+
+def test_design_figures():
+    _, axes = plotting.figure(columns=2)
+    durations = {"1 minute": 60.0, "1 hour": 3600.0}
+    figures.best_rates(628.0, durations, [16, 24], axes[0])
+    assert line(axes[0], "1 hour").get_ydata()[1] == theory.best_rate(628.0, 3600.0, FloatFormat(2, 24))
+    chopped = [each for each in axes[0].lines if each.get_linestyle() == ":"]
+    assert math.isnan(chopped[1].get_ydata()[0])  # no rate saves 16 chopped bits for an hour
+    check_labels(axes[0], "bits", "Hz")
+    figures.needed_bits(628.0, durations, [100.0, 1000.0], axes[1])
+    assert line(axes[1], "1 minute").get_ydata()[1] == theory.needed_precision(628.0, 1000.0, 60.0)
+    check_labels(axes[1], "Hz", "bits")
+    axes[0].figure.canvas.draw()
+    plt.close("all")
+
+
+# -- tables ---------------------------------------------------------------------------------------
+
+
+def test_sensor_table():
+    table = tables.sensor(2.0, 50.0, "m/s", [400.0])
+    f_c, mu, exact, printed, excess, hour = table.body[0]
+    omega = 2 * math.pi * 50
+    assert f_c == "400"
+    assert float(mu) == pytest.approx(omega / 400, rel=1e-2)
+    assert float(exact) == pytest.approx(theory.random_walk(2.0, omega, 400.0), rel=1e-2)
+    assert float(printed) == pytest.approx(theory.printed_random_walk(2.0, omega, 400.0), rel=1e-2)
+    assert float(excess) == pytest.approx(float(theory.approximation_ratio(omega / 400)) - 1, rel=0.1)
+    assert float(hour) == pytest.approx(60 * theory.random_walk(2.0, omega, 400.0), rel=1e-2)
+    assert "m/s/√h" in table.header[-1]
+
+
+def test_rules_table():
+    process = theory.first_order(1.0, 1.0)
+    table = tables.rules([(process, 2.0)])
+    ratio = {row[0]: float(row[2]) for row in table.body}
+    assert ratio["trapezoidal"] == 1
+    walk = theory.walk_rate(process, 2.0, theory.RULES["Boole"]) / theory.walk_rate(process, 2.0)
+    assert ratio["Boole"] == pytest.approx(math.sqrt(walk), rel=1e-3)
+    assert {row[0]: row[1] for row in table.body}["Boole"] == "4"
+
+
+def test_slips_table():
+    rows = {row[0]: row for row in tables.slips(0.3, 0.02).body}
+    assert rows["(25)"][-1] == "no"
+    assert [place for place, row in rows.items() if row[-1] == "yes"] == ["(12)", "(18)", "(34)", "(37)"]
+    assert float(rows["(12)"][1]) == pytest.approx(float(theory.walk_factor(0.3)) - 2 / 0.3, rel=1e-3)
+
+
+def test_design_table():
+    rows = tables.design(628.0, 3600.0, [16]).body
+    assert rows[1] == ("16 bits", "chop", "none", "", "", "")
+    fmt = FloatFormat(2, 16)
+    best = theory.best_rate(628.0, 3600.0, fmt)
+    assert float(rows[0][2].replace(",", "")) == pytest.approx(best, rel=1e-2)
+    assert float(rows[0][5]) == pytest.approx(theory.two_errors(1.0, 628.0, best, 3600.0, fmt).rounding, rel=0.05)
