@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from benchmarks import kalman, multiply_add, rounding
+from benchmarks import integration, kalman, multiply_add, rounding
 from benchmarks.figure import draw
 from benchmarks.timing import Row, machine
 
@@ -31,7 +31,7 @@ def main() -> int:
     about = machine()
     print(", ".join(f"{name} {value}" for name, value in about.items()), flush=True)
     table: list[Row] = []
-    for part in (rounding, multiply_add, kalman):
+    for part in (rounding, multiply_add, kalman, integration):
         found = part.measure()
         print("\n".join(map(line, found)), flush=True)
         table += found
