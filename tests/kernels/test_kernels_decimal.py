@@ -28,13 +28,13 @@ def computed(tag: Any, name: str, *parts: Any) -> tuple[Any, Any]:
 @pytest.mark.parametrize("nearest", [True, False])
 @pytest.mark.parametrize("precision", [1, 2])
 def test_every_pair_of_short_numbers(precision: int, nearest: bool) -> None:
-    """Exponents up to t + 4 apart, either way; the first positive, as the sign of both changes that of the result."""
+    """Of either sign, with exponents up to t + 4 apart, either way."""
     positive = np.arange(10 ** (precision - 1), 10**precision)
-    gaps = np.arange(-precision - 4, precision + 5)
     both = np.concatenate([-positive, positive])
+    gaps = np.arange(-precision - 4, precision + 5)
     oracle = kernel(10, precision, nearest)
     for name in ("add", "subtract", "multiply", "divide"):
-        first, gap, second = np.meshgrid(positive, gaps if name in ("add", "subtract") else [3], both, indexing="ij")
+        first, gap, second = np.meshgrid(both, gaps if name in ("add", "subtract") else [3], both, indexing="ij")
         exact = np.frompyfunc(getattr(oracle, name), 4, 2)
         m, e = (part.astype(np.int64).ravel() for part in exact(first, gap, second, 0))
         for tag in TAGS:
@@ -49,8 +49,8 @@ def test_carries_and_clamped_exponents_of_eight_digits(nearest: bool) -> None:
     t = LARGEST_SHORT
     steps = np.arange(4)
     edges = np.concatenate([10 ** (t - 1) + steps, 10**t - 1 - steps, 5 * 10 ** (t - 1) + steps - 2])
-    gaps = np.arange(-t - 5, t + 6)
-    first, gap, second = np.meshgrid(edges, gaps, np.concatenate([-edges, edges]), indexing="ij")
+    both = np.concatenate([-edges, edges])
+    first, gap, second = np.meshgrid(both, np.arange(-t - 5, t + 6), both, indexing="ij")
     for name in ("add", "subtract", "multiply"):
         exact = np.frompyfunc(getattr(kernel(10, t, nearest), name), 4, 2)
         m, e = (part.astype(np.int64).ravel() for part in exact(first, gap, second, 0))
