@@ -296,8 +296,9 @@ def mixed_products() -> Finding:
 @CHECKS.add(MAIN + "sanalysis.uncorrelated-q")
 def uncorrelated() -> Finding:
     # What x_{n-1} has in common with x_n, and with the integral, less what (5) makes of it.
-    past = P * DECAY - DECAY * P
-    integral = sp.integrate(P * sp.exp(-OMEGA * TAU), (TAU, 0, T)) - (1 - DECAY) / OMEGA * P
+    phi, together = derivation.transition_matrix(), P * sp.exp(-OMEGA * TAU)
+    past = together.subs(TAU, T) - phi[0, 0] * P
+    integral = sp.integrate(together, (TAU, 0, T)) - phi[1, 0] * P
     step_1, second = theory.exact_step(theory.resonant(1.0, 3.0, 0.2), 2.0)
     kept = np.eye(2) - step_1[:2] @ step_1[:2].T
     return compare(
@@ -353,7 +354,11 @@ def covariance_equation() -> Finding:
 
 @CHECKS.add(*eq("21"))
 def covariance_components() -> Finding:
-    return compare(step(derivation.continuous(), 0, 1, 2), "the same, entry by entry")
+    return compare(
+        step(derivation.continuous(), 0, 1, 2),
+        "the same, entry by entry",
+        note="$\\omega_{BW}$ in the second is $\\omega_{bw}$",
+    )
 
 
 @CHECKS.add(*eq("22", "23"), MAIN + "sanalysis.steady-start")

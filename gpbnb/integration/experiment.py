@@ -11,6 +11,7 @@ import mpmath
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb._kernels.carriers import Compiled
 from gpbnb._kernels.scalar import add, load, multiply, round_, store
@@ -22,6 +23,7 @@ from gpbnb.integration.theory import Process, Rule, Step
 Floats = NDArray[np.float64]
 
 CHUNK = 1 << 20  # normal numbers held at a time
+BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # of progress: on a terminal, after two seconds
 
 # -- how exactly the closed form is evaluated -----------------------------------------------------
 
@@ -245,7 +247,9 @@ def simulate(
     if not wanted or wanted[0] < 1 or list(wanted) != sorted(set(wanted)):
         raise ValueError(f"got n = {tuple(n)}; needed rising numbers of cycles, at least 1")
     total, kept = np.zeros(paths), []
+    bar = tqdm(total=wanted[-1], desc="cycles", unit_scale=True, **BAR)
     for piece in pieces(process, f_c, wanted[-1], rng, paths, rule.memory):
+        bar.update(len(piece.d))
         added = piece.d if rule.name == "trapezoidal" else rule_errors(rule, f_c, piece)
         last = piece.first + len(added) - 1
         cuts = [k for k in wanted if piece.first <= k <= last]
@@ -256,6 +260,7 @@ def simulate(
             kept.append(total)
             begin = end
         total = total + added[begin:].sum(axis=0)
+    bar.close()
     return Simulation(process, f_c, rule, wanted, np.array(kept))
 
 
@@ -292,7 +297,8 @@ def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> S
     paths : independent runs; the relative standard error of a variance is √(2/paths).
     """
     values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
-    runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in values.tolist()]
+    bar = tqdm(values.tolist(), desc="sweep", **BAR)
+    runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in bar]
     return Sweep(values, cycles, paths, np.array([run.variance[0] for run in runs]) / cycles)
 
 
@@ -407,7 +413,7 @@ def emulate(
     duration : s; rounded to whole cycles.
     """
     for fmt in formats:
-        if fmt.precision * math.log2(fmt.base) > 41:
+        if fmt.precision * math.log2(fmt.base) > 40:
             raise ValueError(f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer digits")
     process = theory.first_order(sigma_x, omega_bw)
     cycles = round(theory._scalar("duration", duration) * theory._scalar("f_c", f_c))
@@ -466,7 +472,8 @@ def meet(
     paths: int = 64,
 ) -> Meeting:
     """Emulate an integrator over iteration rates and formats; rates are powers of two, so that T/2 is exact."""
-    runs = [emulate(omega_bw, f_c, duration, formats, rng, paths) for f_c in rates]
+    bar = tqdm(rates, desc="rates", **BAR)
+    runs = [emulate(omega_bw, f_c, duration, formats, rng, paths) for f_c in bar]
     table = np.array([[(*run.rms, run.rms_total) for run in at_rate] for at_rate in runs]).transpose(2, 1, 0)
     return Meeting(omega_bw, duration, paths, tuple(formats), np.array(rates, dtype=np.float64), *table)
 

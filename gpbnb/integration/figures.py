@@ -94,6 +94,40 @@ def accuracy(results: Mapping[str, Accuracy], ax: Axes) -> list[Artist]:
     return artists
 
 
+def approximations(terms: int, ax: Axes) -> list[Artist]:
+    """Errors of (39), and of the series with up to `terms` terms, relative to (35)."""
+    mu = np.geomspace(0.1, 20, 300)
+    exact, total = theory.walk_factor(mu), np.zeros_like(mu)
+    artists: list[Artist] = []
+    for k, (c, colour) in enumerate(zip(theory.series(terms), (STRICT, *COLOURS), strict=False)):
+        total = total + float(c) * mu ** (2 * k + 1)
+        error = np.abs(np.sqrt(np.where(total > 0, total, np.nan) / exact) - 1)
+        artists += ax.plot(mu, error, color=colour, label=f"{k + 1} terms" if k else "(39)")
+    artists.append(ax.axvline(2 * np.pi, color=REFERENCE, ls=":", label=r"$\mu=2\pi$"))
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_ylim(1e-6, 10)
+    legend(ax, fontsize=9)
+    label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "error relative to (35) (no unit)")
+    return artists
+
+
+def powers(ax: Axes) -> list[Artist]:
+    """Powers with which the random walk goes with bandwidth and rate, beside those of the abstract."""
+    mu = np.geomspace(0.01, 100, 200)
+    artists: list[Artist] = []
+    for power, printed, colour, name in zip(
+        theory.exponents(mu), (0.5, -1.0), COLOURS, ("bandwidth", "iteration rate"), strict=False
+    ):
+        artists += ax.plot(mu, power, color=colour, label=f"of the {name}")
+        artists.append(ax.axhline(printed, color=colour, ls="--", lw=1))
+    ax.set_xscale("log")
+    ax.set_ylim(-1.1, 0.8)
+    legend(ax, fontsize=9, title="dashed: abstract", title_fontsize=9)
+    label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "power in (35) (no unit)")
+    return artists
+
+
 def random_walk(result: Sweep, ax: Axes) -> list[Artist]:
     """Random walk observed at many μ, beside (35) and (39)."""
     line = np.geomspace(result.mu.min() / 1.5, result.mu.max() * 1.5, 300)

@@ -50,13 +50,15 @@ def rules(processes: Sequence[tuple[Process, float]]) -> Table:
     """Random walk of every rule over that of the trapezoidal one, for pairs of a process and a rate in Hz."""
     body: list[tuple[str, ...]] = []
     for rule in theory.RULES.values():
-        cells = [rule.name, str(rule.period)]
+        weights = rule.sample_weights()
+        alike = len(set(weights)) == 1
+        cells = [rule.name, str(rule.period), "1" if alike else ", ".join(map(str, sorted(weights)))]
         for process, f_c in processes:
             ratio = theory.walk_rate(process, f_c, rule) / theory.walk_rate(process, f_c)
             cells.append(f"{math.sqrt(ratio):.4g}")
         body.append(tuple(cells))
     names = (f"{process.name}, $|p|T = {max(abs(p) for p in process.poles) / f_c:.3g}$" for process, f_c in processes)
-    return Table(f"{len(body)} rules", ("rule", "cycles a period", *names), tuple(body))
+    return Table(f"{len(body)} rules", ("rule", "cycles a period", "weights of the samples", *names), tuple(body))
 
 
 def slips(mu: float = 0.1, period: float = 0.01) -> Table:

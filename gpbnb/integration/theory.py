@@ -400,7 +400,7 @@ def exact_step(process: Process, f_c: float) -> Step:
 
     For the first order in closed form. With h the part of :math:`L\tanh(\mu/2)`,
     :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b`, where b has the variance ``bridge`` of :func:`discretize`. For others
-    Van Loan's matrix exponential, with as many digits as the cancellation takes.
+    from the matrix exponential, with as many digits as the cancellation takes.
     """
     period = 1 / _scalar("f_c", f_c)
     sigma = process.sigma
@@ -411,36 +411,38 @@ def exact_step(process: Process, f_c: float) -> Step:
         phi, root = float(one.phi11), math.sqrt(float(one.q11)) * sigma
         a = np.array([[phi], [half * (1 + phi)]])
         return Step(a, np.array([[root, 0.0], [half * root, sigma * period * math.sqrt(float(one.bridge))]]))
-    a, q = _van_loan(process, period)
-    return Step(a, q)
+    return Step(*_moments(process, period))
 
 
-def _van_loan(process: Process, period: float) -> tuple[Floats, Floats]:
-    """A and B of :class:`Step` in high precision, for a drift of any size."""
+def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
+    r"""A and B of :class:`Step` for any drift F, from the covariances of z and of its integral y over a cycle.
+
+    With :math:`\Phi = e^{FT}`, in units of :math:`\sigma_x` and T, the steady state gives
+    :math:`E(zz^T) = I`, :math:`E(zy) = F^{-1}(\Phi - I)\,e_1`, :math:`E(y^2) = 2e_1^TF^{-2}(\Phi - I - F)\,e_1`; what the
+    state before explains is subtracted. Nothing grows with T; for small T everything cancels, hence the digits.
+    """
     m = len(process.drift)
     small = max(1.0, 1 / (max(abs(p) for p in process.poles) * period))
     with mpmath.workdps(40 + 10 * math.ceil(math.log10(small) + 1)):
         drift = mpmath.matrix(process.drift) * mpmath.mpf(period)
-        augmented = mpmath.zeros(m + 1)
-        augmented[:m, :m] = drift
-        augmented[m, 0] = 1
-        noise = mpmath.zeros(m + 1)
-        noise[:m, :m] = -(drift + drift.T)  # of unit steady-state covariance
-        block = mpmath.zeros(2 * (m + 1))
-        block[: m + 1, : m + 1], block[: m + 1, m + 1 :], block[m + 1 :, m + 1 :] = -augmented, noise, augmented.T
-        power = mpmath.expm(block)
-        transition = power[m + 1 :, m + 1 :].T
-        covariance = transition * power[: m + 1, m + 1 :]
+        phi, inverse, unit, first = mpmath.expm(drift), drift**-1, mpmath.eye(m), mpmath.eye(m)[:, 0]
+        mixed = inverse * (phi - unit) * first
+        transition = mpmath.zeros(m + 1, m)
+        transition[:m, :], transition[m, :] = phi, first.T * inverse * (phi - unit)
+        covariance = mpmath.eye(m + 1)
+        covariance[:m, m], covariance[m, :m] = mixed, mixed.T
+        covariance[m, m] = 2 * (first.T * inverse * (inverse * (phi - unit) - unit) * first)[0]
+        covariance -= transition * transition.T
         # d = (x_n + x_{n-1})/2 - integral
         change = mpmath.eye(m + 1)
         change[m, 0], change[m, m] = mpmath.mpf(1) / 2, -1
-        a = change * transition[:, :m]
+        a = change * transition
         a[m, 0] += mpmath.mpf(1) / 2
         root = mpmath.cholesky(change * covariance * change.T)
         scale = [1.0] * m + [period]
-        first = np.array([[float(a[i, j]) * scale[i] for j in range(m)] for i in range(m + 1)])
-        second = np.array([[float(root[i, j]) * scale[i] * process.sigma for j in range(m + 1)] for i in range(m + 1)])
-    return first, second
+        step = np.array([[float(a[i, j]) * scale[i] for j in range(m)] for i in range(m + 1)])
+        noise = np.array([[float(root[i, j]) * scale[i] * process.sigma for j in range(m + 1)] for i in range(m + 1)])
+    return step, noise
 
 
 # -- other integrators ----------------------------------------------------------------------------
@@ -482,13 +484,17 @@ class Rule:
         """Cycles that the rule looks back."""
         return max(1, *(len(step) - 1 for step in self.weights))
 
-    def harmonics(self) -> tuple[complex, ...]:
-        r"""Fourier coefficients :math:`W_0 \dots W_{p-1}` of the weight that each sample has in the end; W_0 is 1."""
-        p = self.period
-        total = [Fraction(0)] * p
+    def sample_weights(self) -> tuple[Fraction, ...]:
+        """Weights that the samples of a period have in the end; their mean is 1."""
+        total = [Fraction(0)] * self.period
         for r, step in enumerate(self.weights):
             for j, w in enumerate(step):
-                total[(r + 1 - j) % p] += w
+                total[(r + 1 - j) % self.period] += w
+        return tuple(total)
+
+    def harmonics(self) -> tuple[complex, ...]:
+        r"""Fourier coefficients :math:`W_0 \dots W_{p-1}` of :meth:`sample_weights`; W_0 is 1."""
+        p, total = self.period, self.sample_weights()
         turn = [complex(math.cos(2 * math.pi * k / p), -math.sin(2 * math.pi * k / p)) for k in range(p)]
         return tuple(sum(float(a) * turn[m * i % p] for i, a in enumerate(total)) / p for m in range(p))
 
@@ -506,6 +512,7 @@ RULES = {
         _rule("trapezoidal", ["1/2", "1/2"]),
         _rule("Adams-Bashforth 2", ["0", "3/2", "-1/2"]),
         _rule("Adams-Moulton 3", ["5/12", "8/12", "-1/12"]),
+        _rule("two speeds, 4 samples", [], [], [], ["1/2", "1", "1", "1", "1/2"]),
         _rule("Simpson", [], ["1/3", "4/3", "1/3"]),
         _rule("Simpson 3/8", [], [], ["3/8", "9/8", "9/8", "3/8"]),
         _rule("Boole", [], [], [], ["14/45", "64/45", "24/45", "64/45", "14/45"]),
@@ -701,6 +708,8 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
       walk is more often on one side than on the other;
     - the roundings of sample, sum and product, each of the mean square :math:`\kappa` of its number.
 
+    T/2 counts as exact: its one rounding changes the integral by a share that no rate changes.
+
     Chopping: each addition takes the share :math:`\kappa_1` off the accumulator, which leaks. With
     :math:`a = \kappa_1f_ct` the error has the variance
     :math:`(2\sigma_x^2t/\omega_{bw})\,(2a-3+4e^{-a}-e^{-2a})/2a`, or :math:`2\sigma_x^2ta^2/3\omega_{bw}` for small a.
@@ -763,7 +772,7 @@ def independent_best_rate(omega_bw: float, duration: float, fmt: FloatFormat) ->
 
 
 def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
-    """Iteration rate in Hz at which the total of :func:`two_errors` is least.
+    """Iteration rate in Hz at which the total of :func:`two_errors` is least; below :func:`stall_rate`.
 
     Parameters
     ----------

@@ -175,6 +175,7 @@ DISAGREE = [
     ("components", changed_after),
     ("error_variance", plus(theory, "error_variance", 0.1)),
     ("mixed_products", changed_first),
+    ("uncorrelated", times(derivation, "transition_matrix", 2)),
     ("uncorrelated", replace(theory, "exact_step", lambda process, f: theory.Step(np.ones((3, 2)), np.ones((3, 3))))),
     ("p31", changed_first),
     ("p33", changed_after),

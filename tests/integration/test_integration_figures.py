@@ -69,6 +69,27 @@ def test_accuracy(ax):
     check_labels(ax, "rad", "units in the last place")
 
 
+def test_approximations(ax):
+    figures.approximations(3, ax)
+    shown = line(ax, "(39)")
+    mu = shown.get_xdata()
+    assert shown.get_ydata() == pytest.approx(theory.approximation_ratio(mu) - 1, rel=1e-9, abs=1e-14)
+    three = np.sqrt((mu / 6 - mu**3 / 360 + mu**5 / 15120) / theory.walk_factor(mu)) - 1
+    assert line(ax, "3 terms").get_ydata() == pytest.approx(abs(three), rel=1e-6, abs=1e-14)
+    assert np.isnan(line(ax, "2 terms").get_ydata()[-1])  # its variance is negative there
+    check_labels(ax, "rad", "relative to (35)")
+
+
+def test_powers(ax):
+    figures.powers(ax)
+    shown = line(ax, "of the iteration rate")
+    assert shown.get_ydata() == pytest.approx(theory.exponents(shown.get_xdata())[1])
+    assert names(ax) == ["of the bandwidth", "of the iteration rate"]
+    flat = sorted(each.get_ydata()[0] for each in ax.lines if each.get_linestyle() == "--")
+    assert flat == [-1.0, 0.5]
+    check_labels(ax, "rad", "power")
+
+
 @pytest.fixture(scope="module")
 def swept():
     return experiment.sweep([0.01, 1.0, 50.0], 100, 500, np.random.default_rng(1))
@@ -193,7 +214,8 @@ def test_sensor_table():
 def test_rules_table():
     process = theory.first_order(1.0, 1.0)
     table = tables.rules([(process, 2.0)])
-    ratio = {row[0]: float(row[2]) for row in table.body}
+    ratio = {row[0]: float(row[3]) for row in table.body}
+    assert {row[0]: row[2] for row in table.body}["Simpson"] == "2/3, 4/3"
     assert ratio["trapezoidal"] == 1
     walk = theory.walk_rate(process, 2.0, theory.RULES["Boole"]) / theory.walk_rate(process, 2.0)
     assert ratio["Boole"] == pytest.approx(math.sqrt(walk), rel=1e-3)

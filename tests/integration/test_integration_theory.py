@@ -136,10 +136,56 @@ def test_covariances_are_the_integrals_that_they_stand_for():
     assert float(one.bridge) == pytest.approx(float(one.q22 - one.q12**2 / one.q11), rel=1e-12)
 
 
+def van_loan(process, period):
+    """Transition and noise covariance of z and of the integral, from one exponential of a block matrix."""
+    m = len(process.drift)
+    with mpmath.workdps(60):
+        augmented, noise, block = mpmath.zeros(m + 1), mpmath.zeros(m + 1), mpmath.zeros(2 * (m + 1))
+        drift = mpmath.matrix(process.drift)
+        augmented[:m, :m], augmented[m, 0] = drift, 1
+        noise[:m, :m] = -(drift + drift.T)
+        block[: m + 1, : m + 1], block[: m + 1, m + 1 :], block[m + 1 :, m + 1 :] = -augmented, noise, augmented.T
+        power = mpmath.expm(block * period)
+        transition = power[m + 1 :, m + 1 :].T
+        covariance = process.sigma**2 * transition * power[: m + 1, m + 1 :]
+    return (np.array(matrix.tolist(), dtype=float) for matrix in (transition, covariance))
+
+
+@pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0])
+@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+def test_a_step_is_that_of_van_loan(process, f_c):
+    m, step = len(process.drift), theory.exact_step(process, f_c)
+    transition, covariance = van_loan(process, 1 / f_c)
+    change = np.eye(m + 1)
+    change[m, 0], change[m, m] = 0.5 / f_c, -1
+    a = change @ transition[:, :m]
+    a[m, 0] += 0.5 / f_c
+    unit = np.array([1.0] * m + [1 / f_c])
+    # In float64 the differences cancel to μ³: what is left is good to 1e-16 of the terms.
+    assert (step.a - a) / unit[:, np.newaxis] == pytest.approx(0, abs=1e-14)
+    away = step.b @ step.b.T - change @ covariance @ change.T
+    assert away / np.outer(unit, unit) == pytest.approx(0, abs=3e-14)
+
+
+@pytest.mark.parametrize("f_c", [1e-7, 1e-3, 1e9])
+def test_a_resonance_can_be_sampled_at_any_rate(f_c):
+    """Far too slowly the cycles have nothing in common; far too fast their errors follow from x'' = -ω² x."""
+    step = theory.exact_step(RINGING, f_c)
+    if f_c < 1:
+        assert step.a[:2] == pytest.approx(np.zeros((2, 2)), abs=1e-100)
+        assert step.b[:2] == pytest.approx(np.diag([1.3, 1.3, 0])[:2], abs=1e-100)
+        # The integral over T has the variance 2 σ² Re Σ c/p T, less what the samples at its ends tell of it.
+        assert step.b[2, 2] ** 2 * f_c == pytest.approx(float(RINGING.psd(0.0)), rel=0.02)
+    else:
+        # d = T³ x''/12 to leading order, x'' = -ω_0² x - 2ζω_0 x'; z = (x, x'/ω_0).
+        expected = np.array([-(3.0**2), -2 * 0.2 * 3.0**2]) / 12 * f_c**-3
+        assert step.a[2] == pytest.approx(expected, rel=1e-6)
+
+
 @pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0, 1e5])
 def test_the_closed_step_is_the_one_of_the_matrix_exponential(f_c):
     closed = theory.exact_step(FIRST, f_c)
-    a, b = theory._van_loan(FIRST, 1 / f_c)
+    a, b = theory._moments(FIRST, 1 / f_c)
     assert closed.a == pytest.approx(a, rel=1e-13)
     assert closed.b == pytest.approx(b, rel=1e-12, abs=0)
 
@@ -279,7 +325,7 @@ def test_rules_that_weigh_alike_tie_and_no_rule_is_better(rule):
     for process, f_c in ((FIRST, 30.0), (FIRST, 0.3), (RINGING, 4.0), (RINGING, 0.9)):
         least = theory.walk_rate(process, f_c)
         rate = theory.walk_rate(process, f_c, rule)
-        if rule.period == 1:
+        if set(rule.sample_weights()) == {1}:
             assert rate == least
         else:
             assert rate > least * 1.001
@@ -290,7 +336,7 @@ def test_rules_that_weigh_alike_tie_and_no_rule_is_better(rule):
 def test_rules_integrate_polynomials_to_their_order(rule):
     """Exact for constants; for degree 1 but the rectangular ones; Simpson and 3/8 to 3, Boole to 5."""
     order = {"rectangular, old sample": 0, "rectangular, new sample": 0, "trapezoidal": 1, "Adams-Bashforth 2": 1}
-    order |= {"Adams-Moulton 3": 2, "Simpson": 3, "Simpson 3/8": 3, "Boole": 5}
+    order |= {"Adams-Moulton 3": 2, "two speeds, 4 samples": 1, "Simpson": 3, "Simpson 3/8": 3, "Boole": 5}
     p = rule.period
     for degree in range(order[rule.name] + 2):
         total = sum(
@@ -302,6 +348,9 @@ def test_rules_integrate_polynomials_to_their_order(rule):
 
 def test_harmonics():
     assert theory.RULES["Adams-Bashforth 2"].harmonics() == (1.0,)
+    weighs_alike = {rule.name for rule in RULES if set(rule.sample_weights()) == {1}}
+    assert {rule.name for rule in RULES} - weighs_alike == {"Simpson", "Simpson 3/8", "Boole"}
+    assert theory.RULES["Simpson"].sample_weights() == (Fraction(2, 3), Fraction(4, 3))
     simpson = theory.RULES["Simpson"].harmonics()
     assert simpson[0] == 1
     assert abs(simpson[1] + 1 / 3) < 1e-15
@@ -397,6 +446,7 @@ def test_odd_bases_have_no_ties():
 def test_the_best_rate_is_the_best(fmt, omega):
     duration = 600.0
     best = theory.best_rate(omega, duration, fmt)
+    assert best < theory.stall_rate(omega, duration, fmt)
     least = theory.two_errors(1.0, omega, best, duration, fmt).total
     for factor in np.geomspace(0.05, 20, 60):
         assert theory.two_errors(1.0, omega, best * factor, duration, fmt).total >= least * (1 - 1e-9)
