@@ -1,4 +1,4 @@
-"""Ten million cycles of a process and its integration error beside SciPy's filter, with and without drawing the noise."""
+"""Ten million cycles of a process and its integration error beside SciPy's filter, from given noise and drawing it."""
 
 from __future__ import annotations
 

@@ -417,9 +417,9 @@ def exact_step(process: Process, f_c: float) -> Step:
 def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
     r"""A and B of :class:`Step` for any drift F, from the covariances of z and of its integral y over a cycle.
 
-    With :math:`\Phi = e^{FT}`, in units of :math:`\sigma_x` and T, the steady state gives
-    :math:`E(zz^T) = I`, :math:`E(zy) = F^{-1}(\Phi - I)\,e_1`, :math:`E(y^2) = 2e_1^TF^{-2}(\Phi - I - F)\,e_1`; what the
-    state before explains is subtracted. Nothing grows with T; for small T everything cancels, hence the digits.
+    With T as the unit of time, :math:`\Phi = e^F` and :math:`\sigma_x = 1`, the steady state gives
+    :math:`E(zz^T) = I`, :math:`E(zy) = F^{-1}(\Phi - I)\,e_1`, :math:`E(y^2) = 2e_1^TF^{-2}(\Phi - I - F)\,e_1`;
+    what the state before explains is subtracted. Nothing grows with T; for small T everything cancels, hence the digits.
     """
     m = len(process.drift)
     small = max(1.0, 1 / (max(abs(p) for p in process.poles) * period))
