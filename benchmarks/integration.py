@@ -1,4 +1,4 @@
-"""Ten million cycles of a process and its integration error beside SciPy's filter, from given noise and drawing it."""
+"""Ten million cycles of a process and its integration error beside SciPy's filter, from given noise and from drawn."""
 
 from __future__ import annotations
 
