@@ -419,7 +419,7 @@ def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
 
     With T as the unit of time, :math:`\Phi = e^F` and :math:`\sigma_x = 1`, the steady state gives
     :math:`E(zz^T) = I`, :math:`E(zy) = F^{-1}(\Phi - I)\,e_1`, :math:`E(y^2) = 2e_1^TF^{-2}(\Phi - I - F)\,e_1`;
-    what the state before explains is subtracted. Nothing grows with T; for small T everything cancels, hence the digits.
+    what the state before explains is subtracted. Nothing grows with T; for small T all cancels, hence the digits.
     """
     m = len(process.drift)
     small = max(1.0, 1 / (max(abs(p) for p in process.poles) * period))
