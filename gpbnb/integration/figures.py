@@ -239,7 +239,7 @@ def meeting(result: Meeting, ax: Axes) -> list[Artist]:
 
 
 def totals(result: Meeting, ax: Axes) -> list[Artist]:
-    """Both errors together, and the best rate (triangle) of each format."""
+    """Both errors together, and the best rate (star) of each format."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     artists: list[Artist] = []
     for i, (fmt, colour, marker) in enumerate(zip(result.formats, COLOURS, "sD^vo", strict=False)):
@@ -248,7 +248,7 @@ def totals(result: Meeting, ax: Axes) -> list[Artist]:
         best = theory.best_rate(result.omega_bw, result.duration, fmt)
         if rates[0] <= best <= rates[-1]:
             least = theory.two_errors(1.0, result.omega_bw, best, result.duration, fmt).total
-            artists += ax.plot([best], [least / 1.6], "^", color=colour, ms=8, mfc="none")
+            artists += ax.plot([best], [least * 1.6], "*", color=colour, ms=12, mfc="none")
     ax.set_xscale("log")
     ax.set_yscale("log")
     legend(ax, fontsize=8, loc="lower left")
