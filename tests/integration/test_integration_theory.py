@@ -180,6 +180,8 @@ def test_a_resonance_can_be_sampled_at_any_rate(f_c):
         # d = T³ x''/12 to leading order, x'' = -ω_0² x - 2ζω_0 x'; z = (x, x'/ω_0).
         expected = np.array([-(3.0**2), -2 * 0.2 * 3.0**2]) / 12 * f_c**-3
         assert step.a[2] == pytest.approx(expected, rel=1e-6)
+        # What is left given z at both ends: x'' is white, of the density 4ζω_0³σ², and T⁵/720 its share.
+        assert step.b[2, 2] == pytest.approx(math.sqrt(4 * 0.2 * 3.0**3 * 1.3**2 / 720 * f_c**-5), rel=1e-7)
 
 
 @pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0, 1e5])
