@@ -196,6 +196,35 @@ def deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
 Rotate = Callable[[ArrayLike], Floats]
 
 
+def into_spacecraft(
+    vector: ArrayLike, phase: ArrayLike, *misalignments: ArrayLike, rotate: Rotate = rotation
+) -> Floats:
+    """Components of a vector of the intermediate frame after the roll and one misalignment after the other.
+
+    Parameters
+    ----------
+    vector : (..., 3), in any unit.
+    phase : ωt, in radians; all are broadcast.
+    misalignments : (..., 3) each, in radians: β to reach the telescope frame, β and γ for the readout frame.
+    rotate : `rotation` or `small_rotation`.
+
+    Returns
+    -------
+    components : (..., 3).
+    """
+    given, turned = _angles("vector", vector, 3), _finite("phase", phase)
+    yz = deroll(given[..., 1:], -turned)
+    components = np.concatenate([np.broadcast_to(given[..., :1], (*yz.shape[:-1], 1)), yz], axis=-1)
+    for angles in misalignments:
+        components = apply(rotate(angles), components)
+    return components
+
+
+def apply(matrix: Floats, vector: Floats) -> Floats:
+    """Product of matrices (..., 3, 3) and vectors (..., 3), broadcast; without BLAS, whose last digits differ."""
+    return np.asarray(np.einsum("...jk,...k->...j", matrix, vector))
+
+
 def star_in_telescope(alpha: ArrayLike, beta: ArrayLike, phase: ArrayLike, rotate: Rotate = rotation) -> Floats:
     r"""Unit vector to the guide star in the telescope frame, :math:`B(\beta)\,R(\omega t)\,A(\alpha)\,(1,0,0)^T`.
 
@@ -213,7 +242,7 @@ def star_in_telescope(alpha: ArrayLike, beta: ArrayLike, phase: ArrayLike, rotat
     ----------
     hung1982, ch. IV, eq. (1).
     """
-    return _through(rotate(beta), _rolled(rotate(alpha)[..., 0], phase))
+    return into_spacecraft(rotate(alpha)[..., 0], phase, beta, rotate=rotate)
 
 
 def spin_in_readout(
@@ -237,7 +266,7 @@ def spin_in_readout(
     ----------
     hung1982, ch. IV, eq. (2).
     """
-    return _through(rotate(gamma), star_in_telescope(theta, beta, phase, rotate))
+    return into_spacecraft(rotate(theta)[..., 0], phase, beta, gamma, rotate=rotate)
 
 
 def theta_of(phi: ArrayLike, alpha: ArrayLike) -> Floats:
@@ -357,18 +386,6 @@ def _turn(axis: int, angle: Floats) -> Floats:
     C[..., j, k] = np.sin(angle)
     C[..., k, j] = -C[..., j, k]
     return C
-
-
-def _rolled(vector: Floats, phase: ArrayLike) -> Floats:
-    """Components in the roll frame; as roll(phase) @ vector, without a matrix a sample."""
-    turned = _finite("phase", phase)
-    yz = deroll(vector[..., 1:], -turned)
-    x = np.broadcast_to(vector[..., :1], (*yz.shape[:-1], 1))
-    return np.concatenate([x, yz], axis=-1)
-
-
-def _through(matrix: Floats, vector: Floats) -> Floats:
-    return np.asarray(np.einsum("...jk,...k->...j", matrix, vector))
 
 
 def _transverse(angles: Floats) -> Floats:
