@@ -70,7 +70,7 @@ GPB_STATES = (
     "bias_z",
     "scale",
 )
-"""Ten of them: drift and its rate, pointing, the misalignment about the roll axis, biases, scale factor.
+"""Ten of them. Drift and its rate, pointing, the misalignment about the roll axis, biases, scale factor.
 
 The transverse misalignments β2, β3, γ2, γ3 have the columns of the biases, up to sign, and so are part of them.
 """
@@ -371,7 +371,7 @@ def measurement_matrix(
             H[..., column] = deroll(body[name], turned) if derolled else body[name]
         else:
             H[..., column] = inertial[name] if derolled else deroll(inertial[name], -turned)
-    return H
+    return H + 0.0  # no minus before a zero
 
 
 # -- helpers --------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeVar
 
 GOAL = 1.0
-"""Milliarcseconds a year: the basis of Figure II-2 and the design goal of ch. I."""
+"""The basis of Figure II-2 and the design goal of ch. I, in milliarcseconds a year."""
 
 
 class Kind(Enum):
@@ -33,7 +33,7 @@ class Form(Enum):
 
 
 METHODS = ("roll", "orbit", "filter")
-"""Ways to reduce an error: averaging over rolls, averaging over orbits, filtering."""
+"""Ways to reduce an error. Averaging over rolls, averaging over orbits, filtering."""
 
 _BY_KIND: dict[Kind, set[str]] = {
     Kind.DETERMINISTIC: set(),

@@ -126,8 +126,8 @@ def deroll() -> Derivation:
             Step("(5), second row", held(S) * held(t[1]) + held(C) * held(t[2]), ALPHA[1]),
             Step("(6), first row", held(C) * held(r[1]) - held(S) * held(r[2]), -THETA[2]),
             Step("(6), second row", held(S) * held(r[1]) + held(C) * held(r[2]), THETA[1]),
-            Step("(7), first row", held(C) * held(y) - held(S) * held(z), -held(THETA[2] - ALPHA[2])),
-            Step("(7), second row", held(S) * held(y) + held(C) * held(z), held(THETA[1] - ALPHA[1])),
+            Step("(7), first row", held(C) * held(y) - held(S) * held(z), ALPHA[2] - THETA[2]),
+            Step("(7), second row", held(S) * held(y) + held(C) * held(z), THETA[1] - ALPHA[1]),
         )
     )
 
@@ -283,16 +283,17 @@ def one_ring() -> Derivation:
 
 
 def precessions() -> Derivation:
-    r"""Directions of the two drifts for a polar orbit and a star in its plane (Figure I-1).
+    r"""Directions of the two drifts for a polar orbit (Figure I-1).
 
-    The Earth turns about z, the orbit lies in the x-z plane. Both precessions are those of Schiff: geodetic about the
-    orbit's normal :math:`n`, motional about the mean over an orbit of :math:`3\hat r(\hat r\cdot\omega) - \omega`.
+    The Earth turns about z, the orbit lies in the x-z plane, the star stands at the declination δ and by ε off this
+    plane. Both precessions are those of Schiff: geodetic about the orbit's normal n, motional about the mean over
+    an orbit of :math:`3\hat r(\hat r\cdot\omega) - \omega`.
     """
-    u, d = sp.symbols("u delta", real=True)
+    u, d, e = sp.symbols("u delta epsilon", real=True)
     w = sp.Symbol("omega_E", positive=True)
     r = sp.Matrix([sp.cos(u), 0, sp.sin(u)])
     earth, normal = sp.Matrix([0, 0, w]), sp.Matrix([0, 1, 0])
-    star = sp.Matrix([sp.cos(d), 0, sp.sin(d)])
+    star = sp.Matrix([sp.cos(e) * sp.cos(d), sp.sin(e), sp.cos(e) * sp.sin(d)])
     field = 3 * r * r.dot(earth) - earth
     average = [over(sp.Integral(sp.expand(f), (u, 0, 2 * sp.pi)), 2 * sp.pi) for f in field]
     geodetic, motional = normal.cross(star), (earth / 2).cross(star)
@@ -300,14 +301,16 @@ def precessions() -> Derivation:
         (
             Step("mean field along the Earth's axis", average[2], w / 2),
             Step("and across it, in the orbit's plane", average[0], sp.S.Zero),
-            Step("geodetic drift $n\\times s$ along the orbit's normal $n$", dot(geodetic, normal), sp.S.Zero),
-            Step("motional drift along the Earth's axis", dot(motional, earth), sp.S.Zero),
-            Step("and along the orbit's normal", dot(motional, normal), w * sp.cos(d) / 2),
-            Step("geodetic along motional drift", dot(geodetic, motional), sp.S.Zero),
+            Step(
+                "inner product of both drifts, which vanishes for a star in the orbit's plane, $\\epsilon=0$",
+                geodetic.dot(motional),
+                -w * sp.sin(2 * e) * sp.sin(d) / 4,
+            ),
+            Step(
+                "for such a star: motional drift along the orbit's normal",
+                sp.Limit(motional.dot(normal), e, 0),
+                w * sp.cos(d) / 2,
+            ),
+            Step("and in the orbit's plane", sp.Limit(motional[0], e, 0), sp.S.Zero),
         )
     )
-
-
-def dot(a: sp.Matrix, b: sp.Matrix) -> sp.Expr:
-    """Inner product, not yet evaluated."""
-    return sp.Add(*(sp.Mul(held(x), held(y), evaluate=False) for x, y in zip(a, b, strict=True)), evaluate=False)

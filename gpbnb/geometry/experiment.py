@@ -132,11 +132,13 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
     )
 
 
-def years(cases: Mapping[str, Case], step: float = 60.0, roll_period: float = 600.0) -> dict[str, tuple[Year, Year]]:
-    """Each case without and with roll."""
+def years(
+    cases: Mapping[str, Case], step: float = 60.0, roll_period: float = 600.0, *, progress: bool = False
+) -> dict[str, tuple[Year, Year]]:
+    """Each case without and with roll; see :func:`year`."""
     return {
         name: (year(case, None, step), year(case, roll_period, step))
-        for name, case in tqdm(cases.items(), desc="years", ncols=80, disable=len(cases) < 20)
+        for name, case in tqdm(cases.items(), desc="years", ncols=80, disable=not progress)
     }
 
 

@@ -14,9 +14,9 @@ Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 GEODETIC = 6.6 * ARCSEC
-"""Drift in the orbit's plane, a year: the size that was predicted for Gravity Probe B."""
+"""Drift in the plane of the orbit, of the size that was predicted for Gravity Probe B; radians a year."""
 MOTIONAL = 0.04 * ARCSEC
-"""Drift across the orbit's plane, a year."""
+"""Drift across the plane of the orbit; radians a year."""
 YEAR = 365 * 86400.0
 """Seconds of the year that hung1984 takes."""
 ZERO: Triple = (0.0, 0.0, 0.0)
@@ -169,7 +169,7 @@ def effect(case: Case, rolling: bool, phase: float = 0.0) -> Effect:
     return Effect((float(start[0]), float(start[1])), (float(drift[0]), float(drift[1])), line)
 
 
-def line_fit_leak(amplitude: float, rolls: float, samples: int | None = None) -> float:
+def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) -> float:
     r"""Error of the drift of a straight line fitted to all samples, from what stands in the spacecraft.
 
     .. math:: |\Delta\text{drift}| = \frac{6}{\pi N}\,\text{amplitude}, \qquad
