@@ -28,7 +28,8 @@ def test_every_entry_of_these_chapters_has_a_check():
     assert {e.id for e in INVENTORY if e.id.startswith(("hung1982.II.", "hung1984.I."))} <= mine
     elsewhere = {e.id for e in INVENTORY if e.id.startswith("hung1982.I.")} - mine
     assert elsewhere == {
-        f"hung1982.I.{item}" for item in ("figure-i-1", "geodetic-motional-geometry", "larger-effect", "progress-report")
+        f"hung1982.I.{item}"
+        for item in ("figure-i-1", "geodetic-motional-geometry", "larger-effect", "progress-report")
     }
 
 

@@ -84,7 +84,12 @@ ROWS = [f"{eq}, {row} row" for eq in ("(5)", "(6)", "(7)") for row in ("first", 
         ("larger_effect", theory, "precession_rates", lambda altitude: (1.0, 2.0)),
         ("progress_report", checks, "deroll_errors", lambda: (0.0, 0.0)),
         ("six_frames", checks, "frames_of_a_case", lambda: np.stack([np.eye(3)] * 6)),
-        ("equation_1", derivation, "printed_small", lambda a: sp.Matrix(3, 3, [1, a[2], a[1], -a[2], 1, a[0], a[1], -a[0], 1])),
+        (
+            "equation_1",
+            derivation,
+            "printed_small",
+            lambda a: sp.Matrix(3, 3, [1, a[2], a[1], -a[2], 1, a[0], a[1], -a[0], 1]),
+        ),
         ("equation_2", derivation, "printed_small", lambda a: sp.eye(3)),
         ("equation_3", derivation, "orders_agree", lambda: False),
         ("equation_4", derivation, "printed_small", lambda a: sp.eye(3)),
@@ -128,7 +133,15 @@ def test_what_disagrees_could_agree(patch, name, target, attribute, value):
 
 
 def test_every_check_was_tried():
-    tried = {"two_precessions", "larger_effect", "progress_report", "six_frames", "deroll_matrix", "first_angles", "known"}
+    tried = {
+        "two_precessions",
+        "larger_effect",
+        "progress_report",
+        "six_frames",
+        "deroll_matrix",
+        "first_angles",
+        "known",
+    }
     tried |= {"use_of_model", "deltas", "readout_normal", "boresight", "thetas", "identity"}
     tried |= {f"equation_{n}" for n in range(1, 10)}
     # pictures that are lost; definitions that any estimates satisfy; a statement of two parts, both computed

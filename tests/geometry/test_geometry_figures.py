@@ -41,11 +41,13 @@ def test_frames_are_those_of_the_chain():
 def test_triads_and_ring(axes):
     frames = figures.frames([0.1] * 3, [0.1] * 3, [0.2] * 3, [0, 0.1, 0.1], 0.5)
     still, rolling = figures.in_space(axes[0].figure, axes)
-    names = [text.get_text() for text in figures.triads({k: frames[k] for k in "aig"}, still) if hasattr(text, "get_text")]
+    names = [
+        text.get_text() for text in figures.triads({k: frames[k] for k in "aig"}, still) if hasattr(text, "get_text")
+    ]
     assert "$x_{a}$" in names
     assert "absolute, intermediate, gyro" in names
     artists = figures.triads({"r": frames["r"]}, rolling, ring="r")
-    (ring,) = [a for a in artists if hasattr(a, "get_data_3d")and not hasattr(a, "get_text")]
+    (ring,) = [a for a in artists if hasattr(a, "get_data_3d") and not hasattr(a, "get_text")]
     points = np.array(ring.get_data_3d())
     assert np.allclose(frames["r"][2] @ points, 0, atol=1e-14)  # perpendicular to the normal z_r
 
