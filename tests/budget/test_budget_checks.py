@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from datetime import date
 
+import numpy as np
 import pytest
 
 from gpbnb import ledger
@@ -68,7 +69,7 @@ def test_findings_have_their_notes_and_numbers(rows):
         ("by_statistics", checks, "Kind", list(checks.Kind)[:2]),
         ("random_variables", theory, "cycles_factor", lambda cycles: 0.5),
         ("random_processes", theory, "correlated_factor", lambda time, tau: 0.3),
-        ("random_processes", experiment, "correlated_means", lambda *given: [1.0] * 0 or __import__("numpy").ones(9)),
+        ("random_processes", experiment, "correlated_means", lambda *given: np.ones(9)),
         ("scale_factor", checks, "identifiable", lambda amplitude: False),
         ("noise", theory, "white_factor", lambda readings: 0.5),
         ("curve", theory, "equal_error", lambda total, count: total / count),
@@ -77,8 +78,8 @@ def test_findings_have_their_notes_and_numbers(rows):
 def test_what_agrees_could_disagree(monkeypatch, name, target, attribute, value):
     assert FUNCTIONS[name]().agrees is True
     if attribute == "Kind":
-        kinds = type("Two", (), {"__iter__": lambda self: iter(value), **{k.name: k for k in checks.Kind}})()
-        value = kinds
+        members = {kind.name: kind for kind in checks.Kind}
+        value = type("Two", (), {"__iter__": lambda self, two=tuple(value): iter(two), **members})()
     monkeypatch.setattr(target, attribute, value)
     assert FUNCTIONS[name]().agrees is False
 
