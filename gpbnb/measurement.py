@@ -187,8 +187,7 @@ def deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
     hung1982, ch. IV, eqs. (5)-(7); (8) and (9) have other signs and do not deroll.
     """
     body, turned = _angles("readings", readings, 2), _finite("phase", phase)
-    y, z, C, S = body[..., 0], body[..., 1], np.cos(turned), np.sin(turned)
-    return np.stack([C * y - S * z, S * y + C * z], axis=-1)
+    return _turned_back(body, np.cos(turned), np.sin(turned))
 
 
 # -- what is measured -----------------------------------------------------------------------------
@@ -330,6 +329,46 @@ def measurement_matrix(
     ----------
     hung1982, ch. IV, eqs. (1)-(7); bias and scale factor from the classification of ch. II.
     """
+    turned = _finite("phase", phase)
+    theta, alpha = _angles("nominal_theta", nominal_theta, 3), _angles("nominal_alpha", nominal_alpha, 3)
+    H = measurement_rows(
+        np.cos(turned),
+        np.sin(turned),
+        states,
+        signal=signal,
+        derolled=derolled,
+        nominal_theta=theta,
+        nominal_alpha=alpha,
+    )
+    return np.asarray(H, dtype=np.float64) + 0.0  # no minus before a zero
+
+
+def measurement_rows(
+    cosine: ArrayLike,
+    sine: ArrayLike,
+    states: Sequence[str] = GPB_STATES,
+    *,
+    signal: Signal = "gyro",
+    derolled: bool = True,
+    nominal_theta: ArrayLike = (0, 0, 0),
+    nominal_alpha: ArrayLike = (0, 0, 0),
+) -> NDArray[Any]:
+    """The same from cosine and sine of the roll phase, in the numbers that are given: Fractions stay exact.
+
+    Parameters
+    ----------
+    cosine, sine : (...), of ωt; floats, or objects such as Fractions, for a model that is held exactly.
+    states, signal, derolled : as in :func:`measurement_matrix`.
+    nominal_theta, nominal_alpha : (..., 3), numbers of the same type or integers.
+
+    Returns
+    -------
+    H : (..., 2, n), an array of floats for floats, else of objects.
+
+    Raises
+    ------
+    ValueError : an unknown or repeated state, an unknown signal, or nominal angles of the wrong shape.
+    """
     unknown = [name for name in states if name not in STATES]
     if unknown or not states or len(set(states)) != len(states):
         raise ValueError(
@@ -338,12 +377,13 @@ def measurement_matrix(
         )
     if signal not in ("gyro", "telescope", "difference"):
         raise ValueError(f"got signal {signal!r}; needed 'gyro', 'telescope' or 'difference'")
-    turned = _finite("phase", phase)
-    theta, alpha = _angles("nominal_theta", nominal_theta, 3), _angles("nominal_alpha", nominal_alpha, 3)
-    gyro, telescope = float(signal != "telescope"), float(signal != "gyro")
-    if signal == "difference":
-        telescope = -1.0
-    y, z, zero = np.array([1.0, 0.0]), np.array([0.0, 1.0]), np.zeros(2)
+    C, S = np.asarray(cosine), np.asarray(sine)
+    theta, alpha = np.asarray(nominal_theta), np.asarray(nominal_alpha)
+    for name, nominal in (("nominal_theta", theta), ("nominal_alpha", alpha)):
+        if nominal.ndim == 0 or nominal.shape[-1] != 3:
+            raise ValueError(f"got {name} of shape {nominal.shape}; needed (..., 3)")
+    gyro, telescope = int(signal != "telescope"), {"gyro": 0, "telescope": 1, "difference": -1}[signal]
+    y, z, zero = np.array([1, 0]), np.array([0, 1]), np.array([0, 0])
     spin, star = gyro * _transverse(theta), telescope * _transverse(alpha)
     inertial: dict[str, Any] = {  # columns in the intermediate frame
         "phi2": gyro * z,
@@ -364,14 +404,14 @@ def measurement_matrix(
         "bias_y": gyro * y,
         "bias_z": gyro * z,
     }
-    shape = np.broadcast_shapes(turned.shape, theta.shape[:-1], alpha.shape[:-1])
-    H = np.empty((*shape, 2, len(states)))
+    shape = np.broadcast_shapes(C.shape, S.shape, theta.shape[:-1], alpha.shape[:-1])
+    H = np.empty((*shape, 2, len(states)), dtype=np.result_type(C, S, theta, alpha))
     for column, name in enumerate(states):
         if name in body:
-            H[..., column] = deroll(body[name], turned) if derolled else body[name]
+            H[..., column] = _turned_back(body[name], C, S) if derolled else body[name]
         else:
-            H[..., column] = inertial[name] if derolled else deroll(inertial[name], -turned)
-    return H + 0.0  # no minus before a zero
+            H[..., column] = inertial[name] if derolled else _turned_back(inertial[name], C, -S)
+    return H
 
 
 # -- helpers --------------------------------------------------------------------------------------
@@ -388,12 +428,18 @@ def _turn(axis: int, angle: Floats) -> Floats:
     return C
 
 
-def _transverse(angles: Floats) -> Floats:
+def _turned_back(readings: NDArray[Any], C: NDArray[Any], S: NDArray[Any]) -> NDArray[Any]:
+    """The deroll of readings (..., 2), from cosine and sine of the phase."""
+    y, z = readings[..., 0], readings[..., 1]
+    return np.stack([C * y - S * z, S * y + C * z], axis=-1)
+
+
+def _transverse(angles: NDArray[Any]) -> NDArray[Any]:
     """(-v3, v2): where the x axis of a frame stands, in y and z, after small turns v."""
     return np.stack([-angles[..., 2], angles[..., 1]], axis=-1)
 
 
-def _quarter(pair: Floats) -> Floats:
+def _quarter(pair: NDArray[Any]) -> NDArray[Any]:
     """J applied to (..., 2)."""
     return np.stack([pair[..., 1], -pair[..., 0]], axis=-1)
 

@@ -6,6 +6,7 @@ import itertools
 import math
 import subprocess
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -199,6 +200,33 @@ def test_pointing_and_telescope_misalignment_cancel_in_the_difference():
     assert np.all(H == 0)
 
 
+@pytest.mark.parametrize("signal", ["gyro", "telescope", "difference"])
+@pytest.mark.parametrize("derolled", [True, False])
+def test_rows_of_fractions_are_exact_and_those_of_floats_the_matrix(signal, derolled):
+    C, S = Fraction(5, 13), Fraction(-12, 13)
+    theta, alpha = [0, Fraction(1, 3), Fraction(2, 7)], [0, Fraction(-1, 5), Fraction(1, 9)]
+    options = {"signal": signal, "derolled": derolled}
+    exact = m.measurement_rows(C, S, m.STATES, nominal_theta=theta, nominal_alpha=alpha, **options)
+    assert exact.dtype == object
+    assert all(isinstance(entry, int | Fraction) for entry in exact.flat)
+    floats = m.measurement_matrix(
+        math.atan2(S, C), m.STATES, nominal_theta=np.array(theta, float), nominal_alpha=np.array(alpha, float), **options
+    )
+    assert np.allclose(exact.astype(float), floats, atol=10 * EPS, rtol=0)
+
+
+def test_rows_of_one_ring_and_the_telescope_along_its_normal():
+    """What (1) and (2) give along z in the rolling frame, with the signal of the scale factor; all exact."""
+    C, S = np.array([[Fraction(3, 5), Fraction(4, 5)], [Fraction(8, 17), Fraction(-15, 17)]], dtype=object).T
+    known = np.array([[0, Fraction(5), Fraction(2)], [0, Fraction(-1), Fraction(3)]], dtype=object)
+    states = ("phi2", "phi3", "phi2_rate", "phi3_rate", "alpha2", "alpha3", "beta2", "gamma2", "bias_z", "scale")
+    gyro = m.measurement_rows(C, S, states, derolled=False, nominal_theta=known)[:, 1]
+    star = m.measurement_rows(C, S, states, derolled=False, signal="telescope")[:, 1]
+    for k, (c, s) in enumerate(zip(C, S, strict=True)):
+        assert gyro[k].tolist() == [c, s, 0, 0, c, s, 1, 1, 1, c * known[k, 1] + s * known[k, 2]]
+        assert star[k].tolist() == [0, 0, 0, 0, c, s, 1, 0, 0, 0]
+
+
 def test_nominal_angles_may_change_with_the_phase():
     phase, theta = np.linspace(0, 6, 4), np.arange(12.0).reshape(4, 3)
     H = m.measurement_matrix(phase, ("scale",), nominal_theta=theta)
@@ -233,6 +261,9 @@ def test_units():
         (lambda: m.measurement_matrix(0, signal="both"), "got signal 'both'; needed 'gyro'"),
         (lambda: m.measurement_matrix(0, nominal_theta=[1, 2]), "got nominal_theta of shape"),
         (lambda: m.measurement_matrix([0, math.nan]), "got phase with NaN"),
+        (lambda: m.measurement_rows(1, 0, ("phi4",)), "'phi4' is none of them"),
+        (lambda: m.measurement_rows(1, 0, nominal_theta=[1, 2]), r"got nominal_theta of shape \(2,\); needed"),
+        (lambda: m.measurement_rows(1, 0, nominal_alpha=0), r"got nominal_alpha of shape \(\); needed"),
     ],
 )
 def test_bad_input_is_refused(call, message):
