@@ -209,9 +209,8 @@ def test_rows_of_fractions_are_exact_and_those_of_floats_the_matrix(signal, dero
     exact = m.measurement_rows(C, S, m.STATES, nominal_theta=theta, nominal_alpha=alpha, **options)
     assert exact.dtype == object
     assert all(isinstance(entry, int | Fraction) for entry in exact.flat)
-    floats = m.measurement_matrix(
-        math.atan2(S, C), m.STATES, nominal_theta=np.array(theta, float), nominal_alpha=np.array(alpha, float), **options
-    )
+    near = {"nominal_theta": np.array(theta, float), "nominal_alpha": np.array(alpha, float)}
+    floats = m.measurement_matrix(math.atan2(S, C), m.STATES, **near, **options)
     assert np.allclose(exact.astype(float), floats, atol=10 * EPS, rtol=0)
 
 

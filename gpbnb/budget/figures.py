@@ -65,8 +65,6 @@ def distribution(result: Draws, ax: Axes) -> list[Artist]:
         (worst, BOUND, "--", "± worst case"),
     ):
         artists += [ax.axvline(value, color=colour, ls=style, label=name), ax.axvline(-value, color=colour, ls=style)]
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, 1.45 * high)
-    legend(ax, fontsize=8.5, loc="upper center", ncols=2)
+    legend(ax, fontsize=8.5, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     label(ax, "total error (mas)", "density (1/mas)")
     return artists

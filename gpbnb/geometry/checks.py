@@ -144,9 +144,9 @@ def boresight() -> Finding:
     )
 
 
-def boresight_offset(beta: np.ndarray) -> float:
-    """Angle between boresight and roll axis; radians."""
-    return float(np.hypot(*rotation(beta)[1:, 0]))
+def boresight_offset(angles: np.ndarray) -> float:
+    """Angle between the x axes of two frames that these angles separate, as boresight and roll axis; radians."""
+    return float(math.asin(min(1.0, np.hypot(*rotation(angles)[1:, 0]))))
 
 
 @CHECKS.add("hung1982.IV.thetas-drift")
@@ -267,10 +267,9 @@ def equation_9() -> Finding:
 
 @CHECKS.add("hung1982.IV.eq10", "hung1982.IV.eq11", "hung1982.IV.eq12")
 def errors_of_estimates() -> Finding:
-    estimate = sp.symbols("a_2 a_3 t_2 t_3", real=True)
-    a2, a3, t2, t3 = estimate
+    a2, a3, t2, t3 = sp.symbols("a_2 a_3 t_2 t_3", real=True)  # the estimates
     gap = [
-        (t - a) - (theta - alpha) - ((t - theta) - (a - alpha))
+        (t - a) - (theta - alpha) - drift_error(error_of(t, theta), error_of(a, alpha))
         for t, a, theta, alpha in ((t2, a2, THETA[1], ALPHA[1]), (t3, a3, THETA[2], ALPHA[2]))
     ]
     return compare(
@@ -279,6 +278,16 @@ def errors_of_estimates() -> Finding:
         note="definitions, good for any estimates; with those of (8) and (9) as printed the errors are as large as the "
         "angles. Of (10) and (11) the scan keeps fragments",
     )
+
+
+def error_of(estimate: sp.Expr, true: sp.Expr) -> sp.Expr:
+    """One row of (10) or (11), as printed."""
+    return estimate - true
+
+
+def drift_error(theta: sp.Expr, alpha: sp.Expr) -> sp.Expr:
+    """One row of (12), as printed."""
+    return theta - alpha
 
 
 @CHECKS.add("hung1982.IV.deroll-matrix")
@@ -307,6 +316,20 @@ def first_angles() -> Finding:
         bool(absent) and rank == 2,
         f"no trace of $\\alpha_1$ to first order; exactly, the direction of one star fixes {rank} of three angles",
         note="so exact equations would not help: it takes a second star, as for the roll phase",
+    )
+
+
+@CHECKS.add("hung1982.IV.axes-colinear")
+def colinear() -> Finding:
+    apart = [boresight_offset(np.array([0.0, size, size])) for size in (0.0, MINUTE)]
+    return compare(
+        apart[0] == 0 < apart[1],
+        "$x_t$ and $x_r$ are "
+        + " and ".join(
+            f"{offset / ARCSEC:.0f} arcseconds apart with $\\gamma_2=\\gamma_3={size}$"
+            for size, offset in zip(("0", "60''"), apart, strict=True)
+        ),
+        note="so under the ideal condition that (3) to (7) rest on, and not otherwise",
     )
 
 

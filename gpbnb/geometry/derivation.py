@@ -7,6 +7,7 @@ which order it means. Where it matters, all six are looked at.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterable, Sequence
 
 import sympy as sp
@@ -22,6 +23,16 @@ ALPHA, BETA, GAMMA, DELTA, THETA, PHI = (
 C, S = sp.cos(P), sp.sin(P)
 SEQUENCES = tuple(itertools.permutations((1, 2, 3)))
 E1 = sp.Matrix([1, 0, 0])
+
+
+class RollStep(Step):
+    """A step that shows cosine and sine of the roll phase as C and S, as the report does."""
+
+    def latex(self) -> str:
+        text = super().latex()
+        for name, letter in (("cos", "C"), ("sin", "S")):
+            text = re.sub(rf"\\{name}(\^\{{2\}})?\{{\\left\(\\psi \\right\)\}}", rf"{letter}\1 ", text)
+        return text
 
 
 # -- rotations ------------------------------------------------------------------------------------
@@ -122,12 +133,12 @@ def deroll() -> Derivation:
     y, z = r[1] - t[1], r[2] - t[2]
     return Derivation(
         (
-            Step("(5), first row", held(C) * held(t[1]) - held(S) * held(t[2]), -ALPHA[2]),
-            Step("(5), second row", held(S) * held(t[1]) + held(C) * held(t[2]), ALPHA[1]),
-            Step("(6), first row", held(C) * held(r[1]) - held(S) * held(r[2]), -THETA[2]),
-            Step("(6), second row", held(S) * held(r[1]) + held(C) * held(r[2]), THETA[1]),
-            Step("(7), first row", held(C) * held(y) - held(S) * held(z), ALPHA[2] - THETA[2]),
-            Step("(7), second row", held(S) * held(y) + held(C) * held(z), THETA[1] - ALPHA[1]),
+            RollStep("(5), first row", held(C) * held(t[1]) - held(S) * held(t[2]), -ALPHA[2]),
+            RollStep("(5), second row", held(S) * held(t[1]) + held(C) * held(t[2]), ALPHA[1]),
+            RollStep("(6), first row", held(C) * held(r[1]) - held(S) * held(r[2]), -THETA[2]),
+            RollStep("(6), second row", held(S) * held(r[1]) + held(C) * held(r[2]), THETA[1]),
+            RollStep("(7), first row", held(C) * held(y) - held(S) * held(z), ALPHA[2] - THETA[2]),
+            RollStep("(7), second row", held(S) * held(y) + held(C) * held(z), THETA[1] - ALPHA[1]),
         )
     )
 
@@ -147,20 +158,22 @@ def printed_deroll() -> Derivation:
     twice = sp.cos(2 * P), sp.sin(2 * P)
     return Derivation(
         (
-            Step(
+            RollStep(
                 "(8), first row, should be $\\alpha_3$",
                 held(C) * held(y) + held(S) * held(z),
                 -twice[0] * ALPHA[2] + twice[1] * ALPHA[1],
             ),
-            Step(
+            RollStep(
                 "(8), second row, times $-1$, should be $\\alpha_2$",
                 held(S) * held(y) - held(C) * held(z),
                 -twice[1] * ALPHA[2] - twice[0] * ALPHA[1],
             ),
-            Step("mean of the first row over a roll", mean(sp.expand(third)), sp.S.Zero),
-            Step("mean of the second row over a roll", mean(sp.expand(second)), sp.S.Zero),
-            Step("right at a quarter roll, and at three quarters: first row", sp.Limit(third, P, sp.pi / 2), ALPHA[2]),
-            Step("and second row", sp.Limit(second, P, sp.pi / 2), ALPHA[1]),
+            RollStep("mean of the first row over a roll", mean(sp.expand(third)), sp.S.Zero),
+            RollStep("mean of the second row over a roll", mean(sp.expand(second)), sp.S.Zero),
+            RollStep(
+                "right at a quarter roll, and at three quarters: first row", sp.Limit(third, P, sp.pi / 2), ALPHA[2]
+            ),
+            RollStep("and second row", sp.Limit(second, P, sp.pi / 2), ALPHA[1]),
         )
     )
 
@@ -226,28 +239,28 @@ def first_order_effects() -> Derivation:
     turned = derolled(-GAMMA[2], GAMMA[1])
     return Derivation(
         (
-            Step(
+            RollStep(
                 "telescope, first row: β stands still in the spacecraft, so that the deroll turns it",
                 held(C) * held(t[1]) - held(S) * held(t[2]),
                 -ALPHA[2] + sp.expand(derolled(-BETA[2], BETA[1])[0]),
             ),
-            Step(
+            RollStep(
                 "gyro, first row: β and γ",
                 held(C) * held(r[1]) - held(S) * held(r[2]),
                 -THETA[2] + sp.expand(derolled(-BETA[2] - GAMMA[2], BETA[1] + GAMMA[1])[0]),
             ),
-            Step(
+            RollStep(
                 "gyro less telescope, first row: β cancels, γ does not",
                 held(C) * held(y) - held(S) * held(z),
                 -THETA[2] + ALPHA[2] + turned[0],
             ),
-            Step(
+            RollStep(
                 "gyro less telescope, second row",
                 held(S) * held(y) + held(C) * held(z),
                 THETA[1] - ALPHA[1] + turned[1],
             ),
-            Step("mean over a roll of what γ leaves, first row", mean(turned[0]), sp.S.Zero),
-            Step("and second row", mean(turned[1]), sp.S.Zero),
+            RollStep("mean over a roll of what γ leaves, first row", mean(turned[0]), sp.S.Zero),
+            RollStep("and second row", mean(turned[1]), sp.S.Zero),
         )
     )
 
@@ -258,7 +271,11 @@ def second_order_effects() -> Derivation:
     twist = ALPHA[0] + BETA[0] + GAMMA[0]
     return Derivation(
         tuple(
-            Step(f"{name} row of the difference, mean of its error", mean(error), held(twist) * phi + GAMMA[0] * alpha)
+            RollStep(
+                f"{name} row of the difference, mean of its error",
+                mean(sp.collect(error, (C, S, phi))),
+                held(twist) * phi + GAMMA[0] * alpha,
+            )
             for name, error, phi, alpha in (
                 ("first", errors[0], PHI[1], ALPHA[1]),
                 ("second", errors[1], PHI[2], ALPHA[2]),
@@ -273,8 +290,8 @@ def one_ring() -> Derivation:
     z = up_to(1, spin()[2], small)
     return Derivation(
         (
-            Step("$-2\\sin\\psi$ times the reading, mean over a roll", mean(sp.expand(-2 * S * z)), -THETA[2]),
-            Step("$2\\cos\\psi$ times the reading, mean over a roll", mean(sp.expand(2 * C * z)), THETA[1]),
+            RollStep("$-2\\sin\\psi$ times the reading, mean over a roll", mean(sp.expand(-2 * S * z)), -THETA[2]),
+            RollStep("$2\\cos\\psi$ times the reading, mean over a roll", mean(sp.expand(2 * C * z)), THETA[1]),
         )
     )
 

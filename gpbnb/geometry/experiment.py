@@ -142,6 +142,52 @@ def years(
     }
 
 
+@dataclass(frozen=True)
+class Part:
+    """Error of one reading over a roll, in radians: length of its mean, and of what turns at the roll frequency."""
+
+    mean: float
+    turning: float
+
+
+def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
+    """Errors of the derolled readings over one roll: of ``telescope``, ``gyro`` and their ``difference``.
+
+    The telescope is compared with the star, and the gyro with the spin axis, as they stand in the intermediate frame;
+    the difference with the drift in the absolute frame. Angles and drift are those after some `years`, and rotations
+    are exact.
+
+    Parameters
+    ----------
+    case : the angles.
+    years : since the start.
+    samples : in the roll, at least 3.
+
+    Raises
+    ------
+    ValueError : fewer than 3 samples.
+    """
+    if samples < 3:
+        raise ValueError(f"got {samples} samples in a roll; needed 3 or more")
+    phase = 2 * math.pi * np.arange(samples) / samples
+    alpha, beta, gamma = (case.at(name, years) for name in ("alpha", "beta", "gamma"))
+    pointing, drifted = rotation(alpha), spin_axis(case, years)
+    star, spin = pointing[:, 0], apply(pointing, drifted)
+    telescope = into_spacecraft(star, phase, beta)[:, 1:]
+    gyro = into_spacecraft(spin, phase, beta, gamma)[:, 1:]
+    found = {}
+    for name, readings, true in (
+        ("telescope", telescope, star),
+        ("gyro", gyro, spin),
+        ("difference", gyro - telescope, drifted),
+    ):
+        error = deroll(readings, phase) - true[1:]
+        mean = error.mean(axis=0)
+        turning = deroll(error - mean, -phase).mean(axis=0)
+        found[name] = Part(float(np.hypot(*mean)), float(np.hypot(*turning)))
+    return found
+
+
 def misalignment_cases(size: float) -> dict[str, Case]:
     """One angle of `size` radians at a time, then pairs that matter, then angles that change by it in the year."""
     none = Case()

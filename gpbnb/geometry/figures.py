@@ -64,16 +64,18 @@ def triads(matrices: Frames, ax: Any, ring: str | None = None) -> list[Artist]:
     artists: list[Artist] = []
     for k, (name, matrix) in enumerate(matrices.items()):
         colour, letter = FRAME_COLOURS[name], r"\varphi" if name == "φ" else name
-        for axis, row in zip("xyz", matrix * (1 + 0.13 * k), strict=True):
+        for axis, row in zip("xyz", matrix * (1 + 0.18 * k), strict=True):
             artists.append(ax.quiver(0, 0, 0, *row, color=colour, lw=1.6, arrow_length_ratio=0.07))
             artists.append(ax.text(*(row * 1.1), f"${axis}_{{{letter}}}$", color=colour, ha="center", va="center"))
     if ring is not None:
         turn = np.linspace(0, 2 * np.pi, 90)
         around = 0.55 * (np.cos(turn)[:, None] * matrices[ring][0] + np.sin(turn)[:, None] * matrices[ring][1])
         artists += ax.plot(*around.T, color=FRAME_COLOURS[ring], lw=1.2, ls="--")
+    rolling = ring is not None
+    low, high = (-0.95, 1.35) if rolling else (-0.55, 1.45)
     for limit in (ax.set_xlim, ax.set_ylim, ax.set_zlim):
-        limit(-0.75, 1.15)
-    ax.view_init(elev=22, azim=38)
+        limit(low, high)
+    ax.view_init(elev=24, azim=-52)
     names = ", ".join(FRAME_NAMES[name] for name in matrices)
     artists.append(ax.text2D(0.5, 0.04, names, transform=ax.transAxes, ha="center"))
     return artists
@@ -89,14 +91,15 @@ def chain(ax: Axes) -> list[Artist]:
         ("i", "φ", r"$\omega t$", (0.07, 0.1), "-"),
         ("φ", "t", r"$\beta$", (-0.07, 0.1), "-"),
         ("t", "r", r"$\gamma$", (0.0, 0.1), "-"),
-        ("g", "r", r"$\delta$, grows with the roll", (0.2, 0.42), "--"),
+        ("g", "r", r"$\delta$, grows with the roll", (0.2, 0.55), "--"),
     ]
     artists: list[Artist] = []
     for start, end, name, shift, style in links:
         (x0, y0), (x1, y1) = places[start], places[end]
-        arrow = {"arrowstyle": "->", "ls": style, "color": REFERENCE, "shrinkA": 28, "shrinkB": 28}
+        slanted = end == "i"  # into the side of a wide box
+        arrow = {"arrowstyle": "->", "ls": style, "color": REFERENCE, "shrinkA": 28, "shrinkB": 48 if slanted else 30}
         if style == "--":
-            arrow |= {"connectionstyle": "arc3,rad=-0.22", "shrinkB": 22}
+            arrow |= {"connectionstyle": "arc3,rad=-0.22", "shrinkB": 24}
         artists.append(ax.annotate("", (x1, y1), (x0, y0), arrowprops=arrow))
         artists.append(ax.text((x0 + x1) / 2 + shift[0], (y0 + y1) / 2 + shift[1], name, ha="center", va="center"))
     for name, (x, y) in places.items():
@@ -104,7 +107,7 @@ def chain(ax: Axes) -> list[Artist]:
         text = ("$\\varphi$" if name == "φ" else f"${name}$") + f"\n{FRAME_NAMES[name]}"
         artists.append(ax.text(x, y, text, ha="center", va="center", bbox=box, fontsize=9.5))
     ax.set_xlim(-0.8, 4.95)
-    ax.set_ylim(-0.25, 1.35)
+    ax.set_ylim(-0.25, 1.5)
     ax.set_axis_off()
     return artists
 
@@ -207,15 +210,16 @@ def precessions(ax: Any, declination: float) -> list[Artist]:
     tip = gyro + 0.8 * star
     arrows = (
         ((0, 0, -0.8), (0, 0, 1.6), STRICT, "Earth's axis", (0, 0, 0.9)),
-        (gyro, 0.8 * star, OBSERVED, "spin axis, to the star", gyro + 0.4 * star + np.array([0.1, 0, 0.14])),
+        (gyro, 0.8 * star, OBSERVED, "spin axis, to the star", gyro + 0.4 * star + np.array([0.1, 0, 0.2])),
         (tip, 0.5 * geodetic, BOUND, "geodetic", tip + 0.62 * geodetic),
-        (tip, 0.6 * motional, OBSERVED_OTHERS[0], "motional", tip + 0.75 * motional),
+        (tip, 0.6 * motional, OBSERVED_OTHERS[0], "motional", tip + motional + np.array([0.15, 0, -0.06])),
     )
     for start, way, colour, name, place in arrows:
         artists.append(ax.quiver(*start, *way, color=colour, lw=1.8, arrow_length_ratio=0.12))
-        artists.append(ax.text(*place, name, color=colour, fontsize=9.5, ha="center"))
+        artists.append(ax.text(*place, name, color=colour, fontsize=9.5, ha="center", clip_on=False))
     artists.append(ax.text(-0.8, 0, -0.98, "polar orbit", color=REFERENCE, fontsize=9.5, ha="center"))
-    for limit, (low, high) in ((ax.set_xlim, (-0.7, 1.1)), (ax.set_ylim, (-0.9, 0.9)), (ax.set_zlim, (-0.8, 1.0))):
+    for limit, (low, high) in ((ax.set_xlim, (-0.6, 1.4)), (ax.set_ylim, (-1.0, 1.0)), (ax.set_zlim, (-0.9, 1.1))):
         limit(low, high)
+    ax.set_box_aspect((1, 1, 1), zoom=1.1)
     ax.view_init(elev=18, azim=-62)
     return artists

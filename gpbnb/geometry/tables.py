@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from gpbnb.geometry.experiment import Year
+from gpbnb.geometry.experiment import Part, Year
 from gpbnb.geometry.theory import effect
 from gpbnb.measurement import ARCSEC, MAS
 from gpbnb.tables import Table
@@ -47,9 +47,45 @@ def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
     return Table(f"{len(body)} cases, errors of $\\varphi_2, \\varphi_3$ in milliarcseconds", header, tuple(body))
 
 
+def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
+    """What becomes of each misalignment on its way from both readings to the drift; milliarcseconds.
+
+    Parameters
+    ----------
+    results : from :func:`gpbnb.geometry.experiment.parts`, by angle.
+    """
+    body = tuple(
+        (
+            _symbols(name),
+            *(number(value) for part in parts.values() for value in (part.mean, part.turning)),
+            fate(parts),
+        )
+        for name, parts in results.items()
+    )
+    readings = next(iter(results.values()), {})
+    header = ("angle", *(f"{name}: {what}" for name in readings for what in ("mean", "turning")), "so it")
+    return Table(f"{len(body)} angles, errors in milliarcseconds", header, body)
+
+
+def fate(parts: Mapping[str, Part]) -> str:
+    """Whether an error stays, turns with the roll, cancels, or was none; to 0.001 milliarcseconds."""
+
+    def seen(radians: float) -> bool:
+        return number(radians) != "0"
+
+    difference = parts["difference"]
+    if seen(difference.mean):
+        return "stays"
+    if seen(difference.turning):
+        return "averages out"
+    if any(seen(value) for part in parts.values() for value in (part.mean, part.turning)):
+        return "cancels"
+    return "is measured"
+
+
 def reach(rows: Iterable[tuple[str, float]], allowed: float) -> Table:
     """How large each angle may be before its small-angle form costs `allowed` radians."""
-    body = tuple((_symbols(name), f"{size / ARCSEC:,.0f}", f"{math.degrees(size):.2g}") for name, size in rows)
+    body = tuple((_symbols(name), _two(size / ARCSEC), f"{math.degrees(size):.2g}") for name, size in rows)
     return Table(f"angles that cost {allowed / MAS:g} milliarcsecond", ("angle", "in arcseconds", "in degrees"), body)
 
 
@@ -65,6 +101,11 @@ def pair(angles: Sequence[float]) -> str:
     """Two angles in milliarcseconds; one zero where both are."""
     both = [number(float(angle)) for angle in np.asarray(angles)]
     return "0" if both == ["0", "0"] else "; ".join(both)
+
+
+def _two(value: float) -> str:
+    """Two digits: the expansion holds to no more of them at the largest angles."""
+    return f"{float(f'{value:.2g}'):,.0f}"
 
 
 def _symbols(name: str) -> str:

@@ -85,6 +85,23 @@ def test_rolls_that_are_no_whole_number_of_samples():
     assert result.error.line == pytest.approx(SIZE, rel=1e-3)
 
 
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=9, max_size=9), st.sampled_from([3, 24, 25]))
+def test_parts_of_a_roll_are_those_of_the_analysis(values, samples):
+    alpha, beta, gamma = (tuple(1e-4 * v for v in values[k : k + 3]) for k in (0, 3, 6))
+    case = Case(alpha, beta, gamma)
+    found = experiment.parts(case, 1.0, samples)
+    left = third_order(case)
+    # to second order β1 turns the mean of the telescope; β1 and γ1 that of the gyro; the difference is `measured`
+    pointing, spin = np.hypot(*alpha[1:]), np.hypot(case.drift[0] + alpha[1], case.drift[1] + alpha[2])
+    assert found["telescope"].mean == pytest.approx(abs(beta[0]) * pointing, abs=left)
+    assert found["gyro"].mean == pytest.approx(abs(beta[0] + gamma[0]) * spin, abs=left)
+    assert found["difference"].mean == pytest.approx(np.hypot(*theory.measured(case, True, 1.0)), abs=left)
+    assert found["telescope"].turning == pytest.approx(np.hypot(*beta[1:]), abs=left)
+    assert found["gyro"].turning == pytest.approx(np.hypot(*np.add(beta, gamma)[1:]), abs=4e-8)
+    assert found["difference"].turning == pytest.approx(np.hypot(*theory.standing(beta, gamma)), abs=left)
+
+
 def test_the_year_is_the_same_in_chunks(monkeypatch):
     case = CASES["gamma1 and alpha_rate2"]
     whole = experiment.year(case, PERIOD, STEP)
@@ -122,6 +139,7 @@ def test_small_angle_errors_are_the_loss(name):
         (lambda: experiment.year(Case(), 600, math.nan), "needed both above 0"),
         (lambda: experiment.year(Case(), 600, 1e6), "needed a hundred samples in a year"),
         (lambda: experiment.year(Case(), 600.05), "needed whole tenths of a second"),
+        (lambda: experiment.parts(Case(), samples=2), "got 2 samples in a roll; needed 3 or more"),
         (lambda: experiment.year(Case(), 600, 300.0), "got 2 samples in whole rolls of 600 s; needed 3 or more"),
     ],
 )

@@ -115,6 +115,24 @@ def test_table_of_misalignments(both):
     assert row[5] == "0.004; −0.640"
 
 
+def test_table_of_fates():
+    size = 20 * ARCSEC
+    names = ("alpha1", "alpha2", "beta1", "beta3", "gamma1", "gamma2")
+    table = tables.fates({name: experiment.parts(theory.Case().with_angle(name, size)) for name in names})
+    assert table.header[1:3] == ("telescope: mean", "telescope: turning")
+    assert [row[-1] for row in table.body] == [
+        "stays",
+        "is measured",
+        "stays",
+        "cancels",
+        "stays",
+        "averages out",
+    ]
+    assert table.body[2][1:7] == ("0", "0", "0.640", "0", "0.640", "0")
+    assert table.body[3][1:7] == ("0", "20,000", "0", "20,000", "0", "0")
+    assert table.body[5][1:7] == ("0", "0", "0", "20,000", "0", "20,000")
+
+
 def test_numbers_in_cells():
     assert [tables.number(x * MAS) for x in (0, -1e-5, 1.23456, -12.3456, 20000.4, 123456.7)] == [
         "0",
@@ -126,4 +144,4 @@ def test_numbers_in_cells():
     ]
     assert tables._symbols("gamma1 and alpha_rate2") == r"$\gamma_1$ and $\dot\alpha_2$"
     assert tables._symbols("no angle") == "no angle"
-    assert tables.reach([("beta2", ARCSEC * 3600)], MAS).body == ((r"$\beta_2$", "3,600", "1"),)
+    assert tables.reach([("beta2", ARCSEC * 3649)], MAS).body == ((r"$\beta_2$", "3,600", "1"),)
