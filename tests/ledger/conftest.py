@@ -5,7 +5,7 @@ import textwrap
 
 import pytest
 
-CHECKED = ("hung1984.I.two-tasks", "hung1984.I.1-f-study")
+CHECKED = tuple(f"hung1984.I.{item}" for item in ("two-tasks", "1-f-study", "report-period", "contract"))
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def complete(topic, request):
         f"""
         CALLS = []
 
-        @CHECKS.add("{CHECKED[0]}", "{CHECKED[1]}")
+        @CHECKS.add(*{CHECKED})
         def both():
             CALLS.append(1)
             return compare(False, "$|a|$, not \\"b\\"", Verdict.TYPO, "line one\\nline two")

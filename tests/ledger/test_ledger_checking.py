@@ -28,13 +28,13 @@ def test_topics_check_entries_of_the_inventory_only():
 def test_one_row_an_entry_in_order(complete):
     found = rows(topics=[complete])
     assert tuple(row.entry for row in found) == INVENTORY
-    assert [row.entry.id for row in found if row.finding] == ["hung1984.I.two-tasks", "hung1984.I.1-f-study"]
+    assert [row.entry.id for row in found if row.finding] == [entry.id for entry in INVENTORY[:4]]
     assert all(row.error is None for row in found)
 
 
 def test_a_function_that_checks_several_entries_is_called_once(complete):
     found = rows(document="hung1984", chapter="I", topics=[complete])
-    assert [row.outcome for row in found] == ["typo", "typo"]
+    assert [row.outcome for row in found] == ["typo"] * 4
     assert importlib.import_module(complete).CALLS == [1]
 
 
@@ -46,7 +46,7 @@ def test_only_the_selected_checks_are_run(complete):
 
 
 def test_an_iterator_of_entries_will_do(complete):
-    some = INVENTORY[:3]
+    some = INVENTORY[:5]
     assert tuple(row.entry for row in rows(iter(some), topics=[complete])) == some
 
 

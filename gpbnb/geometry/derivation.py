@@ -1,0 +1,333 @@
+r"""The algebra of hung1982, ch. IV, derived again: exact rotations first, small angles second.
+
+A set of angles is turned about the axes 3, 2, 1 in this order, :math:`C = R_1 R_2 R_3`; the document does not say
+which order it means. Where it matters, all six are looked at.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterable, Sequence
+
+import sympy as sp
+
+from gpbnb.derivation import Derivation, Step, held, over
+
+P = sp.Symbol("psi", real=True)
+"""The roll phase ωt."""
+H = sp.Symbol("h", positive=True)
+ALPHA, BETA, GAMMA, DELTA, THETA, PHI = (
+    sp.symbols(f"{name}_1:4", real=True) for name in ("alpha", "beta", "gamma", "delta", "theta", "varphi")
+)
+C, S = sp.cos(P), sp.sin(P)
+SEQUENCES = tuple(itertools.permutations((1, 2, 3)))
+E1 = sp.Matrix([1, 0, 0])
+
+
+class RollStep(Step):
+    """A step that shows cosine and sine of the roll phase as C and S, as the report does."""
+
+    def latex(self) -> str:
+        text = super().latex()
+        for name, letter in (("cos", "C"), ("sin", "S")):
+            text = re.sub(rf"\\{name}(\^\{{2\}})?\{{\\left\(\\psi \\right\)\}}", rf"{letter}\1 ", text)
+        return text
+
+
+# -- rotations ------------------------------------------------------------------------------------
+
+
+def turn(axis: int, angle: sp.Expr) -> sp.Matrix:
+    """Matrix to a frame turned by `angle` about `axis`, from Rodrigues' formula."""
+    e = sp.zeros(3, 1)
+    e[axis - 1] = 1
+    cross = sp.Matrix([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
+    return sp.cos(angle) * sp.eye(3) + (1 - sp.cos(angle)) * e * e.T - sp.sin(angle) * cross
+
+
+def exact(angles: Sequence[sp.Expr], sequence: Sequence[int] = (3, 2, 1)) -> sp.Matrix:
+    """Matrix to a frame turned by three angles, the first turn of `sequence` on the right."""
+    matrix = sp.eye(3)
+    for axis in sequence:
+        matrix = turn(axis, angles[axis - 1]) * matrix
+    return matrix
+
+
+def printed_small(angles: Sequence[sp.Expr]) -> sp.Matrix:
+    """The small-angle matrix as (1) to (4) print it."""
+    a1, a2, a3 = angles
+    return sp.Matrix([[1, a3, -a2], [-a3, 1, a1], [a2, -a1, 1]])
+
+
+def printed_roll() -> sp.Matrix:
+    """The roll matrix as (1) to (4) print it."""
+    return sp.Matrix([[1, 0, 0], [0, C, S], [0, -S, C]])
+
+
+def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Expr:
+    """`expression` expanded up to products of `order` of the `small` symbols."""
+    scaled = expression.subs({symbol: H * symbol for symbol in small}, simultaneous=True)
+    terms = (sp.diff(scaled, H, k).subs(H, 0) / sp.factorial(k) for k in range(order + 1))
+    return sp.expand(sum(terms, start=sp.Integer(0)))
+
+
+def orders_agree() -> bool:
+    """Whether every order of turns has the printed matrix as its first order."""
+    return all(
+        (exact(ALPHA, sequence).applyfunc(lambda entry: up_to(1, entry, ALPHA)) - printed_small(ALPHA)).is_zero_matrix
+        for sequence in SEQUENCES
+    )
+
+
+def turns() -> Derivation:
+    """From the exact matrix to the printed one: the entries that (3) and (4) use."""
+    matrix = exact(ALPHA).applyfunc(sp.expand)
+    names = {
+        (0, 0): "first column, first row: 1",
+        (1, 0): "second row: $-\\alpha_3$",
+        (2, 0): "third row: $\\alpha_2$",
+        (1, 2): "and in the third column $\\alpha_1$",
+    }
+    steps = []
+    for (i, j), name in names.items():
+        scaled = matrix[i, j].subs({a: H * a for a in ALPHA}, simultaneous=True)
+        right = printed_small(ALPHA)[i, j]
+        steps.append(Step(name, sp.Limit(scaled if i == j else scaled / H, H, 0), right))
+    return Derivation(tuple(steps))
+
+
+# -- what is read ---------------------------------------------------------------------------------
+
+
+def star(small: bool = True) -> sp.Matrix:
+    """The star in the telescope frame: (1), with small-angle matrices or exact ones."""
+    matrix = printed_small if small else exact
+    return matrix(BETA) * turn(1, P) * matrix(ALPHA) * E1
+
+
+def spin(small: bool = True) -> sp.Matrix:
+    """The spin axis in the readout frame: (2), with small-angle matrices or exact ones."""
+    matrix = printed_small if small else exact
+    return matrix(GAMMA) * matrix(BETA) * turn(1, P) * matrix(THETA) * E1
+
+
+def aligned(vector: sp.Matrix) -> sp.Matrix:
+    """Without misalignments: (1) becomes (3), and (2) becomes (4)."""
+    return vector.subs(dict.fromkeys((*BETA, *GAMMA), 0)).applyfunc(sp.expand)
+
+
+def derolled(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """The left sides of (5) and (6)."""
+    return C * y - S * z, S * y + C * z
+
+
+def printed_estimates(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Third and second angle as (8) and (9) print them, the minus of the second moved over."""
+    return C * y + S * z, -(-S * y + C * z)
+
+
+def deroll() -> Derivation:
+    """(3) to (7): without misalignments the readings, turned back, are the angles."""
+    t, r = aligned(star()), aligned(spin())
+    y, z = r[1] - t[1], r[2] - t[2]
+    return Derivation(
+        (
+            RollStep("(5), first row", held(C) * held(t[1]) - held(S) * held(t[2]), -ALPHA[2]),
+            RollStep("(5), second row", held(S) * held(t[1]) + held(C) * held(t[2]), ALPHA[1]),
+            RollStep("(6), first row", held(C) * held(r[1]) - held(S) * held(r[2]), -THETA[2]),
+            RollStep("(6), second row", held(S) * held(r[1]) + held(C) * held(r[2]), THETA[1]),
+            RollStep("(7), first row", held(C) * held(y) - held(S) * held(z), ALPHA[2] - THETA[2]),
+            RollStep("(7), second row", held(S) * held(y) + held(C) * held(z), THETA[1] - ALPHA[1]),
+        )
+    )
+
+
+# -- (8) and (9) as printed -----------------------------------------------------------------------
+
+
+def mean(expression: sp.Expr) -> sp.Expr:
+    """The mean over a roll, not yet evaluated."""
+    return over(sp.Integral(expression, (P, 0, 2 * sp.pi)), 2 * sp.pi)
+
+
+def printed_deroll() -> Derivation:
+    """What (8) makes of the aligned telescope's readings: it rolls them once more. (9) does the same with θ."""
+    _, y, z = aligned(star())
+    third, second = printed_estimates(y, z)
+    twice = sp.cos(2 * P), sp.sin(2 * P)
+    return Derivation(
+        (
+            RollStep(
+                "(8), first row, should be $\\alpha_3$",
+                held(C) * held(y) + held(S) * held(z),
+                -twice[0] * ALPHA[2] + twice[1] * ALPHA[1],
+            ),
+            RollStep(
+                "(8), second row, times $-1$, should be $\\alpha_2$",
+                held(S) * held(y) - held(C) * held(z),
+                -twice[1] * ALPHA[2] - twice[0] * ALPHA[1],
+            ),
+            RollStep("mean of the first row over a roll", mean(sp.expand(third)), sp.S.Zero),
+            RollStep("mean of the second row over a roll", mean(sp.expand(second)), sp.S.Zero),
+            RollStep(
+                "right at a quarter roll, and at three quarters: first row", sp.Limit(third, P, sp.pi / 2), ALPHA[2]
+            ),
+            RollStep("and second row", sp.Limit(second, P, sp.pi / 2), ALPHA[1]),
+        )
+    )
+
+
+def fewest_signs() -> tuple[tuple[int, ...], ...]:
+    r"""All smallest sets of the six signs of (8) whose change makes it deroll.
+
+    The signs are counted as printed: 0, 1 before :math:`\hat\alpha_3, \hat\alpha_2` on the left; 2 to 5 before the
+    C, S, S, C of the matrix, row by row.
+    """
+    _, y, z = aligned(star())
+    found: list[tuple[int, ...]] = []
+    for count in range(7):
+        for changed in itertools.combinations(range(6), count):
+            left3, left2, c1, s1, s2, c2 = (-1 if k in changed else 1 for k in range(6))
+            third = left3 * (c1 * C * y + s1 * S * z)
+            second = -left2 * (-s2 * S * y + c2 * C * z)
+            if all(sp.simplify(e) == 0 for e in (third - ALPHA[2], second - ALPHA[1])):
+                found.append(changed)
+        if found:
+            break
+    return tuple(found)
+
+
+# -- misalignments --------------------------------------------------------------------------------
+
+
+def drift_errors(order: int) -> tuple[sp.Expr, sp.Expr]:
+    """Errors of the derolled difference, y and z, up to `order`, with exact rotations; true drift taken off.
+
+    The gyro is turned by φ (φ1 = 0) against the absolute frame, so that the matrix of θ is that of α times that of φ.
+    """
+    small = (*ALPHA, *BETA, *GAMMA, *PHI)
+    c, s = sp.symbols("c s")  # sympy is slow with sine and cosine
+
+    def cut(entry: sp.Expr) -> sp.Expr:
+        """Drop products of more than `order` small angles."""
+        terms = sp.Poly(entry, *small).terms()
+        kept = ((powers, factor) for powers, factor in terms if sum(powers) <= order)
+        return sum((f * sp.prod(map(sp.Pow, small, powers)) for powers, f in kept), start=sp.Integer(0))
+
+    def matrix(angles: Sequence[sp.Expr]) -> sp.Matrix:
+        return exact(angles).applyfunc(lambda entry: up_to(order, entry, small))
+
+    A, B, G, F = map(matrix, (ALPHA, BETA, GAMMA, (sp.Integer(0), PHI[1], PHI[2])))
+    roll = sp.Matrix([[1, 0, 0], [0, c, s], [0, -s, c]])
+    telescope = (B * (roll * A[:, 0])).applyfunc(cut)
+    readout = F[:, 0]
+    for following in (A, roll, B, G):
+        readout = (following * readout).applyfunc(cut)
+    y, z = readout[1] - telescope[1], readout[2] - telescope[2]
+    errors = (c * y - s * z + PHI[2], s * y + c * z - PHI[1])
+    reduced = (sp.expand(sp.expand(error).subs(s**2, 1 - c**2)) for error in errors)
+    first, second = (error.subs({c: C, s: S}) for error in reduced)
+    return first, second
+
+
+def first_order_effects() -> Derivation:
+    """Misalignments to first order: (1) and (2) with β and γ, turned back as in (5)-(7)."""
+    small = (*ALPHA, *BETA, *GAMMA, *THETA)
+    t, r = (vector.applyfunc(lambda e: up_to(1, e, small)) for vector in (star(), spin()))
+    y, z = sp.expand(r[1] - t[1]), sp.expand(r[2] - t[2])
+    turned = derolled(-GAMMA[2], GAMMA[1])
+    return Derivation(
+        (
+            RollStep(
+                "telescope, first row: β stands still in the spacecraft, so that the deroll turns it",
+                held(C) * held(t[1]) - held(S) * held(t[2]),
+                -ALPHA[2] + sp.expand(derolled(-BETA[2], BETA[1])[0]),
+            ),
+            RollStep(
+                "gyro, first row: β and γ",
+                held(C) * held(r[1]) - held(S) * held(r[2]),
+                -THETA[2] + sp.expand(derolled(-BETA[2] - GAMMA[2], BETA[1] + GAMMA[1])[0]),
+            ),
+            RollStep(
+                "gyro less telescope, first row: β cancels, γ does not",
+                held(C) * held(y) - held(S) * held(z),
+                -THETA[2] + ALPHA[2] + turned[0],
+            ),
+            RollStep(
+                "gyro less telescope, second row",
+                held(S) * held(y) + held(C) * held(z),
+                THETA[1] - ALPHA[1] + turned[1],
+            ),
+            RollStep("mean over a roll of what γ leaves, first row", mean(turned[0]), sp.S.Zero),
+            RollStep("and second row", mean(turned[1]), sp.S.Zero),
+        )
+    )
+
+
+def second_order_effects() -> Derivation:
+    """What is left of the misalignments in the mean over a roll, to second order, with exact rotations."""
+    errors = drift_errors(2)
+    twist = ALPHA[0] + BETA[0] + GAMMA[0]
+    return Derivation(
+        tuple(
+            RollStep(
+                f"{name} row of the difference, mean of its error",
+                mean(sp.collect(error, (C, S, phi))),
+                held(twist) * phi + GAMMA[0] * alpha,
+            )
+            for name, error, phi, alpha in (
+                ("first", errors[0], PHI[1], ALPHA[1]),
+                ("second", errors[1], PHI[2], ALPHA[2]),
+            )
+        )
+    )
+
+
+def one_ring() -> Derivation:
+    """A ring with the normal z_r reads z alone: means over a roll still tell both angles, without β and γ."""
+    small = (*BETA, *GAMMA, *THETA)
+    z = up_to(1, spin()[2], small)
+    return Derivation(
+        (
+            RollStep("$-2\\sin\\psi$ times the reading, mean over a roll", mean(sp.expand(-2 * S * z)), -THETA[2]),
+            RollStep("$2\\cos\\psi$ times the reading, mean over a roll", mean(sp.expand(2 * C * z)), THETA[1]),
+        )
+    )
+
+
+# -- chapter I: the two precessions ---------------------------------------------------------------
+
+
+def precessions() -> Derivation:
+    r"""Directions of the two drifts for a polar orbit (Figure I-1).
+
+    The Earth turns about z, the orbit lies in the x-z plane, the star stands at the declination δ and by ε off this
+    plane. Both precessions are those of Schiff: geodetic about the orbit's normal n, motional about the mean over
+    an orbit of :math:`3\hat r(\hat r\cdot\omega) - \omega`.
+    """
+    u, d, e = sp.symbols("u delta epsilon", real=True)
+    w = sp.Symbol("omega_E", positive=True)
+    r = sp.Matrix([sp.cos(u), 0, sp.sin(u)])
+    earth, normal = sp.Matrix([0, 0, w]), sp.Matrix([0, 1, 0])
+    star = sp.Matrix([sp.cos(e) * sp.cos(d), sp.sin(e), sp.cos(e) * sp.sin(d)])
+    field = 3 * r * r.dot(earth) - earth
+    average = [over(sp.Integral(sp.expand(f), (u, 0, 2 * sp.pi)), 2 * sp.pi) for f in field]
+    geodetic, motional = normal.cross(star), (earth / 2).cross(star)
+    return Derivation(
+        (
+            Step("mean field along the Earth's axis", average[2], w / 2),
+            Step("and across it, in the orbit's plane", average[0], sp.S.Zero),
+            Step(
+                "inner product of both drifts, which vanishes for a star in the orbit's plane, $\\epsilon=0$",
+                geodetic.dot(motional),
+                -w * sp.sin(2 * e) * sp.sin(d) / 4,
+            ),
+            Step(
+                "for such a star: motional drift along the orbit's normal",
+                sp.Limit(motional.dot(normal), e, 0),
+                w * sp.cos(d) / 2,
+            ),
+            Step("and in the orbit's plane", sp.Limit(motional[0], e, 0), sp.S.Zero),
+        )
+    )

@@ -1,0 +1,114 @@
+"""Tables of the chapter on measurement geometry."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from gpbnb.geometry.experiment import Part, Year
+from gpbnb.geometry.theory import effect
+from gpbnb.measurement import ARCSEC, MAS
+from gpbnb.tables import Table
+
+
+def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
+    """What each misalignment does, in milliarcseconds; predicted, and the drift also as simulated.
+
+    Parameters
+    ----------
+    results : from :func:`gpbnb.geometry.experiment.years`: without and with roll, by angle.
+    """
+    body = []
+    for name, (still, rolled) in results.items():
+        without, with_roll = effect(still.case, False), effect(rolled.case, True)
+        body.append(
+            (
+                _symbols(name),
+                pair(without.angle),
+                pair(without.drift),
+                number(with_roll.line),
+                pair(with_roll.angle),
+                pair(with_roll.drift),
+                pair(rolled.error.drift),
+            )
+        )
+    header = (
+        "angle",
+        "no roll: angle",
+        "no roll: drift",
+        "rolling: at roll frequency",
+        "rolling: angle",
+        "rolling: drift",
+        "drift, simulated",
+    )
+    return Table(f"{len(body)} cases, errors of $\\varphi_2, \\varphi_3$ in milliarcseconds", header, tuple(body))
+
+
+def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
+    """What becomes of each misalignment on its way from both readings to the drift; milliarcseconds.
+
+    Parameters
+    ----------
+    results : from :func:`gpbnb.geometry.experiment.parts`, by angle.
+    """
+    body = tuple(
+        (
+            _symbols(name),
+            *(number(value) for part in parts.values() for value in (part.mean, part.turning)),
+            fate(parts),
+        )
+        for name, parts in results.items()
+    )
+    readings = next(iter(results.values()), {})
+    header = ("angle", *(f"{name}: {what}" for name in readings for what in ("mean", "turning")), "so it")
+    return Table(f"{len(body)} angles, errors in milliarcseconds", header, body)
+
+
+def fate(parts: Mapping[str, Part]) -> str:
+    """Whether an error stays, turns with the roll, cancels, or was none; to 0.001 milliarcseconds."""
+
+    def seen(radians: float) -> bool:
+        return number(radians) != "0"
+
+    difference = parts["difference"]
+    if seen(difference.mean):
+        return "stays"
+    if seen(difference.turning):
+        return "averages out"
+    if any(seen(value) for part in parts.values() for value in (part.mean, part.turning)):
+        return "cancels"
+    return "is measured"
+
+
+def reach(rows: Iterable[tuple[str, float]], allowed: float) -> Table:
+    """How large each angle may be before its small-angle form costs `allowed` radians."""
+    body = tuple((_symbols(name), _two(size / ARCSEC), f"{math.degrees(size):.2g}") for name, size in rows)
+    return Table(f"angles that cost {allowed / MAS:g} milliarcsecond", ("angle", "in arcseconds", "in degrees"), body)
+
+
+def number(radians: float) -> str:
+    """An angle in milliarcseconds, to 0.001 or four digits, whichever is coarser."""
+    value = radians / MAS
+    places = 3 if abs(value) < 10 else max(0, 3 - math.floor(math.log10(abs(value))))
+    text = f"{value:,.{places}f}"
+    return "0" if float(text.replace(",", "")) == 0 else text.replace("-", "−")
+
+
+def pair(angles: Sequence[float]) -> str:
+    """Two angles in milliarcseconds; one zero where both are."""
+    both = [number(float(angle)) for angle in np.asarray(angles)]
+    return "0" if both == ["0", "0"] else "; ".join(both)
+
+
+def _two(value: float) -> str:
+    """Two digits: the expansion holds to no more of them at the largest angles."""
+    return f"{float(f'{value:.2g}'):,.0f}"
+
+
+def _symbols(name: str) -> str:
+    """``gamma_rate2`` as a formula, and so for every angle in `name`."""
+    moving = re.sub(r"(alpha|beta|gamma)_rate(\d)", r"$\\dot\\\1_\2$", name)
+    return re.sub(r"(?<!\\)\b(alpha|beta|gamma)(\d)", r"$\\\1_\2$", moving)

@@ -1,0 +1,272 @@
+"""What misalignments and small-angle forms do to the measured drift: closed forms. Angles in radians, time in years."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gpbnb.measurement import ARCSEC, apply, deroll, rotation
+
+Floats = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+GEODETIC = 6.6 * ARCSEC
+"""Drift in the plane of the orbit, of the size that was predicted for Gravity Probe B; radians a year."""
+MOTIONAL = 0.04 * ARCSEC
+"""Drift across the plane of the orbit; radians a year."""
+YEAR = 365 * 86400.0
+"""Seconds of the year that hung1984 takes."""
+ZERO: Triple = (0.0, 0.0, 0.0)
+
+GM = 3.986004e14
+"""Gravitational parameter of the Earth, m³/s²."""
+LIGHT = 299792458.0
+"""Speed of light, m/s."""
+RADIUS = 6.378137e6
+"""Equatorial radius of the Earth, m."""
+INERTIA = 0.3307
+"""Moment of inertia of the Earth about its axis, over its mass times the square of `RADIUS`."""
+SPIN = 7.292115e-5
+"""Rate at which the Earth turns, rad/s."""
+
+
+def precession_rates(altitude: float) -> tuple[float, float]:
+    r"""Geodetic and motional drift in a circular polar orbit, for a star on the equator; radians a year.
+
+    .. math:: \Omega_G = \frac32\,\frac{(GM)^{3/2}}{c^2 r^{5/2}}, \qquad \Omega_M = \frac{G I \omega}{2 c^2 r^3}
+
+    Parameters
+    ----------
+    altitude : above the equatorial radius, m; 0 or above.
+
+    References
+    ----------
+    Schiff 1960.
+    """
+    if not altitude >= 0:
+        raise ValueError(f"got an altitude of {altitude} m; needed 0 or above")
+    r = RADIUS + altitude
+    geodetic = 1.5 * GM**1.5 / (LIGHT**2 * r**2.5)
+    motional = GM * INERTIA * RADIUS**2 * SPIN / (2 * LIGHT**2 * r**3)
+    return geodetic * YEAR, motional * YEAR
+
+
+@dataclass(frozen=True)
+class Case:
+    """Angles of an experiment of one year.
+
+    Parameters
+    ----------
+    alpha, beta, gamma : pointing and both misalignments at the start; radians.
+    alpha_rate, beta_rate, gamma_rate : their change; radians a year.
+    drift : rates of φ2 and φ3; radians a year. The z axis lies in the orbit's plane here, so that φ2 is geodetic.
+
+    Raises
+    ------
+    ValueError : a number is missing, or is not finite.
+    """
+
+    alpha: Triple = ZERO
+    beta: Triple = ZERO
+    gamma: Triple = ZERO
+    alpha_rate: Triple = ZERO
+    beta_rate: Triple = ZERO
+    gamma_rate: Triple = ZERO
+    drift: tuple[float, float] = (GEODETIC, MOTIONAL)
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            needed = 2 if name == "drift" else 3
+            if len(value) != needed or not all(math.isfinite(v) for v in value):
+                raise ValueError(f"got {name} = {value}; needed {needed} finite numbers, in radians")
+
+    def with_angle(self, name: str, size: float) -> Case:
+        """Set one angle, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
+        which, axis = name[:-1], name[-1:]
+        if which == "drift" or which not in vars(self) or axis not in ("1", "2", "3"):
+            raise ValueError(f"got angle {name!r}; needed alpha, beta, gamma or their _rate and 1, 2 or 3: 'gamma1'")
+        values = list(getattr(self, which))
+        values[int(axis) - 1] = size
+        return replace(self, **{which: tuple(values)})
+
+    def at(self, name: str, years: ArrayLike) -> Floats:
+        """Angles of `name` after some `years` (...): (..., 3), or (3,) where they do not change."""
+        start, rate = np.asarray(getattr(self, name)), np.asarray(getattr(self, f"{name}_rate"))
+        return start + np.asarray(years, dtype=float)[..., None] * rate if rate.any() else start
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Errors of the measured drift φ2, φ3 in radians: of the angle at the start, of the drift of a year.
+
+    `line` is the size of what appears at roll frequency in the derolled difference, in the middle of the year.
+    """
+
+    angle: tuple[float, float]
+    drift: tuple[float, float]
+    line: float
+
+
+def printed_deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
+    r"""What (8) and (9) print, as (-α3, α2) or (-θ3, θ2), to be compared with :func:`gpbnb.measurement.deroll`.
+
+    .. math:: \begin{bmatrix} \hat\alpha_3 \\ -\hat\alpha_2 \end{bmatrix} = \begin{bmatrix} C & S \\ -S & C
+        \end{bmatrix} \begin{bmatrix} y_t \\ z_t \end{bmatrix}
+    """
+    return -deroll(readings, -np.asarray(phase, dtype=float))
+
+
+def measured(case: Case, rolling: bool, years: ArrayLike = 0.0, phase: float = 0.0) -> Floats:
+    r"""Errors of the measured φ2, φ3 after some `years`, to second order; rolling: the mean over a roll.
+
+    .. math:: \Delta\varphi_2 &= (\alpha_1 + \beta_1 + \gamma_1)\varphi_3 + \gamma_1\alpha_3 + m_2 \\
+        \Delta\varphi_3 &= -(\alpha_1 + \beta_1 + \gamma_1)\varphi_2 - \gamma_1\alpha_2 + m_3
+
+    Without rolling, m is what the transverse misalignments leave, turned by the constant roll `phase`: γ2 and γ3 to
+    first order. With rolling its mean is zero.
+
+    Parameters
+    ----------
+    case : the angles.
+    rolling : whether the spacecraft rolls.
+    years : (...), since the start.
+    phase : of the spacecraft that does not roll.
+
+    Returns
+    -------
+    errors : (..., 2), radians.
+    """
+    since = np.asarray(years, dtype=float)
+    alpha, beta, gamma = (case.at(name, since) for name in ("alpha", "beta", "gamma"))
+    phi2, phi3 = case.drift[0] * since, case.drift[1] * since
+    twist = alpha[..., 0] + beta[..., 0] + gamma[..., 0]
+    second = twist * phi3 + gamma[..., 0] * alpha[..., 2]
+    third = -twist * phi2 - gamma[..., 0] * alpha[..., 1]
+    if not rolling:
+        y, z = np.moveaxis(deroll(standing(beta, gamma), phase), -1, 0)
+        second, third = second + z, third - y
+    return np.stack([second, third], axis=-1)
+
+
+def standing(beta: ArrayLike, gamma: ArrayLike) -> Floats:
+    """What stands in the spacecraft: readings y, z of gyro less telescope for a vector along the roll axis, exactly."""
+    boresight = rotation(beta)[..., 0]
+    return np.asarray((apply(rotation(gamma), boresight) - boresight)[..., 1:])
+
+
+def effect(case: Case, rolling: bool, phase: float = 0.0) -> Effect:
+    """Errors of angle and drift, to second order, from the values at the start and after a year.
+
+    The drift is that of a straight line through both ends: the error of a product of two changing angles is not
+    straight in between.
+    """
+    start, end = measured(case, rolling, np.array([0.0, 1.0]), phase)
+    line = float(np.hypot(*standing(case.at("beta", 0.5), case.at("gamma", 0.5)))) if rolling else 0.0
+    drift = end - start
+    return Effect((float(start[0]), float(start[1])), (float(drift[0]), float(drift[1])), line)
+
+
+def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) -> float:
+    r"""Error of the drift of a straight line fitted to all samples, from what stands in the spacecraft.
+
+    .. math:: |\Delta\text{drift}| = \frac{6}{\pi N}\,\text{amplitude}, \qquad
+        \text{or } \frac{6}{nN\sin(\pi/n)}\,\text{amplitude for n samples a roll}
+
+    for N whole rolls, to first order in 1/N. It vanishes where means of whole rolls are fitted.
+
+    Parameters
+    ----------
+    amplitude : size of the line at roll frequency, in any unit.
+    rolls : N, above 0.
+    samples : n in a roll, at least 2; many by default.
+
+    Returns
+    -------
+    leak : length of the error of both drifts, in the unit of `amplitude`, over the length of the record.
+    """
+    if not rolls > 0 or (samples is not None and samples < 2):
+        raise ValueError(f"got {rolls} rolls with {samples} samples each; needed above 0, and 2 or more")
+    spread = math.pi if samples is None else samples * math.sin(math.pi / samples)
+    return 6 / (rolls * spread) * abs(amplitude)
+
+
+def ramp_leak(rate: float, roll_period: float, samples: int | None = None) -> float:
+    r"""Constant error of the mean over a roll from what stands in the spacecraft and grows at a steady `rate`.
+
+    .. math:: |\Delta\varphi| = \frac{\text{rate}\;T}{2\pi}, \qquad
+        \text{or } \frac{\text{rate}\;T}{2n\sin(\pi/n)} \text{ for the mean of n samples}
+
+    Parameters
+    ----------
+    rate : in any unit a second.
+    roll_period : T, seconds.
+    samples : n in a roll, at least 2; many by default.
+    """
+    if not roll_period > 0 or (samples is not None and samples < 2):
+        raise ValueError(f"got a roll period of {roll_period} s with {samples} samples; needed above 0, and 2 or more")
+    whole = abs(rate) * roll_period
+    return whole / (2 * math.pi) if samples is None else whole / (2 * samples * math.sin(math.pi / samples))
+
+
+SINGLE = ("alpha1", "alpha2", "alpha3", "beta1", "beta2", "beta3", "gamma1", "gamma2", "gamma3")
+"""The angles whose small-angle form is looked at."""
+
+
+def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> Floats:
+    r"""Error of φ, over a mean of whole rolls, that dropping products of small angles makes: one angle x alone.
+
+    To third order, with the worse sign of x, for turns about the roll axis, for the others of β and γ, and for α2:
+
+    .. math:: |x|\,|\varphi| + \dots, \qquad \tfrac14 x^2|\varphi|, \qquad
+        \tfrac12 x^2|\varphi_2| + \tfrac12|x|\,|\varphi|^2
+
+    each together with what the drift alone makes, :math:`\varphi^3/6`.
+
+    Parameters
+    ----------
+    name : one of `SINGLE`.
+    size : (...), of that angle; radians.
+    drift : true φ2, φ3; radians.
+
+    Returns
+    -------
+    loss : (...), length of the error (Δφ2, Δφ3); radians.
+    """
+    if name not in SINGLE:
+        raise ValueError(f"got angle {name!r}; needed one of {', '.join(SINGLE)}")
+    phi2, phi3 = drift
+    square = phi2**2 + phi3**2
+    worst = []
+    for x in (np.asarray(size, dtype=float), -np.asarray(size, dtype=float)):
+        y, z = phi3**3 / 6 + 0 * x, -(phi2**3) / 6 - phi2 * phi3**2 / 2 + 0 * x
+        if name.endswith("1"):
+            y, z = y + x * phi2 + x**2 * phi3 / 2, z + x * phi3 - x**2 * phi2 / 2
+        elif name == "alpha2":
+            z = z - x**2 * phi2 / 2 - x * square / 2
+        elif name == "alpha3":
+            y = y + x**2 * phi3 / 2 + x * square / 2
+        else:
+            y, z = y + x**2 * phi3 / 4, z - x**2 * phi2 / 4
+        worst.append(np.hypot(y, z))
+    return np.asarray(np.maximum(*worst))
+
+
+def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
+    """Size of an angle whose :func:`small_angle_loss` is `allowed`; radians, at most half a turn."""
+    if not 0 < allowed < small_angle_loss(name, math.pi, drift):
+        raise ValueError(f"got allowed = {allowed}; needed an angle above 0 that half a turn of {name} exceeds")
+    low, high = 0.0, math.pi
+    for _ in range(80):
+        middle = (low + high) / 2
+        low, high = (middle, high) if small_angle_loss(name, middle, drift) < allowed else (low, middle)
+    return high
+
+
+def twist_limit(allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
+    """Largest turn about the roll axis that moves no more than `allowed` from one drift into the other; radians."""
+    if not allowed > 0:
+        raise ValueError(f"got allowed = {allowed}; needed an angle above 0, in radians")
+    return allowed / max(map(abs, drift))

@@ -1,0 +1,458 @@
+r"""What telescope and gyro read in a rolling spacecraft: frames, rotations, and the measurement matrix.
+
+Six frames with one origin are used, as in hung1982, ch. IV. A rotation carries the components of a vector
+from one to the next, in the order in which they are chained:
+
+======  ============  ==============================================================================
+frame   name          how one gets there
+======  ============  ==============================================================================
+``a``   absolute      fixed; :math:`x_a` points to the guide star
+``i``   intermediate  from ``a`` by the pointing α; :math:`x_i` is the roll axis
+``φ``   roll          from ``i`` by the roll phase ωt about :math:`x_i`
+``t``   telescope     from ``φ`` by the misalignment β; :math:`x_t` is the boresight
+``r``   readout       from ``t`` by the misalignment γ; :math:`z_r` is the normal of the readout ring
+``g``   gyro          :math:`x_g` is the spin axis; θ leads from ``g`` to ``i``, φ = θ - α to ``a``
+======  ============  ==============================================================================
+
+Angles are in radians, and each set of three is turned about the axes 3, 2, 1 in this order. To first order the order
+does not matter; the document does not say it. Mind the sign of θ and φ: they turn the gyro frame *into* the others,
+so that the spin axis stands at :math:`(1, -\varphi_3, \varphi_2)` in the absolute frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+ARCSEC = math.pi / (180 * 3600)
+"""One second of arc, in radians."""
+MAS = ARCSEC / 1000
+"""One milliarcsecond, in radians."""
+
+Floats = NDArray[np.float64]
+Signal = Literal["gyro", "telescope", "difference"]
+
+SEQUENCE = (3, 2, 1)
+"""Axes about which a set of three angles is turned, the first turn first."""
+
+STATES = (
+    "phi2",
+    "phi3",
+    "phi2_rate",
+    "phi3_rate",
+    "alpha2",
+    "alpha3",
+    "beta1",
+    "beta2",
+    "beta3",
+    "gamma1",
+    "gamma2",
+    "gamma3",
+    "bias_y",
+    "bias_z",
+    "scale",
+)
+"""All that :func:`measurement_matrix` has a column for."""
+
+GPB_STATES = (
+    "phi2",
+    "phi3",
+    "phi2_rate",
+    "phi3_rate",
+    "alpha2",
+    "alpha3",
+    "gamma1",
+    "bias_y",
+    "bias_z",
+    "scale",
+)
+"""Ten of them. Drift and its rate, pointing, the misalignment about the roll axis, biases, scale factor.
+
+The transverse misalignments β2, β3, γ2, γ3 have the columns of the biases, up to sign, and so are part of them.
+"""
+
+
+# -- rotations ------------------------------------------------------------------------------------
+
+
+def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
+    r"""Exact matrix that carries components over to a frame turned by `angles`.
+
+    .. math:: C = R_1(\alpha_1)\,R_2(\alpha_2)\,R_3(\alpha_3)
+
+    for the sequence (3, 2, 1); another one orders the factors accordingly, the first turn on the right.
+
+    Parameters
+    ----------
+    angles : (..., 3), in radians, about axes 1, 2 and 3.
+    sequence : a permutation of 1, 2, 3.
+
+    Returns
+    -------
+    C : (..., 3, 3), orthogonal.
+
+    Raises
+    ------
+    ValueError : the last axis is not of length 3, an angle is not finite, or `sequence` is no permutation.
+    """
+    each = _angles("angles", angles, 3)
+    if sorted(sequence) != [1, 2, 3]:
+        raise ValueError(f"got sequence {tuple(sequence)}; needed each of 1, 2, 3 once, as in (3, 2, 1)")
+    first, second, third = (_turn(axis, each[..., axis - 1]) for axis in sequence)
+    return np.asarray(third @ second @ first)
+
+
+def small_rotation(angles: ArrayLike) -> Floats:
+    r"""The small-angle form of :func:`rotation`, the same for every sequence; orthogonal only to first order.
+
+    .. math:: C \approx \begin{bmatrix} 1 & \alpha_3 & -\alpha_2 \\ -\alpha_3 & 1 & \alpha_1 \\
+        \alpha_2 & -\alpha_1 & 1 \end{bmatrix}
+
+    Parameters
+    ----------
+    angles : (..., 3), in radians.
+
+    References
+    ----------
+    hung1982, ch. IV, eqs. (1)-(4).
+    """
+    each = _angles("angles", angles, 3)
+    C = np.zeros((*each.shape, 3))
+    C[..., (0, 1, 2), (0, 1, 2)] = 1
+    C[..., (0, 1, 2), (1, 2, 0)] = each[..., (2, 0, 1)]
+    C[..., (1, 2, 0), (0, 1, 2)] = -each[..., (2, 0, 1)]
+    return C
+
+
+def angles_of(matrix: ArrayLike) -> Floats:
+    """The three angles of a rotation matrix: the inverse of :func:`rotation` for the sequence (3, 2, 1).
+
+    Parameters
+    ----------
+    matrix : (..., 3, 3), orthogonal with determinant one to 1e-9; the second angle within ±π/2.
+
+    Returns
+    -------
+    angles : (..., 3), in radians.
+
+    Raises
+    ------
+    ValueError : `matrix` is not a rotation.
+    """
+    C = np.asarray(matrix, dtype=np.float64)
+    if C.shape[-2:] != (3, 3):
+        raise ValueError(f"got shape {C.shape}; needed (..., 3, 3)")
+    off = np.abs(C @ np.swapaxes(C, -1, -2) - np.eye(3)).max(initial=0.0)
+    if not off < 1e-9 or not np.all(np.linalg.det(C) > 0):
+        raise ValueError(
+            f"got a matrix whose product with its transpose is {off:.3g} from the identity; needed a rotation: "
+            "build it with rotation(), not with small_rotation()"
+        )
+    first = np.arctan2(C[..., 1, 2], C[..., 2, 2])
+    second = np.arctan2(-C[..., 0, 2], np.hypot(C[..., 0, 0], C[..., 0, 1]))
+    third = np.arctan2(C[..., 0, 1], C[..., 0, 0])
+    return np.stack([first, second, third], axis=-1)
+
+
+def roll(phase: ArrayLike) -> Floats:
+    r"""Matrix (..., 3, 3) from the intermediate to the roll frame, a turn by the phase ωt, in radians, about x.
+
+    .. math:: R(\omega t) = \begin{bmatrix} 1 & 0 & 0 \\ 0 & \cos\omega t & \sin\omega t \\
+        0 & -\sin\omega t & \cos\omega t \end{bmatrix}
+    """
+    return _turn(1, _finite("phase", phase))
+
+
+def deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
+    r"""Turn readings y, z of a rolling frame back into those of the intermediate frame.
+
+    .. math:: \begin{bmatrix} y_i \\ z_i \end{bmatrix} = \begin{bmatrix} \cos\omega t & -\sin\omega t \\
+        \sin\omega t & \cos\omega t \end{bmatrix} \begin{bmatrix} y \\ z \end{bmatrix}
+
+    Parameters
+    ----------
+    readings : (..., 2), in any unit.
+    phase : ωt, in radians; broadcast against the leading axes of `readings`.
+
+    Returns
+    -------
+    derolled : (..., 2); of the telescope (-α3, α2), of the gyro (-θ3, θ2), to first order.
+
+    References
+    ----------
+    hung1982, ch. IV, eqs. (5)-(7); (8) and (9) have other signs and do not deroll.
+    """
+    body, turned = _angles("readings", readings, 2), _finite("phase", phase)
+    return _turned_back(body, np.cos(turned), np.sin(turned))
+
+
+# -- what is measured -----------------------------------------------------------------------------
+
+Rotate = Callable[[ArrayLike], Floats]
+
+
+def into_spacecraft(
+    vector: ArrayLike, phase: ArrayLike, *misalignments: ArrayLike, rotate: Rotate = rotation
+) -> Floats:
+    """Components of a vector of the intermediate frame after the roll and one misalignment after the other.
+
+    Parameters
+    ----------
+    vector : (..., 3), in any unit.
+    phase : ωt, in radians; all are broadcast.
+    misalignments : (..., 3) each, in radians: β to reach the telescope frame, β and γ for the readout frame.
+    rotate : `rotation` or `small_rotation`.
+
+    Returns
+    -------
+    components : (..., 3).
+    """
+    given, turned = _angles("vector", vector, 3), _finite("phase", phase)
+    yz = deroll(given[..., 1:], -turned)
+    components = np.concatenate([np.broadcast_to(given[..., :1], (*yz.shape[:-1], 1)), yz], axis=-1)
+    for angles in misalignments:
+        components = apply(rotate(angles), components)
+    return components
+
+
+def apply(matrix: Floats, vector: Floats) -> Floats:
+    """Product of matrices (..., 3, 3) and vectors (..., 3), broadcast; without BLAS, whose last digits differ."""
+    return np.asarray(np.einsum("...jk,...k->...j", matrix, vector))
+
+
+def star_in_telescope(alpha: ArrayLike, beta: ArrayLike, phase: ArrayLike, rotate: Rotate = rotation) -> Floats:
+    r"""Unit vector to the guide star in the telescope frame, :math:`B(\beta)\,R(\omega t)\,A(\alpha)\,(1,0,0)^T`.
+
+    Parameters
+    ----------
+    alpha, beta : (..., 3), in radians: pointing, and misalignment of telescope against roll frame.
+    phase : ωt, in radians; all three are broadcast.
+    rotate : `rotation` for the exact vector; `small_rotation` for the equation as printed.
+
+    Returns
+    -------
+    x, y, z : (..., 3).
+
+    References
+    ----------
+    hung1982, ch. IV, eq. (1).
+    """
+    return into_spacecraft(rotate(alpha)[..., 0], phase, beta, rotate=rotate)
+
+
+def spin_in_readout(
+    theta: ArrayLike, beta: ArrayLike, gamma: ArrayLike, phase: ArrayLike, rotate: Rotate = rotation
+) -> Floats:
+    r"""Unit vector along the spin axis in the readout frame.
+
+    .. math:: \Gamma(\gamma)\,B(\beta)\,R(\omega t)\,\Theta(\theta)\,(1,0,0)^T
+
+    Parameters
+    ----------
+    theta, beta, gamma : (..., 3), in radians: from gyro to intermediate frame, and both misalignments.
+    phase : ωt, in radians; all are broadcast.
+    rotate : `rotation` for the exact vector; `small_rotation` for the equation as printed.
+
+    Returns
+    -------
+    x, y, z : (..., 3).
+
+    References
+    ----------
+    hung1982, ch. IV, eq. (2).
+    """
+    return into_spacecraft(rotate(theta)[..., 0], phase, beta, gamma, rotate=rotate)
+
+
+def theta_of(phi: ArrayLike, alpha: ArrayLike) -> Floats:
+    """Angles θ from gyro to intermediate frame, for drift φ and pointing α, exactly; φ + α to first order.
+
+    Parameters
+    ----------
+    phi, alpha : (..., 3), in radians; broadcast.
+
+    Returns
+    -------
+    theta : (..., 3), in radians.
+    """
+    return angles_of(rotation(alpha) @ rotation(phi))
+
+
+def measurement_matrix(
+    phase: ArrayLike,
+    states: Sequence[str] = GPB_STATES,
+    *,
+    signal: Signal = "gyro",
+    derolled: bool = True,
+    nominal_theta: ArrayLike = (0.0, 0.0, 0.0),
+    nominal_alpha: ArrayLike = (0.0, 0.0, 0.0),
+) -> Floats:
+    r"""Two readings, y and z, as a linear function of the unknowns, at given roll phases.
+
+    In the roll frame, to first order in every unknown, with the pairs :math:`\vec\theta = (-\theta_3, \theta_2)^T`,
+    :math:`\vec\alpha`, :math:`\vec\beta`, :math:`\vec\gamma` alike, :math:`\vec\theta = \vec\varphi + \vec\alpha`,
+    the 2×2 block R of :func:`roll`, :math:`J = \begin{bmatrix} 0 & 1 \\ -1 & 0 \end{bmatrix}`, bias b, scale factor
+    error k:
+
+    .. math::
+
+        \text{gyro} &= (1 + k)\bigl[(1 + (\beta_1 + \gamma_1) J)\,R\,\vec\theta
+            + \vec\beta + \vec\gamma\bigr] + b \\
+        \text{telescope} &= (1 + \beta_1 J)\,R\,\vec\alpha + \vec\beta
+
+    ``difference`` is gyro less telescope. Scale factor and turns about the roll axis multiply the signal: their columns
+    are taken where the signal is nominal, and are zero where it is zero. A rate has a column of zeros: it shows
+    in the readings only through the angle that it changes.
+
+    Parameters
+    ----------
+    phase : (...), ωt in radians.
+    states : names from `STATES`, one a column, in this order; rates are per any unit of time.
+    signal : which readings.
+    derolled : whether they are turned back into the intermediate frame, as by :func:`deroll`.
+    nominal_theta, nominal_alpha : (..., 3), in radians; broadcast against `phase`. The first element is not used.
+
+    Returns
+    -------
+    H : (..., 2, n). Readings and angles share one unit, which is free in all columns but those of ``scale``,
+        ``beta1`` and ``gamma1``: these are in radians a unit (scale) and a radian, from the nominal angles.
+
+    Raises
+    ------
+    ValueError : an unknown or repeated state, an unknown signal, or angles that are not finite or of the wrong shape.
+
+    References
+    ----------
+    hung1982, ch. IV, eqs. (1)-(7); bias and scale factor from the classification of ch. II.
+    """
+    turned = _finite("phase", phase)
+    theta, alpha = _angles("nominal_theta", nominal_theta, 3), _angles("nominal_alpha", nominal_alpha, 3)
+    H = measurement_rows(
+        np.cos(turned),
+        np.sin(turned),
+        states,
+        signal=signal,
+        derolled=derolled,
+        nominal_theta=theta,
+        nominal_alpha=alpha,
+    )
+    return np.asarray(H, dtype=np.float64) + 0.0  # no minus before a zero
+
+
+def measurement_rows(
+    cosine: ArrayLike,
+    sine: ArrayLike,
+    states: Sequence[str] = GPB_STATES,
+    *,
+    signal: Signal = "gyro",
+    derolled: bool = True,
+    nominal_theta: ArrayLike = (0, 0, 0),
+    nominal_alpha: ArrayLike = (0, 0, 0),
+) -> NDArray[Any]:
+    """The same from cosine and sine of the roll phase, in the numbers that are given: Fractions stay exact.
+
+    Parameters
+    ----------
+    cosine, sine : (...), of ωt; floats, or objects such as Fractions, for a model that is held exactly.
+    states, signal, derolled : as in :func:`measurement_matrix`.
+    nominal_theta, nominal_alpha : (..., 3), numbers of the same type or integers.
+
+    Returns
+    -------
+    H : (..., 2, n), an array of floats for floats, else of objects.
+
+    Raises
+    ------
+    ValueError : an unknown or repeated state, an unknown signal, or nominal angles of the wrong shape.
+    """
+    unknown = [name for name in states if name not in STATES]
+    if unknown or not states or len(set(states)) != len(states):
+        raise ValueError(
+            f"got states {tuple(states)}; needed different names from {', '.join(STATES)}"
+            + (f"; {', '.join(map(repr, unknown))} is none of them" if unknown else "")
+        )
+    if signal not in ("gyro", "telescope", "difference"):
+        raise ValueError(f"got signal {signal!r}; needed 'gyro', 'telescope' or 'difference'")
+    C, S = np.asarray(cosine), np.asarray(sine)
+    theta, alpha = np.asarray(nominal_theta), np.asarray(nominal_alpha)
+    for name, nominal in (("nominal_theta", theta), ("nominal_alpha", alpha)):
+        if nominal.ndim == 0 or nominal.shape[-1] != 3:
+            raise ValueError(f"got {name} of shape {nominal.shape}; needed (..., 3)")
+    gyro, telescope = int(signal != "telescope"), {"gyro": 0, "telescope": 1, "difference": -1}[signal]
+    y, z, zero = np.array([1, 0]), np.array([0, 1]), np.array([0, 0])
+    spin, star = gyro * _transverse(theta), telescope * _transverse(alpha)
+    inertial: dict[str, Any] = {  # columns in the intermediate frame
+        "phi2": gyro * z,
+        "phi3": -gyro * y,
+        "alpha2": (gyro + telescope) * z,
+        "alpha3": -(gyro + telescope) * y,
+        "beta1": _quarter(spin + star),
+        "gamma1": _quarter(spin),
+        "scale": spin,
+    }
+    body: dict[str, Any] = {  # columns in the roll frame
+        "phi2_rate": zero,
+        "phi3_rate": zero,
+        "beta2": (gyro + telescope) * z,
+        "beta3": -(gyro + telescope) * y,
+        "gamma2": gyro * z,
+        "gamma3": -gyro * y,
+        "bias_y": gyro * y,
+        "bias_z": gyro * z,
+    }
+    shape = np.broadcast_shapes(C.shape, S.shape, theta.shape[:-1], alpha.shape[:-1])
+    H = np.empty((*shape, 2, len(states)), dtype=np.result_type(C, S, theta, alpha))
+    for column, name in enumerate(states):
+        if name in body:
+            H[..., column] = _turned_back(body[name], C, S) if derolled else body[name]
+        else:
+            H[..., column] = inertial[name] if derolled else _turned_back(inertial[name], C, -S)
+    return H
+
+
+# -- helpers --------------------------------------------------------------------------------------
+
+
+def _turn(axis: int, angle: Floats) -> Floats:
+    """Elementary matrix that carries components to a frame turned by `angle` about `axis`."""
+    j, k = axis % 3, (axis + 1) % 3
+    C = np.zeros((*angle.shape, 3, 3))
+    C[..., axis - 1, axis - 1] = 1
+    C[..., j, j] = C[..., k, k] = np.cos(angle)
+    C[..., j, k] = np.sin(angle)
+    C[..., k, j] = -C[..., j, k]
+    return C
+
+
+def _turned_back(readings: NDArray[Any], C: NDArray[Any], S: NDArray[Any]) -> NDArray[Any]:
+    """The deroll of readings (..., 2), from cosine and sine of the phase."""
+    y, z = readings[..., 0], readings[..., 1]
+    return np.stack([C * y - S * z, S * y + C * z], axis=-1)
+
+
+def _transverse(angles: NDArray[Any]) -> NDArray[Any]:
+    """(-v3, v2): where the x axis of a frame stands, in y and z, after small turns v."""
+    return np.stack([-angles[..., 2], angles[..., 1]], axis=-1)
+
+
+def _quarter(pair: NDArray[Any]) -> NDArray[Any]:
+    """J applied to (..., 2)."""
+    return np.stack([pair[..., 1], -pair[..., 0]], axis=-1)
+
+
+def _finite(name: str, values: ArrayLike) -> Floats:
+    given = np.asarray(values, dtype=np.float64)
+    if not np.all(np.isfinite(given)):
+        raise ValueError(f"got {name} with NaN or infinity; needed finite numbers; leave out samples that are missing")
+    return given
+
+
+def _angles(name: str, values: ArrayLike, count: int) -> Floats:
+    given = _finite(name, values)
+    if given.ndim == 0 or given.shape[-1] != count:
+        raise ValueError(f"got {name} of shape {given.shape}; needed (..., {count})")
+    return given

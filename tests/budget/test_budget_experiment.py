@@ -1,0 +1,80 @@
+"""gpbnb.budget: derivations hold, and simulated budgets and averages agree with them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from importlib.resources import files
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from gpbnb.budget import derivation, experiment, theory
+from gpbnb.budget.theory import Budget
+
+EXAMPLE = theory.read(files("gpbnb.budget") / "example.csv")
+
+
+@pytest.mark.parametrize(("name", "count"), [("equal_sources", 2), ("averages", 4)])
+def test_derivations(name, count):
+    steps = getattr(derivation, name)().steps
+    assert len(steps) == count
+    for step in steps:
+        assert step.holds
+        assert not replace(step, right=2 * step.right).holds
+        left, right = step.latex().split(r"\;=\;")
+        assert left.strip() != right.strip()
+
+
+def test_the_factors_of_theory_are_those_of_the_derivation():
+    constant, _, white, correlated = (step.right for step in derivation.averages().steps)
+    c = next(symbol for symbol in constant.free_symbols if symbol.name == "c")
+    for cycles in (0.3, 2.25, 17.9):
+        assert theory.cycles_factor(cycles) == pytest.approx(abs(float(constant.doit().subs(c, cycles))), rel=1e-12)
+    assert theory.white_factor(9) ** 2 == pytest.approx(float(white.subs({derivation.E: 1, derivation.N: 9})))
+    for ratio in (0.7, 12.0):
+        value = correlated.subs({derivation.T: sp.Float(ratio, 40), derivation.TAU: 1})
+        assert theory.correlated_factor(ratio, 1) ** 2 == pytest.approx(float(value), rel=1e-12)
+
+
+@pytest.mark.parametrize("group", ["", "one"])
+def test_drawn_budgets_have_the_root_sum_square(group):
+    trials = 40_000
+    budget = Budget(tuple(replace(source, group=group) for source in EXAMPLE.budget.sources))
+    draws = experiment.draw(budget, trials, np.random.default_rng(3))
+    # four standard errors of a standard deviation
+    assert abs(draws.deviation / budget.total - 1) < 4 / math.sqrt(2 * trials)
+    expected = math.erfc(1 / math.sqrt(2))
+    assert abs(draws.beyond(budget.total) - expected) < 4 * math.sqrt(expected * (1 - expected) / trials)
+    assert draws.errors.shape == (trials,)
+
+
+@pytest.mark.parametrize("cycles", [0.01, 0.5, 3.3, 12.0, 80.7])
+def test_means_of_turning_constants(cycles):
+    # the midpoint rule multiplies the mean by x / sin x, x = pi c / samples
+    x = math.pi * cycles / 20000
+    assert experiment.turning_mean(cycles) == pytest.approx(
+        theory.cycles_factor(cycles) * x / math.sin(x), rel=1e-9, abs=1e-13
+    )
+
+
+@pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0])
+def test_means_of_correlated_noise(ratio):
+    trials = 4000
+    means = experiment.correlated_means(ratio, 1.0, trials, np.random.default_rng(11))
+    rule = (ratio / experiment.SAMPLES) ** 2 / 24
+    assert abs(np.sqrt(np.mean(means**2)) / theory.correlated_factor(ratio, 1) - 1) < 4 / math.sqrt(2 * trials) + rule
+
+
+def test_the_example_has_four_rows_to_be_refused():
+    assert [row.line for row in EXAMPLE.refused] == [9, 10, 11, 12]
+    assert len(EXAMPLE.budget.sources) == 7
+    assert all(not source.unforeseen for source in EXAMPLE.budget.sources)
+
+
+def test_bad_input_is_refused():
+    rng = np.random.default_rng(0)
+    for budget, trials in ((Budget(()), 5), (EXAMPLE.budget, 0)):
+        with pytest.raises(ValueError, match="needed at least one of each"):
+            experiment.draw(budget, trials, rng)

@@ -1,0 +1,87 @@
+"""gpbnb.budget.figures and tables: what is shown is the result."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from gpbnb import plotting
+from gpbnb.budget import experiment, figures, tables, theory
+
+READING = theory.read(files("gpbnb.budget") / "example.csv")
+BUDGET = READING.budget
+
+
+@pytest.fixture
+def ax():
+    _, axes = plotting.figure()
+    yield axes[0]
+    axes[0].figure.canvas.draw()
+    plt.close("all")
+
+
+def legend_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_budget_curve(ax):
+    one, other, signs, printed = figures.budget_curve((44, 0.15), (1.0, 1.253), ax, most=50)
+    n = np.arange(1, 51)
+    assert list(one.get_xdata()) == list(n)
+    assert np.allclose(one.get_ydata(), n**-0.5, rtol=1e-15)
+    assert np.allclose(other.get_ydata(), 1.253 * n**-0.5, rtol=1e-15)
+    assert np.array_equal(signs.get_ydata(), 1 / n)
+    assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([44], [0.15])
+    assert printed.get_markerfacecolor() == "white"
+    assert "printed example" in legend_of(ax)
+    assert ax.get_ylabel() == "error of each (mas)"
+
+
+def test_shares(ax):
+    bars = figures.shares(BUDGET, ax)
+    ordered = sorted(BUDGET.sources, key=BUDGET.share)
+    assert [bar.get_width() for bar in bars] == [100 * BUDGET.share(source) for source in ordered]
+    assert [tick.get_text() for tick in ax.get_yticklabels()] == [source.name for source in ordered]
+    colours = {source.form: bar.get_facecolor() for source, bar in zip(ordered, bars, strict=True)}
+    assert len(set(colours.values())) == len(colours) == 4
+    assert legend_of(ax) == ["bias", "drift", "scale factor", "noise"]
+    assert "%" in ax.get_xlabel()
+
+
+def test_distribution(ax):
+    draws = experiment.draw(BUDGET, 2000, np.random.default_rng(1))
+    artists = figures.distribution(draws, ax)
+    lines = {line.get_xdata()[0] for line in artists[60:]}
+    expected = (BUDGET.total, theory.GOAL, BUDGET.worst_case)
+    assert lines == {sign * value for value in expected for sign in (1, -1)}
+    assert sum(bar.get_height() * bar.get_width() for bar in artists[:60]) == pytest.approx(1)
+    assert "mas" in ax.get_xlabel()
+
+
+def test_table_of_sources():
+    table = tables.sources(BUDGET)
+    *rows, total, worst = table.body
+    assert [row[0] for row in rows] == [source.name for source in BUDGET.sources]
+    for source, row in zip(BUDGET.sources, rows, strict=True):
+        assert row[1:3] == (source.kind.value, source.form.value)
+        assert row[6] == f"{source.residual:.3g}"
+        assert row[7] == f"{100 * BUDGET.share(source):.1f} %"
+    assert rows[0][4] == "roll × 0.0005"
+    assert total[6] == f"{BUDGET.total:.4g}"
+    assert total[7] == "100.0 %"
+    assert worst[6] == f"{BUDGET.worst_case:.4g}"
+
+
+def test_table_of_refused_rows():
+    table = tables.refused(READING)
+    assert [row[0] for row in table.body] == ["9", "10", "11", "12"]
+    assert "TBD" in table.body[0][2]
+    assert table.body[0][1].startswith("starlight, deterministic")
+
+
+def test_table_of_the_curve():
+    (row,) = tables.curve([("printed", 44, 0.15)]).body
+    assert row == ("printed", "44", "0.1500", f"{0.15 * 44**0.5:.4f}", "6.600")

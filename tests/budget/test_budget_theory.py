@@ -1,0 +1,266 @@
+"""gpbnb.budget.theory: sums, shares, factors of averaging, and the file that holds a budget."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gpbnb.budget import theory
+from gpbnb.budget.theory import Budget, Form, Kind, Source
+
+HEADER = "name,kind,form,error_mas,roll,orbit,filter,group,note"
+GOOD = "a,random constant,bias,0.30,0.5,,,,"
+
+words = st.text(st.characters(codec="utf-8", exclude_categories=("C",)), min_size=1).map(str.strip).filter(bool)
+sizes = st.floats(-1e6, 1e6)
+factors = st.floats(0, 1)
+sources = st.builds(
+    Source,
+    words,
+    st.sampled_from(Kind),
+    st.sampled_from(Form),
+    sizes,
+    factors,
+    factors,
+    factors,
+    st.sampled_from(["", "g", "h"]),
+    st.sampled_from(["", 'a "note", with comma']),
+)
+budgets = st.lists(sources, max_size=8, unique_by=lambda source: source.name).map(tuple).map(Budget)
+
+
+def made(*errors, group=""):
+    return Budget(
+        tuple(Source(f"s{k}", Kind.CONSTANT, Form.BIAS, error, group=group) for k, error in enumerate(errors))
+    )
+
+
+# -- sums -----------------------------------------------------------------------------------------
+
+
+def test_independent_sources_add_up_as_squares_and_a_group_with_signs():
+    assert made(3, 4).total == 5
+    assert made(3, 4, group="g").total == 7
+    assert made(3, -4, group="g").total == 1
+    assert made(3, -4).worst_case == made(3, -4, group="g").worst_case == 7
+    mixed = Budget((*made(3, 1, group="g").sources, Source("c", Kind.PROCESS, Form.NOISE, 6, filter=0.5)))
+    assert mixed.total == 5
+    assert [len(group) for group in mixed.groups()] == [2, 1]
+
+
+def test_a_group_may_have_the_name_of_a_source():
+    budget = Budget((replace(made(3).sources[0], name="g"), replace(made(4).sources[0], group="g")))
+    assert budget.total == 5
+
+
+@given(budgets)
+def test_total_against_exact_sums(budget):
+    square = Fraction(0)
+    for group in {source.group or source.name + "\0" for source in budget.sources}:
+        inside = [s for s in budget.sources if (s.group or s.name + "\0") == group]
+        square += sum((Fraction(s.residual) for s in inside), Fraction(0)) ** 2
+    if square > Fraction(10) ** -200:
+        # correctly rounded sums and hypot: a few ulps
+        assert abs(Fraction(budget.total) ** 2 / square - 1) < Fraction(1, 10**14)
+    assert budget.total <= budget.worst_case * (1 + 1e-15)
+
+
+@given(budgets)
+def test_shares_add_up_to_one(budget):
+    shares = [budget.share(source) for source in budget.sources]
+    largest = max((abs(source.residual) for source in budget.sources), default=0)
+    if budget.total > 1e-3 * largest > 1e-100:
+        # a group that cancels to a thousandth has shares of a million, each with a rounding
+        assert math.isclose(math.fsum(shares), 1, abs_tol=1e-9)
+    if budget.total == 0:
+        assert not any(shares)
+
+
+def test_a_share_below_zero_cancels_others():
+    budget = made(3, -1, group="g")
+    assert [budget.share(source) for source in budget.sources] == [1.5, -0.5]
+
+
+def test_order_does_not_matter():
+    budget = made(0.1, 0.2, 0.3, 0.7)
+    assert Budget(budget.sources[::-1]).total == pytest.approx(budget.total, rel=1e-15)
+
+
+def test_reduction_multiplies():
+    source = Source("a", Kind.PROCESS, Form.NOISE, -8, roll=0.5, orbit=0.25, filter=0.5)
+    assert source.residual == -0.5
+
+
+def test_allowance_fills_the_goal():
+    budget = made(0.6)
+    assert budget.allowance() == pytest.approx(0.8)
+    assert theory.root_sum_square((budget.total, budget.allowance(2.5))) == pytest.approx(2.5)
+    assert math.isnan(made(1.253).allowance())
+
+
+@given(st.floats(1e-6, 1e6), st.integers(1, 10**6))
+def test_equal_sources_and_their_error_are_inverse(total, count):
+    each = theory.equal_error(total, count)
+    assert theory.equal_sources(total, each) == pytest.approx(count, rel=1e-14)
+    if count <= 1000:
+        assert theory.root_sum_square([each] * count) == pytest.approx(total, rel=1e-12)
+
+
+def test_the_printed_example():
+    assert theory.equal_error(1, 44) == pytest.approx(44**-0.5, rel=1e-15)
+    assert theory.root_sum_square([0.15] * 44) < 1 < theory.root_sum_square([0.16] * 44)
+
+
+# -- averages -------------------------------------------------------------------------------------
+
+
+@given(st.integers(1, 10**7))
+def test_whole_cycles_leave_nothing(cycles):
+    assert theory.cycles_factor(cycles) == 0
+
+
+@given(st.floats(0.01, 1e4))
+def test_cycles_factor_is_that_of_sinc(cycles):
+    # numpy's sinc takes the sine of a large number: its error is an ulp of that number
+    assert theory.cycles_factor(cycles) == pytest.approx(abs(np.sinc(cycles)), rel=1e-12, abs=1e-15)
+    assert theory.cycles_factor(cycles) <= min(1, 1 / (math.pi * cycles)) * (1 + 1e-15)
+    assert theory.cycles_factor(0) == 1
+
+
+def test_correlated_factor_joins_its_two_forms():
+    below, above = math.nextafter(0.5, 0), 0.5
+    assert theory.correlated_factor(below, 1) == pytest.approx(theory.correlated_factor(above, 1), rel=1e-15)
+
+
+@pytest.mark.parametrize("h", [1e-12, 1e-5, 0.1, 0.49, 0.5, 2.0, 40.0, 1e6])
+def test_correlated_factor_against_many_digits(h):
+    mpmath = pytest.importorskip("mpmath")
+    with mpmath.workdps(60):
+        x = mpmath.mpf(h)
+        exact = mpmath.sqrt(2 * (x - 1 + mpmath.exp(-x))) / x
+    # expm1 cancels to a fifth at worst
+    assert theory.correlated_factor(h, 1.0) == pytest.approx(float(exact), rel=4e-15)
+
+
+def test_limits_of_averages():
+    assert theory.correlated_factor(0, 1) == 1
+    assert theory.correlated_factor(1e8, 1) == pytest.approx(math.sqrt(2e-8), rel=1e-7)
+    assert theory.white_factor(100) == 0.1
+
+
+def test_what_chapter_ii_foresees():
+    assert theory.foreseen(Kind.DETERMINISTIC, Form.DRIFT) == set()
+    assert theory.foreseen(Kind.CONSTANT, Form.BIAS) == {"roll", "orbit"}
+    assert theory.foreseen(Kind.CONSTANT, Form.SCALE_FACTOR) == {"roll", "orbit", "filter"}
+    assert theory.foreseen(Kind.DETERMINISTIC, Form.NOISE) == {"filter"}
+    source = Source("a", Kind.DETERMINISTIC, Form.BIAS, 1, roll=0.5, filter=0.5)
+    assert source.unforeseen == ("filter",)
+    assert replace(source, filter=1.0).unforeseen == ()
+
+
+# -- files ----------------------------------------------------------------------------------------
+
+
+@given(budgets)
+def test_what_is_written_is_read_again(budget):
+    found = theory.parse(theory.to_csv(budget.sources))
+    assert found.refused == ()
+    assert found.budget == budget
+
+
+def test_files(tmp_path):
+    path = tmp_path / "budget.csv"
+    budget = made(0.1, 1 / 3, -2e-17)
+    theory.write(budget, path)
+    assert theory.read(path).budget == budget
+    before = path.read_bytes()
+    with pytest.raises(FileExistsError):
+        theory.write(made(5), path)
+    assert path.read_bytes() == before
+    path.write_bytes(b"\xef\xbb\xbf" + before)
+    assert theory.read(path).budget == budget
+    path.write_bytes(before + "é".encode("latin-1"))
+    with pytest.raises(ValueError, match=r"budget\.csv is not UTF-8"):
+        theory.read(path)
+    with pytest.raises(FileNotFoundError):
+        theory.read(tmp_path / "none.csv")
+
+
+def test_columns_in_any_order_and_only_those_that_are_needed():
+    reading = theory.parse("error_mas,form,name,kind\n.5,noise, b ,random process\n")
+    assert reading.budget.sources == (Source("b", Kind.PROCESS, Form.NOISE, 0.5),)
+
+
+@pytest.mark.parametrize(
+    ("row", "reason"),
+    [
+        ("b,random constant,bias,TBD,,,,,", "error_mas is 'TBD'; a number is needed"),
+        ("b,random constant,bias,,,,,,", "error_mas is ''"),
+        ("b,random constant,bias,?,,,,,", "error_mas is '?'"),
+        ("b,random constant,bias,nan,,,,,", "got error nan; needed a finite number"),
+        ("b,random constant,bias,1,x,,,,", "roll is 'x'; a number is needed"),
+        ("b,random constant,bias,1,,1.5,,,", "got orbit 1.5; needed a factor from 0"),
+        ("b,random constant,bias,1,,,-0.1,,", "got filter -0.1; needed a factor from 0"),
+        ("b,random constant,bias,1,nan,,,,", "got roll nan; needed a factor"),
+        ("b,random,bias,1,,,,,", "kind is 'random'; needed one of deterministic, random constant, random process"),
+        ("b,random constant,biased,1,,,,,", "form is 'biased'; needed one of bias, drift"),
+        (",random constant,bias,1,,,,,", "got name ''; needed text"),
+        ("b,random constant,bias,1", "4 cells; 9 are needed"),
+        ("b,random constant,bias,1,,,,,,more", "10 cells; 9 are needed"),
+        ("a,random constant,bias,1,,,,,", "name 'a' is that of line 2 already"),
+    ],
+)
+def test_a_bad_row_is_refused_by_line_and_the_rest_is_read(row, reason):
+    alone = theory.parse(f"{HEADER}\n{GOOD}\nc,random process,noise,2,,,,,\n").budget
+    reading = theory.parse(f"{HEADER}\n{GOOD}\n\n{row}\nc,random process,noise,2,,,,,\n")
+    assert reading.budget == alone
+    (refused,) = reading.refused
+    assert refused.line == 4
+    assert reason in refused.reason
+    assert list(refused.cells) == row.split(",")
+
+
+def test_a_row_over_several_lines_counts_them():
+    note = '"one\ntwo"'
+    reading = theory.parse(f"{HEADER}\na,random constant,bias,1,,,,,{note}\nb,random constant,bias,x,,,,,\n")
+    assert reading.budget.sources[0].note == "one\ntwo"
+    assert reading.refused[0].line == 4
+
+
+@pytest.mark.parametrize(
+    ("header", "message"),
+    [
+        ("", "line 1: got columns none; needed name, kind, form, error_mas.*name, kind, form, error_mas missing"),
+        ("name,kind,form", "error_mas missing"),
+        ("name,kind,form,error_mas,size", "size unknown or repeated"),
+        ("name,kind,form,error_mas,roll,roll", "roll unknown or repeated"),
+    ],
+)
+def test_a_bad_header_is_refused(header, message):
+    with pytest.raises(ValueError, match=message):
+        theory.parse(header + "\n" + GOOD)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Budget(made(1).sources * 2), "got 's0' more than once"),
+        (lambda: Source(" a", Kind.CONSTANT, Form.BIAS, 1), "got name ' a'; needed text without blanks"),
+        (lambda: Source("a", "random constant", Form.BIAS, 1), "needed a Kind and a Form"),
+        (lambda: theory.equal_error(-1, 3), "got a total of -1 over 3 sources"),
+        (lambda: theory.equal_error(1, 0), "over 0 sources"),
+        (lambda: theory.equal_sources(1, 0), "from errors of 0"),
+        (lambda: theory.cycles_factor(-1), "got -1 cycles"),
+        (lambda: theory.white_factor(0.5), "got 0.5 readings"),
+        (lambda: theory.correlated_factor(1, 0), "got T = 1 and tau = 0"),
+    ],
+)
+def test_bad_input_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

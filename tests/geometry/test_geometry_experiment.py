@@ -1,0 +1,148 @@
+"""gpbnb.geometry.experiment: a simulated year with exact rotations agrees with the analysis, within third order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gpbnb.geometry import experiment, theory
+from gpbnb.geometry.theory import Case
+from gpbnb.measurement import ARCSEC, MAS, deroll, rotation, spin_in_readout, star_in_telescope, theta_of
+
+SIZE = 20 * ARCSEC
+STEP = 7200.0  # long steps in long rolls: as many rolls as the tests have time for
+PERIOD = 5 * 7200.0
+CASES = experiment.misalignment_cases(SIZE)
+
+
+def third_order(case):
+    """Bound of what the analysis leaves out: at most 30 third-order products with coefficients up to one (sympy)."""
+    largest = max(abs(v) for name, value in vars(case).items() for v in value)
+    return 30 * largest**3
+
+
+def test_the_difference_is_that_of_the_chains_with_theta():
+    rng = np.random.default_rng(8)
+    alpha, beta, gamma = rng.uniform(-0.2, 0.2, (3, 3))
+    case = Case(tuple(alpha), tuple(beta), tuple(gamma), drift=(0.1, -0.2))
+    phase = np.linspace(0, 6, 7)
+    theta = theta_of([0, 0.1, -0.2], alpha)
+    gap = spin_in_readout(theta, beta, gamma, phase) - star_in_telescope(alpha, beta, phase)
+    y, z = deroll(gap[:, 1:], phase).T
+    # a dozen rotations of unit vectors
+    assert np.allclose(experiment.difference(case, np.ones(7), phase), np.stack([z, -y], axis=-1), atol=1e-14, rtol=0)
+
+
+def test_the_spin_axis_is_the_first_column_of_the_matrix_of_phi():
+    case = Case(drift=(0.3, 0.5))
+    assert np.allclose(experiment.spin_axis(case, 1.0), rotation([0, 0.3, 0.5])[:, 0], atol=1e-16)
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("period", [None, PERIOD])
+def test_a_year_agrees_with_the_analysis(name, period):
+    case = CASES[name]
+    result, analysed = experiment.year(case, period, STEP).error, theory.effect(case, period is not None)
+    # an angle that grows by SIZE in the year leaves a constant in the mean of a roll
+    rate = np.hypot(*case.gamma_rate[1:]) / theory.YEAR
+    leak = theory.ramp_leak(float(rate), PERIOD, 5) if period else 0.0
+    assert np.hypot(*np.subtract(result.drift, analysed.drift)) <= third_order(case)
+    assert np.hypot(*np.subtract(result.angle, analysed.angle)) <= 1.001 * leak + third_order(case)
+    # the drift itself turns within a roll, too
+    assert result.line == pytest.approx(
+        analysed.line, abs=theory.ramp_leak(theory.GEODETIC / theory.YEAR, PERIOD, 5) * 2 + 1e-3 * SIZE
+    )
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=9, max_size=9))
+def test_any_misalignments(parts):
+    values = np.array(parts) * 1e-4
+    case = Case(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:]))
+    result = experiment.year(case, PERIOD, STEP).error
+    assert np.hypot(*np.subtract(result.drift, theory.effect(case, True).drift)) <= 30 * 1e-12 + 1e-15
+    assert np.hypot(*np.subtract(result.angle, theory.effect(case, True).angle)) <= 30 * 1e-12 + 1e-15
+
+
+def test_the_line_fit_to_samples_keeps_what_the_fit_to_means_drops():
+    case = Case().with_angle("gamma3", SIZE)
+    result = experiment.year(case, PERIOD, STEP)
+    rolls = result.block * len(result.time) * STEP / PERIOD
+    leak = theory.line_fit_leak(SIZE, rolls, 5) / (rolls * PERIOD / theory.YEAR)
+    sampled = np.hypot(*(result.sample_drift - case.drift))
+    assert sampled == pytest.approx(leak, rel=1e-3)
+    assert np.hypot(*(result.drift - case.drift)) <= third_order(case) < sampled / 1e3
+
+
+def test_rolls_that_are_no_whole_number_of_samples():
+    result = experiment.year(Case().with_angle("gamma2", SIZE), 77.5 * 100, 1000.0)
+    assert result.block == 31
+    assert np.hypot(*result.error.drift) <= third_order(result.case)
+    assert result.error.line == pytest.approx(SIZE, rel=1e-3)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=9, max_size=9), st.sampled_from([3, 24, 25]))
+def test_parts_of_a_roll_are_those_of_the_analysis(values, samples):
+    alpha, beta, gamma = (tuple(1e-4 * v for v in values[k : k + 3]) for k in (0, 3, 6))
+    case = Case(alpha, beta, gamma)
+    found = experiment.parts(case, 1.0, samples)
+    left = third_order(case)
+    # to second order β1 turns the mean of the telescope; β1 and γ1 that of the gyro; the difference is `measured`
+    pointing, spin = np.hypot(*alpha[1:]), np.hypot(case.drift[0] + alpha[1], case.drift[1] + alpha[2])
+    assert found["telescope"].mean == pytest.approx(abs(beta[0]) * pointing, abs=left)
+    assert found["gyro"].mean == pytest.approx(abs(beta[0] + gamma[0]) * spin, abs=left)
+    assert found["difference"].mean == pytest.approx(np.hypot(*theory.measured(case, True, 1.0)), abs=left)
+    assert found["telescope"].turning == pytest.approx(np.hypot(*beta[1:]), abs=left)
+    assert found["gyro"].turning == pytest.approx(np.hypot(*np.add(beta, gamma)[1:]), abs=4e-8)
+    assert found["difference"].turning == pytest.approx(np.hypot(*theory.standing(beta, gamma)), abs=left)
+
+
+def test_the_year_is_the_same_in_chunks(monkeypatch):
+    case = CASES["gamma1 and alpha_rate2"]
+    whole = experiment.year(case, PERIOD, STEP)
+    monkeypatch.setattr(experiment, "CHUNK", 100)
+    parts = experiment.year(case, PERIOD, STEP)
+    assert np.array_equal(whole.phi, parts.phi)
+    assert np.array_equal(whole.drift, parts.drift)
+    assert np.allclose(whole.sample_drift, parts.sample_drift, rtol=1e-12)
+
+
+def test_years_run_each_case_both_ways():
+    some = {name: CASES[name] for name in ("no angle", "gamma1")}
+    found = experiment.years(some, STEP, PERIOD)
+    assert list(found) == list(some)
+    for name, (still, rolled) in found.items():
+        assert (still.roll_period, rolled.roll_period) == (None, PERIOD)
+        assert still.case == rolled.case == some[name]
+
+
+@pytest.mark.parametrize("name", theory.SINGLE)
+def test_small_angle_errors_are_the_loss(name):
+    sizes = np.array([1, 30, 1000]) * ARCSEC
+    drift = (theory.GEODETIC, theory.MOTIONAL)
+    errors = experiment.small_angle_errors(name, sizes, drift)
+    # fourth order: the largest angle, 5e-3, against one; and 1e-17 of rounding against errors of 5e-15
+    assert np.allclose(errors, theory.small_angle_loss(name, sizes, drift), rtol=6e-3)
+    assert np.allclose(errors[:2], theory.small_angle_loss(name, sizes[:2], drift), rtol=1e-4, atol=1e-9 * MAS)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: experiment.year(Case(), 0), "got a roll period of 0 s"),
+        (lambda: experiment.year(Case(), 600, -1), "a step of -1 s; needed both above 0"),
+        (lambda: experiment.year(Case(), 600, math.nan), "needed both above 0"),
+        (lambda: experiment.year(Case(), 600, 1e6), "needed a hundred samples in a year"),
+        (lambda: experiment.year(Case(), 600.05), "needed whole tenths of a second"),
+        (lambda: experiment.parts(Case(), samples=2), "got 2 samples in a roll; needed 3 or more"),
+        (lambda: experiment.year(Case(), 600, 300.0), "got 2 samples in whole rolls of 600 s; needed 3 or more"),
+    ],
+)
+def test_bad_input_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

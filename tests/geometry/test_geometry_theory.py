@@ -1,0 +1,143 @@
+"""gpbnb.geometry.theory: closed forms against the expansion by sympy and against sums written out."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from gpbnb.geometry import derivation, theory
+from gpbnb.geometry.derivation import ALPHA, BETA, GAMMA, PHI
+from gpbnb.geometry.theory import Case
+from gpbnb.measurement import ARCSEC, MAS, deroll
+
+NAMES = dict(zip(theory.SINGLE, (*ALPHA, *BETA, *GAMMA), strict=True))
+
+
+@cache
+def mean_errors(order):
+    """Errors of y and z over a mean of whole rolls, from sympy."""
+    return [sp.expand(sp.simplify(derivation.mean(e).doit())) for e in derivation.drift_errors(order)]
+
+
+def test_second_order_of_a_rolling_spacecraft_is_that_of_sympy():
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        values = rng.uniform(-1, 1, 12) * 1e-4
+        case = Case(tuple(values[:3]), tuple(values[3:6]), tuple(values[6:9]), drift=(values[10], values[11]))
+        numbers = dict(zip((*ALPHA, *BETA, *GAMMA, *PHI), values, strict=True))
+        y, z = (float(e.subs(numbers)) for e in mean_errors(2))
+        # products of two numbers of 1e-4; sympy and numpy round them differently by an ulp or two
+        assert np.allclose(theory.measured(case, True, 1.0), [z, -y], rtol=1e-12, atol=1e-22)
+
+
+@pytest.mark.parametrize("name", theory.SINGLE)
+def test_small_angle_loss_is_the_third_order_of_sympy(name):
+    for size, drift in ((1e-3, (3e-5, 2e-5)), (1e-5, (3e-5, -4e-5))):
+        worst = []
+        for signed in (size, -size):
+            numbers = dict.fromkeys((*ALPHA, *BETA, *GAMMA), 0) | {
+                NAMES[name]: signed,
+                PHI[1]: drift[0],
+                PHI[2]: drift[1],
+            }
+            worst.append(math.hypot(*(float(e.subs(numbers)) for e in mean_errors(3))))
+        assert theory.small_angle_loss(name, size, drift) == pytest.approx(max(worst), rel=1e-12)
+
+
+def test_without_roll_the_readout_misalignment_stands_and_the_telescope_one_cancels():
+    g = 1e-4
+    assert theory.measured(Case(gamma=(0, g, 0)), False) == pytest.approx([g, 0], abs=g**2)
+    assert theory.measured(Case(gamma=(0, 0, g)), False) == pytest.approx([0, g], abs=g**2)
+    assert theory.measured(Case(beta=(0, g, g)), False) == pytest.approx([0, 0], abs=1e-20)
+    quarter = theory.measured(Case(gamma=(0, g, 0)), False, phase=math.pi / 2)
+    assert quarter == pytest.approx([0, g], abs=g**2)
+
+
+def test_rolling_removes_what_stands():
+    effect = theory.effect(Case(beta=(0, 1e-4, 2e-4), gamma=(0, 1e-4, -3e-4)), True)
+    assert effect.angle == effect.drift == (0, 0)
+    assert effect.line == pytest.approx(math.hypot(1e-4, 3e-4), rel=1e-4)
+    assert theory.effect(Case(gamma=(0, 1e-4, 0)), False).line == 0
+
+
+def test_effect_of_a_twist_in_milliarcseconds():
+    for name in ("alpha1", "beta1", "gamma1"):
+        drift = theory.effect(Case().with_angle(name, 20 * ARCSEC), True).drift
+        # 20" in radians times 0.04" and 6.6"
+        assert drift[0] / MAS == pytest.approx(20 / 206264.806 * 40, rel=1e-6)
+        assert drift[1] / MAS == pytest.approx(-20 / 206264.806 * 6600, rel=1e-6)
+
+
+def test_printed_deroll_rolls_twice():
+    inertial = np.array([-0.7, 0.3])
+    phase = np.linspace(0, 6, 9)
+    readings = deroll(np.broadcast_to(inertial, (9, 2)), -phase)
+    assert np.allclose(theory.printed_deroll(readings, phase), -deroll(readings, -phase))
+    assert np.allclose(theory.printed_deroll(readings, phase), -deroll(np.broadcast_to(inertial, (9, 2)), -2 * phase))
+
+
+@pytest.mark.parametrize(("samples", "rolls"), [(3, 40), (10, 25), (50, 9)])
+def test_leaks_are_the_sums_written_out(samples, rolls):
+    k = np.arange(samples * rolls)
+    turning = np.exp(2j * np.pi * k / samples)
+    time = (k - k.mean()) / len(k)
+    slope = abs(np.sum(time * turning) / np.sum(time**2))
+    # the sum of squares is that of a line up to one over the square of the number of samples
+    assert theory.line_fit_leak(1, rolls, samples) == pytest.approx(slope, rel=2 / len(k) ** 2)
+    ramp = abs(np.mean(k[:samples] * turning[:samples]))
+    assert theory.ramp_leak(1 / 600, 600.0 * samples, samples) == pytest.approx(ramp, rel=1e-12)
+
+
+def test_leaks_of_many_samples():
+    assert theory.line_fit_leak(1, 100) == pytest.approx(theory.line_fit_leak(1, 100, 10**5), rel=1e-9)
+    assert theory.line_fit_leak(-1, 100) == theory.line_fit_leak(1, 100) == 6 / (100 * math.pi)
+    assert theory.ramp_leak(2, 600) == pytest.approx(theory.ramp_leak(2, 600, 10**5), rel=1e-9)
+
+
+def test_reach_is_where_the_loss_is_the_limit():
+    for name in theory.SINGLE:
+        size = theory.reach(name, MAS)
+        assert theory.small_angle_loss(name, size) == pytest.approx(MAS, rel=1e-9)
+    assert theory.twist_limit(MAS) / ARCSEC == pytest.approx(206264.806 / 6600, rel=1e-6)
+
+
+def test_precession_rates_are_of_the_size_that_is_used():
+    geodetic, motional = theory.precession_rates(640e3)
+    assert geodetic == pytest.approx(theory.GEODETIC, rel=0.01)
+    assert motional == pytest.approx(theory.MOTIONAL, rel=0.05)
+    higher = theory.precession_rates(2000e3)
+    ratio = (theory.RADIUS + 640e3) / (theory.RADIUS + 2000e3)
+    assert np.divide(higher, (geodetic, motional)) == pytest.approx([ratio**2.5, ratio**3])
+
+
+def test_cases():
+    case = Case().with_angle("gamma_rate2", 3e-5).with_angle("beta3", 1e-5)
+    assert case.gamma_rate == (0, 3e-5, 0)
+    assert case.at("gamma", [0, 0.5]).tolist() == [[0, 0, 0], [0, 1.5e-5, 0]]
+    assert case.at("beta", [0, 0.5]).tolist() == [0, 0, 1e-5]
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: Case(alpha=(1, 2)), r"got alpha = \(1, 2\); needed 3 finite numbers, in radians"),
+        (lambda: Case(drift=(1, math.nan)), "got drift = .*; needed 2 finite"),
+        (lambda: Case().with_angle("delta1", 1), "got angle 'delta1'; needed alpha, beta"),
+        (lambda: Case().with_angle("alpha4", 1), "got angle 'alpha4'"),
+        (lambda: Case().with_angle("drift1", 1), "got angle 'drift1'"),
+        (lambda: theory.small_angle_loss("theta1", 1), "got angle 'theta1'; needed one of alpha1"),
+        (lambda: theory.reach("gamma1", -1), "got allowed = -1"),
+        (lambda: theory.twist_limit(0), "got allowed = 0"),
+        (lambda: theory.line_fit_leak(1, 0), "got 0 rolls"),
+        (lambda: theory.line_fit_leak(1, 5, 1), "with 1 samples each"),
+        (lambda: theory.ramp_leak(1, -600), "got a roll period of -600"),
+        (lambda: theory.precession_rates(-1), "got an altitude of -1"),
+    ],
+)
+def test_bad_input_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

@@ -1,0 +1,276 @@
+"""gpbnb.measurement: rotations against scipy, and the measurement matrix against the chain of printed matrices."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import subprocess
+import sys
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
+
+from gpbnb import measurement as m
+
+EPS = np.finfo(float).eps
+angle = st.floats(-1.5, 1.5)
+three = arrays(np.float64, 3, elements=angle)
+phases = st.floats(-400, 400)
+
+
+# -- rotations ------------------------------------------------------------------------------------
+
+
+@given(three, st.permutations([1, 2, 3]))
+def test_rotation_is_that_of_scipy(angles, sequence):
+    # scipy turns vectors, about axes that turn along (capitals); we turn the frame: the transpose
+    oracle = Rotation.from_euler("".join("XYZ"[k - 1] for k in sequence), [angles[k - 1] for k in sequence])
+    # three products of two 3x3 matrices with entries up to one, and sine and cosine: under 10 roundings an entry
+    assert np.abs(m.rotation(angles, sequence) - oracle.as_matrix().T).max() <= 10 * EPS
+
+
+def test_a_turned_frame_sees_a_fixed_vector_turn_back():
+    """A frame that turns from x towards y by a quarter sees the fixed y axis where its own x axis is."""
+    quarter = math.pi / 2
+    for axis, (seen, fixed) in enumerate(([1, 2], [2, 0], [0, 1])):
+        angles = np.zeros(3)
+        angles[axis] = quarter
+        assert np.allclose(m.rotation(angles) @ np.eye(3)[fixed], np.eye(3)[seen], atol=EPS)
+
+
+@given(three)
+def test_angles_of_undoes_rotation(angles):
+    # up to 1.5 the second angle stays 0.07 from the pole, where the others are found 14 times less sharply
+    assert np.abs(m.angles_of(m.rotation(angles)) - angles).max() <= 14 * 10 * EPS
+
+
+@pytest.mark.parametrize("sequence", list(itertools.permutations((1, 2, 3))))
+def test_small_rotation_is_the_first_order_of_every_sequence(sequence):
+    # in an entry stand at most two products of two angles h, or half the sum of two squares; then h^3
+    for h in (1e-2, 1e-3, 1e-4):
+        signs = np.array(list(itertools.product((-h, h), repeat=3)))
+        off = np.abs(m.rotation(signs, sequence) - m.small_rotation(signs)).max()
+        assert h**2 / 2 <= off <= h**2 * (1 + 2 * h)
+
+
+def test_small_rotation_as_printed():
+    a1, a2, a3 = 0.5, 0.25, 0.125
+    assert m.small_rotation([a1, a2, a3]).tolist() == [[1, a3, -a2], [-a3, 1, a1], [a2, -a1, 1]]
+
+
+@given(three, phases)
+def test_roll_is_the_turn_about_the_first_axis(angles, phase):
+    assert np.array_equal(m.roll(phase), m.rotation([phase, 0, 0]))
+    turned = m.roll(phase) @ m.rotation(angles)[:, 0]
+    assert np.allclose(m.star_in_telescope(angles, np.zeros(3), phase), turned, atol=4 * EPS, rtol=0)
+
+
+@given(arrays(np.float64, (4, 2), elements=angle), phases)
+def test_deroll_undoes_roll(inertial, phase):
+    rolled = (m.roll(phase)[1:, 1:] @ inertial.T).T
+    assert np.allclose(m.deroll(rolled, phase), inertial, atol=8 * EPS, rtol=0)
+
+
+# -- the chains of frames -------------------------------------------------------------------------
+
+
+@given(three, three, three, phases)
+def test_chains_are_the_products_of_their_matrices(alpha, beta, gamma, phase):
+    for rotate in (m.rotation, m.small_rotation):
+        chain = rotate(beta) @ m.roll(phase) @ rotate(alpha)
+        star = m.star_in_telescope(alpha, beta, phase, rotate)
+        assert np.allclose(star, chain[:, 0], atol=200 * EPS, rtol=0)
+        spin = m.spin_in_readout(alpha, beta, gamma, phase, rotate)
+        assert np.allclose(spin, (rotate(gamma) @ chain)[:, 0], atol=1000 * EPS, rtol=0)
+
+
+def test_spin_axis_in_the_absolute_frame_has_the_signs_of_7():
+    h = 1e-6
+    for phi, stands in (([0, h, 0], (0, h)), ([0, 0, h], (-h, 0)), ([h, 0, 0], (0, 0))):
+        assert np.allclose(m.rotation(phi)[1:, 0], stands, atol=h**2)
+
+
+@given(*[arrays(np.float64, 3, elements=st.floats(-0.3, 0.3))] * 2)
+def test_theta_leads_from_gyro_over_the_absolute_to_the_intermediate_frame(phi, alpha):
+    theta = m.theta_of(phi, alpha)
+    assert np.allclose(m.rotation(theta), m.rotation(alpha) @ m.rotation(phi), atol=20 * EPS, rtol=0)
+
+
+def test_theta_is_phi_plus_alpha_to_first_order():
+    phi, alpha = np.array([1e-5, 2e-5, -3e-5]), np.array([2e-5, -1e-5, 1e-5])
+    off = np.abs(m.theta_of(phi, alpha) - phi - alpha).max()
+    assert 1e-11 < off < 2 * 3e-5 * 2e-5  # two products of a drift and a pointing angle
+
+
+def test_many_phases_at_once():
+    phase = np.linspace(0, 9, 7)
+    alpha, beta, gamma = np.full(3, 0.1), np.full(3, 0.2), np.full((7, 3), 0.3)
+    spin = m.spin_in_readout(alpha, beta, gamma, phase)
+    assert spin.shape == (7, 3)
+    one = m.spin_in_readout(alpha, beta, gamma[4], phase[4])
+    assert np.array_equal(spin[4], one)
+
+
+# -- the measurement matrix -----------------------------------------------------------------------
+
+ANGLES = {"phi": 0, "alpha": 0, "beta": 0, "gamma": 0}
+
+
+def readings(signal, phase, values, theta, alpha):
+    """The report's own chain with its small-angle matrices, plus bias and scale factor; independent of H."""
+    turns = {name: np.zeros(3) for name in ANGLES}
+    for name, value in values.items():
+        if name[:-1] in turns:
+            turns[name[:-1]][int(name[-1]) - 1] = value
+    star = alpha + turns["alpha"]
+    spin = theta + turns["phi"] + turns["alpha"]
+    roll, B, G = m.roll(phase), m.small_rotation(turns["beta"]), m.small_rotation(turns["gamma"])
+    telescope = (B @ roll @ m.small_rotation(star)[:, 0])[1:]
+    gyro = (G @ B @ roll @ m.small_rotation(spin)[:, 0])[1:] * (1 + values.get("scale", 0))
+    gyro += np.array([values.get("bias_y", 0), values.get("bias_z", 0)])
+    return {"gyro": gyro, "telescope": telescope, "difference": gyro - telescope}[signal]
+
+
+@pytest.mark.parametrize("signal", ["gyro", "telescope", "difference"])
+@pytest.mark.parametrize("state", m.STATES)
+@settings(max_examples=20)
+@given(phase=st.floats(-7, 7), theta=three, alpha=three)
+def test_each_column_is_the_derivative_of_the_printed_chain(signal, state, phase, theta, alpha):
+    # each state enters the chain in one factor, and linearly: half the difference over -1 and 1 is the derivative
+    H = m.measurement_matrix(
+        phase, signal=signal, states=[state], derolled=False, nominal_theta=theta, nominal_alpha=alpha
+    )
+    up, down = (readings(signal, phase, {state: s}, theta, alpha) for s in (1.0, -1.0))
+    assert np.allclose(H[:, 0], (up - down) / 2, atol=40 * EPS, rtol=0)
+
+
+@given(phase=phases, theta=three, alpha=three)
+def test_derolled_is_deroll_of_the_other(phase, theta, alpha):
+    for signal in ("gyro", "telescope", "difference"):
+        body, inertial = (
+            m.measurement_matrix(
+                phase, m.STATES, signal=signal, derolled=flag, nominal_theta=theta, nominal_alpha=alpha
+            )
+            for flag in (False, True)
+        )
+        assert np.allclose(m.deroll(body.T, phase).T, inertial, atol=10 * EPS, rtol=0)
+
+
+def test_against_the_exact_chain():
+    """The linear form differs from exact rotations by products of two angles only."""
+    rng = np.random.default_rng(4)
+    h, phase = 1e-5, np.linspace(0, 2 * np.pi, 9)
+    alpha, beta, gamma, phi = rng.uniform(-h, h, (4, 3))
+    alpha[0] = phi[0] = 0
+    states = ("phi2", "phi3", "alpha2", "alpha3", "beta2", "beta3", "gamma2", "gamma3")
+    x = np.array([phi[1], phi[2], alpha[1], alpha[2], beta[1], beta[2], gamma[1], gamma[2]])
+    linear = m.measurement_matrix(phase, states) @ x
+    exact = m.deroll(m.spin_in_readout(m.theta_of(phi, alpha), beta, gamma, phase)[:, 1:], phase)
+    # twelve angles of at most h: no more than their 66 products and 12 halved squares, most of them absent
+    assert h**2 / 10 < np.abs(linear - exact).max() < 10 * h**2
+
+
+def test_the_ten_states_of_the_filter():
+    assert len(m.GPB_STATES) == 10
+    assert set(m.GPB_STATES) < set(m.STATES)
+    H = m.measurement_matrix(np.zeros(5), nominal_theta=[0, 2.0, 3.0])
+    assert H.shape == (5, 2, 10)
+    assert H[0].tolist() == [
+        [0, -1, 0, 0, 0, -1, 2, 1, 0, -3],
+        [1, 0, 0, 0, 1, 0, 3, 0, 1, 2],
+    ]
+
+
+def test_transverse_misalignments_are_biases():
+    phase = np.linspace(0, 6, 5)
+    for flag in (True, False):
+        H = m.measurement_matrix(phase, ("gamma2", "gamma3", "beta2", "beta3", "bias_y", "bias_z"), derolled=flag)
+        g2, g3, b2, b3, y, z = np.moveaxis(H, -1, 0)
+        for transverse, bias in ((g2, z), (b2, z), (-g3, y), (-b3, y)):
+            assert np.array_equal(transverse, bias)
+
+
+def test_pointing_and_telescope_misalignment_cancel_in_the_difference():
+    H = m.measurement_matrix(np.linspace(0, 6, 5), ("alpha2", "alpha3", "beta2", "beta3"), signal="difference")
+    assert np.all(H == 0)
+
+
+@pytest.mark.parametrize("signal", ["gyro", "telescope", "difference"])
+@pytest.mark.parametrize("derolled", [True, False])
+def test_rows_of_fractions_are_exact_and_those_of_floats_the_matrix(signal, derolled):
+    C, S = Fraction(5, 13), Fraction(-12, 13)
+    theta, alpha = [0, Fraction(1, 3), Fraction(2, 7)], [0, Fraction(-1, 5), Fraction(1, 9)]
+    options = {"signal": signal, "derolled": derolled}
+    exact = m.measurement_rows(C, S, m.STATES, nominal_theta=theta, nominal_alpha=alpha, **options)
+    assert exact.dtype == object
+    assert all(isinstance(entry, int | Fraction) for entry in exact.flat)
+    near = {"nominal_theta": np.array(theta, float), "nominal_alpha": np.array(alpha, float)}
+    floats = m.measurement_matrix(math.atan2(S, C), m.STATES, **near, **options)
+    assert np.allclose(exact.astype(float), floats, atol=10 * EPS, rtol=0)
+
+
+def test_rows_of_one_ring_and_the_telescope_along_its_normal():
+    """What (1) and (2) give along z in the rolling frame, with the signal of the scale factor; all exact."""
+    C, S = np.array([[Fraction(3, 5), Fraction(4, 5)], [Fraction(8, 17), Fraction(-15, 17)]], dtype=object).T
+    known = np.array([[0, Fraction(5), Fraction(2)], [0, Fraction(-1), Fraction(3)]], dtype=object)
+    states = ("phi2", "phi3", "phi2_rate", "phi3_rate", "alpha2", "alpha3", "beta2", "gamma2", "bias_z", "scale")
+    gyro = m.measurement_rows(C, S, states, derolled=False, nominal_theta=known)[:, 1]
+    star = m.measurement_rows(C, S, states, derolled=False, signal="telescope")[:, 1]
+    for k, (c, s) in enumerate(zip(C, S, strict=True)):
+        assert gyro[k].tolist() == [c, s, 0, 0, c, s, 1, 1, 1, c * known[k, 1] + s * known[k, 2]]
+        assert star[k].tolist() == [0, 0, 0, 0, c, s, 1, 0, 0, 0]
+
+
+def test_nominal_angles_may_change_with_the_phase():
+    phase, theta = np.linspace(0, 6, 4), np.arange(12.0).reshape(4, 3)
+    H = m.measurement_matrix(phase, ("scale",), nominal_theta=theta)
+    assert np.array_equal(H[..., 0], np.stack([-theta[:, 2], theta[:, 1]], axis=-1))
+
+
+def test_units():
+    assert pytest.approx(math.pi / 180) == 3600 * m.ARCSEC
+    assert pytest.approx(m.ARCSEC) == 1000 * m.MAS
+
+
+# -- bad input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: m.rotation([1, 2]), r"got angles of shape \(2,\); needed \(\.\.\., 3\)"),
+        (lambda: m.rotation(1.0), r"got angles of shape \(\); needed"),
+        (lambda: m.rotation([1, 2, math.nan]), "got angles with NaN or infinity; needed finite"),
+        (lambda: m.rotation([1, 2, 3], (3, 2, 2)), r"got sequence \(3, 2, 2\); needed each of 1, 2, 3 once"),
+        (lambda: m.small_rotation([[1, 2]]), "got angles of shape"),
+        (lambda: m.angles_of(np.ones(3)), r"got shape \(3,\); needed \(\.\.\., 3, 3\)"),
+        (lambda: m.angles_of(m.small_rotation([0.1, 0, 0])), r"0\.01 from the identity; .* not with small_rotation"),
+        (lambda: m.angles_of(-np.eye(3)), "needed a rotation"),
+        (lambda: m.angles_of(np.full((3, 3), np.nan)), "needed a rotation"),
+        (lambda: m.deroll([1, 2, 3], 0), r"got readings of shape \(3,\); needed \(\.\.\., 2\)"),
+        (lambda: m.roll(math.inf), "got phase with NaN or infinity"),
+        (lambda: m.measurement_matrix(0, ("phi2", "phi4")), "'phi4' is none of them"),
+        (lambda: m.measurement_matrix(0, ("phi2", "phi2")), "needed different names from phi2"),
+        (lambda: m.measurement_matrix(0, ()), "needed different names"),
+        (lambda: m.measurement_matrix(0, signal="both"), "got signal 'both'; needed 'gyro'"),
+        (lambda: m.measurement_matrix(0, nominal_theta=[1, 2]), "got nominal_theta of shape"),
+        (lambda: m.measurement_matrix([0, math.nan]), "got phase with NaN"),
+        (lambda: m.measurement_rows(1, 0, ("phi4",)), "'phi4' is none of them"),
+        (lambda: m.measurement_rows(1, 0, nominal_theta=[1, 2]), r"got nominal_theta of shape \(2,\); needed"),
+        (lambda: m.measurement_rows(1, 0, nominal_alpha=0), r"got nominal_alpha of shape \(\); needed"),
+    ],
+)
+def test_bad_input_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_importing_is_light():
+    code = "import sys, gpbnb.measurement; print(*{'sympy', 'matplotlib', 'scipy', 'numba'} & set(sys.modules))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == []
