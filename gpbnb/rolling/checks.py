@@ -562,7 +562,7 @@ def ramp_density() -> Finding:
         abs(slopes[0] - slopes[1]) < 0.01,
         f"of a year's record, from 10 to 100 cycles a year, the density falls with the power {slopes[0]:.2f} of "
         f"frequency, not {slopes[1]:.2f}: $2k^2T/\\omega^2$",
-        otherwise_note="$k^2/\\omega^4$ is the squared size of a transform, no power density, and of a ramp without end; "
+        otherwise_note="$k^2/\\omega^4$ is the squared size of a transform, no power density, and of an endless ramp; "
         "a record ends with a jump, and its spectrum reaches much farther",
     )
 

@@ -208,7 +208,12 @@ def resets(
 def rotations(results: Sequence[Rotation], drift: float, ax: Axes, title: str = "") -> list[Drawn]:
     """Error in mas of a derolled drift over the year, a colour a format, beside the bound (line)."""
     artists: list[Drawn] = []
-    for colour, result in zip((OBSERVED, *OBSERVED_OTHERS), results, strict=False):
+    colours = (OBSERVED, *OBSERVED_OTHERS)
+    if len(results) > len(colours):
+        raise ValueError(
+            f"got {len(results)} results; needed at most {len(colours)}, or colours repeat; draw two figures"
+        )
+    for colour, result in zip(colours, results, strict=False):
         t = result.step * result.interval
         scale = drift * t / YEAR
         shown = result.size > 0
