@@ -28,6 +28,8 @@ YEAR_SAMPLES = round(YEAR / INTERVAL)
 
 
 def _samples(duration: float, interval: float) -> int:
+    if not (0 < interval < math.inf and 0 < duration < math.inf):
+        raise ValueError(f"got {duration} s with a sample every {interval} s; needed two finite positive numbers")
     n = round(duration / interval)
     if n < 2:
         raise ValueError(f"got {duration:g} s with a sample every {interval:g} s; needed at least 2 samples")
@@ -219,6 +221,8 @@ def derolled_record(
     -------
     stages : "signal", "rolled", "noise", "measured" and "derolled", each (samples,) complex, in mas.
     """
+    if not all(map(math.isfinite, drift)):
+        raise ValueError(f"got drifts {drift}; needed finite numbers, in mas a year")
     n = np.arange(samples)
     ramp = np.asarray(complex(*drift) * (n * interval / YEAR))
     pair = record(level, samples, 2, rng)
@@ -316,8 +320,10 @@ def drift_rates(
     if gyros < 1 or not periods:
         raise ValueError(f"got {gyros} gyros and {len(periods)} roll periods; needed at least 1 of each")
     for period in periods:
-        if period is not None and not period > 0:
+        if period is not None and not 0 < period < math.inf:
             raise ValueError(f"got a roll period of {period} s; needed more than 0, or None for no rolling")
+    if not all(map(math.isfinite, drift)):
+        raise ValueError(f"got drifts {drift}; needed finite numbers, in mas a year")
     sums = np.zeros((len(periods), gyros, 2))
     slope = 2 / (n - 1)  # times run from -1 to 1
     half = (n - 1) * interval / YEAR / 2  # of the record, in years
@@ -406,11 +412,13 @@ def filter_study(
     """
     n = _samples(duration, interval)
     names = [*("single pole" for _ in bandwidths), *("moving average" for _ in bandwidths)]
-    longest = 10 / (4 * min(bandwidths, default=1.0))
-    if not bandwidths or longest > duration / 2:
+    if not len(bandwidths) or not min(bandwidths) > 0:
+        raise ValueError(f"got bandwidths {tuple(bandwidths)} Hz; needed at least one, and each above 0")
+    longest = 10 / (4 * min(bandwidths))
+    if longest > duration / 2:
         raise ValueError(
-            f"got bandwidths {tuple(bandwidths)} Hz for {duration:g} s; needed at least one, and each above "
-            f"{5 / duration:.3g} Hz; take a longer record"
+            f"got bandwidths {tuple(bandwidths)} Hz for {duration:g} s; needed each above {5 / duration:.3g} Hz; take "
+            "a longer record"
         )
     skip = math.ceil(longest / interval)
     squares = np.zeros((len(names), 2 * gyros))

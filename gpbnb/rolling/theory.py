@@ -300,7 +300,9 @@ def rolling_gain(period: float, duration: float = YEAR) -> float:
 
 
 def roll_phase(index: Any, period: float, interval: float = INTERVAL) -> NDArray[np.float64]:
-    """Roll angle, in [0, 2π), at samples counted from 0."""
+    """Roll angle, in [0, 2π), at samples counted from 0; `period` and `interval` in s."""
+    if not (0 < period < math.inf and 0 < interval < math.inf):
+        raise ValueError(f"got a roll period of {period} s, a sample every {interval} s; needed positive numbers")
     return np.asarray(2 * np.pi * np.mod(np.asarray(index) * (interval / period), 1.0))
 
 
