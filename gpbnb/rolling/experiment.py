@@ -643,10 +643,16 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
 def digits_needed_observed(
     method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
 ) -> int:
-    """Least precision from which on a year's deroll of a drift stays within `error` mas, tried from above."""
+    """Least precision from which on a year's deroll of a drift stays within `error` mas.
+
+    Tried downwards from what the bound proves to be enough, and no further than to the first that is not: with fewer
+    digits still, it may stay within by luck.
+    """
+    bound = theory.rotation_bound(method, period, steps[-1])
     rotate = {"recursion": recursion, "direct": direct}[method]
-    least = {2: 53, 10: 18, 16: 13}[base]
-    for precision in range(least, 1, -1):
+    most = {2: 53, 10: 18, 16: 13}[base]
+    enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
+    for precision in range(min(most, enough), 1, -1):
         if rotate(FloatFormat(base, precision), period, steps).drift_error(drift) > error:
             return precision + 1
     return 2

@@ -106,9 +106,12 @@ def flicker(
 def _blocks(
     level: float, samples: int, channels: int, rng: np.random.Generator, block: int
 ) -> Iterator[NDArray[np.float64]]:
+    sources = rng.spawn(channels)
+    if level == 0:
+        yield from (np.zeros((min(block, samples - start), channels)) for start in range(0, samples, block))
+        return
     poles, weights = exponentials()
     states = np.zeros((len(poles), channels))
-    sources = rng.spawn(channels)
     scale = math.sqrt(math.pi * level)
     for start in range(0, samples, block):
         length = min(block, samples - start)

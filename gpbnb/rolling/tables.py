@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.rolling import experiment, theory
@@ -110,17 +109,8 @@ def needed(
                         str(base),
                         method,
                         str(experiment.digits_needed_observed(method, base, drift, period, steps, error)),
-                        str(theory.digits_needed(_bound(method, period, steps[-1]), base, limit)),
+                        str(theory.digits_needed(theory.rotation_bound(method, period, steps[-1]), base, limit)),
                     )
                 )
     header = ("roll period", "base", "method", "digits, observed", "digits, by the bound")
     return Table(f"Digits for {error:g} mas", header, tuple(body))
-
-
-def _bound(method: str, period: float, steps: int):  # type: ignore[no-untyped-def]
-    def of(beta: Fraction) -> float:
-        if method == "recursion":
-            return theory.recursion_bound(steps, beta)
-        return theory.direct_bound(2 * math.pi * steps * theory.INTERVAL / period, beta)
-
-    return of

@@ -486,6 +486,15 @@ def direct_bound(phase: float, beta: Fraction) -> float:
     return abs(phase) * float(gamma(3, beta)) + float(beta)
 
 
+def rotation_bound(method: str, period: float, steps: int, interval: float = INTERVAL) -> Callable[[Fraction], float]:
+    """The bound after some samples, "recursion" or "direct", as a function of the unit roundoff."""
+    if method == "recursion":
+        return lambda beta: recursion_bound(steps, beta)
+    if method == "direct":
+        return lambda beta: direct_bound(2 * math.pi * steps * interval / period, beta)
+    raise ValueError(f'got the method {method!r}; needed "recursion" or "direct"')
+
+
 def digits_needed(bound: Callable[[Fraction], float], base: int, largest: float) -> int:
     """The least precision at which a bound, a function of the unit roundoff, is no larger than `largest`."""
     for precision in range(2, 400):
