@@ -1,0 +1,127 @@
+r"""Causal 1/f noise by the sample: reproducible, of stated density, in bounded memory for any length.
+
+White noise passes through the fractional difference of order one half, whose response is
+:math:`h_k = \binom{2k}{k}/4^k` (Kasdin 1995). As an integral over decays,
+
+.. math:: h_k = \frac1\pi\int_{-\infty}^{\infty} \frac{(1+e^y)^{-k}}{2\cosh(y/2)}\,dy,
+
+it is a sum of some hundred exponentials, found by the trapezoidal rule, which converges here like
+:math:`2\sqrt2\,e^{-\pi^2/\text{step}}`. Each exponential is a filter with one number of memory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+ACCURACY = 1e-6
+"""Of the response h_k, relative, up to `LONGEST`."""
+
+LONGEST = 10**10
+"""Samples up to which the response is accurate: three thousand years at one every 10 s."""
+
+
+def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    r"""Poles p and weights w with :math:`h_k = \sum_j w_j p_j^k`, for 1 ≤ k < `longest`.
+
+    Parameters
+    ----------
+    accuracy : largest relative error of h_k, between 1e-12 and 0.1.
+    longest : number of samples.
+
+    Returns
+    -------
+    poles, weights : (m,) each; m grows as the product of the logarithms of `longest` and 1/`accuracy`.
+
+    Raises
+    ------
+    ValueError : a parameter is out of its range.
+    """
+    if not 1e-12 <= accuracy <= 0.1:
+        raise ValueError(f"got an accuracy of {accuracy}; needed 1e-12 to 0.1")
+    if not 1 <= longest <= LONGEST:
+        raise ValueError(f"got {longest} samples; needed 1 to {LONGEST}")
+    # A third of the error each: the step, the largest y, the slowest decays joined into one that never ends.
+    share = accuracy / 3
+    step = math.pi**2 / math.log(2 * math.sqrt(2) / share)
+    last = -math.log(share) / 1.5
+    first = math.log(share / longest)
+    y = np.arange(first, last + step, step)
+    weights = step / (2 * math.pi * np.cosh(y / 2))
+    weights[0] += step / math.pi * math.exp(first / 2) / (math.exp(step / 2) - 1)
+    return 1 / (1 + np.exp(y)), weights
+
+
+@njit(cache=True, nogil=True)
+def _filter(poles, weights, states, white, out):  # type: ignore[no-untyped-def]
+    channels = white.shape[1]
+    for i in range(white.shape[0]):
+        for c in range(channels):
+            out[i, c] = white[i, c]
+        for j in range(len(poles)):
+            p, w = poles[j], weights[j]
+            for c in range(channels):
+                s = states[j, c]
+                out[i, c] += w * s
+                states[j, c] = p * (s + white[i, c])
+
+
+def flicker(
+    level: float, samples: int, channels: int, rng: np.random.Generator, block: int = 2**15
+) -> Iterator[NDArray[np.float64]]:
+    r"""Independent records of 1/f noise, block by block; each starts at rest.
+
+    The one-sided density of samples taken Δt apart is :math:`\pi A\,\Delta t/\sin(\pi f\Delta t)`, and A/f at low
+    frequencies, whatever Δt. A channel's noise depends neither on the number of channels nor on the block.
+
+    Parameters
+    ----------
+    level : A, in the square of the noise's unit.
+    samples : of each record.
+    channels : number of records.
+    rng : each channel draws from a child of it.
+    block : samples at a time; memory grows with it alone.
+
+    Yields
+    ------
+    noise : (at most `block`, channels); the unit is that of √A.
+
+    Raises
+    ------
+    ValueError : a level that is negative or not finite, no samples or channels, more than `LONGEST` samples.
+    """
+    if not 0 <= level < math.inf:
+        raise ValueError(f"got a noise level of {level}; needed a finite number of at least 0")
+    if samples < 1 or channels < 1 or block < 1:
+        raise ValueError(f"got {samples} samples, {channels} channels, blocks of {block}; needed at least 1 of each")
+    if samples > LONGEST:
+        raise ValueError(f"got {samples} samples; needed at most {LONGEST}; take several records")
+    return _blocks(level, samples, channels, rng, block)
+
+
+def _blocks(
+    level: float, samples: int, channels: int, rng: np.random.Generator, block: int
+) -> Iterator[NDArray[np.float64]]:
+    sources = rng.spawn(channels)
+    if level == 0:
+        yield from (np.zeros((min(block, samples - start), channels)) for start in range(0, samples, block))
+        return
+    poles, weights = exponentials()
+    states = np.zeros((len(poles), channels))
+    scale = math.sqrt(math.pi * level)
+    for start in range(0, samples, block):
+        length = min(block, samples - start)
+        white, out = np.empty((length, channels)), np.empty((length, channels))
+        for c, source in enumerate(sources):
+            white[:, c] = scale * source.standard_normal(length)
+        _filter(poles, weights, states, white, out)
+        yield out
+
+
+def record(level: float, samples: int, channels: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """As :func:`flicker`, in one array (samples, channels)."""
+    return np.concatenate(list(flicker(level, samples, channels, rng)))

@@ -1,0 +1,116 @@
+"""Tables of the chapter on roll and deroll."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rolling import experiment, theory
+from gpbnb.rolling.theory import YEAR
+from gpbnb.tables import Table, digits
+
+
+def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
+    """What rounding ω_r costs in a year: worst case, then as it is."""
+    body = []
+    for fmt in formats:
+        name = digits(fmt) + (", chopped" if fmt.rounding is Rounding.CHOP else "")
+        for case, error in (
+            ("worst", float(theory.worst_rate_error(period, fmt))),
+            ("as rounded", abs(experiment.rounded_rate_error(period, fmt))),
+        ):
+            body.append((name, case, *_cells(error)))
+    header = (
+        "register",
+        "$\\Delta\\omega$",
+        "rad/s",
+        "phase after a year (rad)",
+        "strength lost, one dimension",
+        "drift across, two dimensions (mas a year)",
+    )
+    return Table(f"What rounding the roll rate of {period:g} s costs", header, tuple(body))
+
+
+def _cells(error: float) -> tuple[str, ...]:
+    across = theory.off_tuned_drift(theory.DRIFTS[0], error)
+    return f"{error:.3e}", f"{error * YEAR:.3e}", f"{theory.off_tuned_loss(error):.3e}", f"{across:.3g}"
+
+
+def phase_costs(angles: Mapping[str, float], drift: tuple[float, float] = theory.DRIFTS) -> Table:
+    """Cost of a constant phase error: share of power in one dimension, error of both drifts in two."""
+    body = []
+    for name, angle in angles.items():
+        x, y = theory.phase_error_cost(drift, angle)
+        body.append((name, f"{100 * math.sin(angle) ** 2:.3g} %", f"{x:.3g}", f"{y:.3g}"))
+    header = ("phase error", "power lost, one dimension", "geodetic (mas a year)", "frame dragging (mas a year)")
+    return Table("What a phase error costs", header, tuple(body))
+
+
+def drift_errors(study: experiment.DriftStudy) -> Table:
+    """Standard errors of drift, simulated and in closed form; and what rolling buys."""
+    found = study.standard_error()
+    duration = study.samples * study.interval
+    plain = theory.drift_error_unrolled(study.level, duration, at_rest=True)
+    body = []
+    for i, period in enumerate(study.periods):
+        closed = plain
+        if period is not None:
+            closed = theory.drift_error_rolled(study.level, period, duration, study.interval)
+        body.append(
+            (
+                "none" if period is None else f"{period:g} s",
+                f"{found[i]:.3g} ± {found[i] * study.uncertainty():.1g}",
+                f"{closed:.3g}",
+                f"{(found[i] / closed - 1) / study.uncertainty():+.1f}",
+                f"{plain / closed:.3g}",
+            )
+        )
+    header = ("roll period", "simulated", "closed form", "difference / standard error", "better than without")
+    return Table("Standard error of a drift rate (mas a year)", header, tuple(body))
+
+
+def filters(
+    named: Mapping[str, object], drift: float, level: float, period: float, samples: int, interval: float
+) -> Table:
+    """Filters beside each other: lag, noise in the band, slow noise let through, and the image of one dimension."""
+    density = float(theory.flicker_density(level, 1 / period, interval))
+    body = []
+    for name, weights in named.items():
+        image = experiment.image_behind(weights, drift, period, samples, interval)  # type: ignore[arg-type]
+        total = theory.filtered_variance(weights, level, samples, period, interval)
+        body.append(
+            (
+                name,
+                f"{drift / YEAR * theory.filter_lag(weights, interval):.3g}",
+                f"{math.sqrt(density * theory.noise_bandwidth(weights, interval)):.3g}",
+                f"{math.sqrt(theory.pedestal(weights, level, samples, period, interval)):.2g}",
+                f"{math.sqrt(total):.3g}",
+                f"{abs(image).max():.2g}",
+            )
+        )
+    header = ("filter", "lag", "noise in the band", "slow noise let through", "noise, exact", "image, one dimension")
+    return Table("What filters leave, in mas at the end of the record", header, tuple(body))
+
+
+def needed(
+    periods: Sequence[float], bases: Sequence[int], drift: float, steps: Sequence[int], error: float = 1.0
+) -> Table:
+    """Digits with which a year's deroll of a drift stays within an error in mas: observed, and by the bound."""
+    body = []
+    duration = steps[-1] * theory.INTERVAL
+    limit = error / (drift * duration / YEAR)
+    for period in periods:
+        for base in bases:
+            for method in ("recursion", "direct"):
+                body.append(
+                    (
+                        f"{period:g} s",
+                        str(base),
+                        method,
+                        str(experiment.digits_needed_observed(method, base, drift, period, steps, error)),
+                        str(theory.digits_needed(theory.rotation_bound(method, period, steps[-1]), base, limit)),
+                    )
+                )
+    header = ("roll period", "base", "method", "digits, observed", "digits, by the bound")
+    return Table(f"Digits for {error:g} mas", header, tuple(body))

@@ -1,0 +1,248 @@
+"""gpbnb.rolling.experiment: simulations against closed forms, within their standard errors; refusals."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from gpbnb.formats import FloatFormat
+from gpbnb.rolling import checks, experiment, theory
+from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
+
+
+def rng(seed=0):
+    return np.random.default_rng(seed)
+
+
+# -- through roll and deroll ----------------------------------------------------------------------------
+
+
+def test_the_stages_are_those_of_5_to_7():
+    found = experiment.derolled_record(DRIFTS, 30.0, 77.5, rng(1), 200, 10.0)
+    for n in (0, 3, 77, 199):
+        r = theory.rotation(2 * math.pi * n * 10 / 77.5)
+        s = np.array(DRIFTS) * (n * 10 / YEAR)
+        noise = np.array([found["noise"][n].real, found["noise"][n].imag])
+        for name, expected in (
+            ("signal", s),
+            ("rolled", r @ s),
+            ("measured", r @ s + noise),
+            ("derolled", s + r.T @ noise),
+        ):
+            assert [found[name][n].real, found[name][n].imag] == pytest.approx(list(expected), abs=1e-11)
+    assert np.std(found["noise"].real) > 5
+    assert not np.array_equal(found["noise"].real, found["noise"].imag)
+
+
+@pytest.mark.parametrize("angle", [1e-4, math.radians(1), 0.4])
+def test_a_phase_error_costs_what_theory_says(angle):
+    found = experiment.clean_drift_error(DRIFTS, lambda t: np.full(t.shape, angle))
+    assert found == pytest.approx(theory.phase_error_cost(DRIFTS, angle), rel=1e-8)
+
+
+@pytest.mark.parametrize("digits", [6, 8, 10])
+def test_an_off_tuned_deroll_costs_what_theory_says(digits):
+    rate = experiment.rounded_rate_error(600.0, FloatFormat(10, digits))
+    found = experiment.clean_drift_error((6600.0, 0.0), lambda t: rate * t)
+    expected = theory.fitted_drift((6600.0, 0.0), lambda t: rate * t) - np.array([6600.0, 0.0])
+    # The sum over samples 100 s apart differs from the integral by about their number to the minus one.
+    assert found == pytest.approx(expected, rel=1e-4, abs=1e-7)
+
+
+def test_rounded_rates():
+    assert experiment.rounded_rate_error(600.0, FloatFormat(10, 6)) == pytest.approx(
+        0.0104720 - math.pi / 300, rel=1e-8
+    )
+    assert experiment.rounded_rate_error(600.0, FloatFormat(10, 10)) == pytest.approx(-1.966e-12, rel=1e-3)
+
+
+# -- spectra --------------------------------------------------------------------------------------------
+
+
+def test_the_spectra_of_the_figures():
+    found = checks.spectra()
+    duration, n = found.duration, len(found.base_noise)
+    base = theory.ramp_density(found.drift, duration, np.arange(1, n + 1) / duration)
+    assert found.base_signal[:5] == pytest.approx(base[:5], rel=1e-3)
+    near = abs(found.offset) <= 5
+    line = theory.ramp_density(found.drift, duration, found.offset / duration) / 4
+    assert found.line_signal[near] == pytest.approx(line[near], rel=0.02)
+    # Means of 4 gyros' two readouts over independent frequencies.
+    roll = float(theory.flicker_density(found.level, 1 / found.period))
+    assert np.mean(found.line_noise) == pytest.approx(roll, rel=4 / math.sqrt(8 * len(found.offset)))
+    assert np.mean(found.base_noise) == pytest.approx(roll, rel=4 / math.sqrt(8 * n))
+    bands = found.derolled.frequency < 0.3 / found.period
+    z = (found.derolled.density / theory.derolled_density(found.level, found.period, found.derolled.frequency) - 1)[
+        bands
+    ]
+    # A slow part leaks from the roll frequency through the window that is not there.
+    assert np.max(abs(z / found.derolled.error[bands])) < 4.5
+    peak = np.argmax(found.derolled.density)
+    assert abs(math.log(found.derolled.frequency[peak] * found.period)) < 0.3
+
+
+def test_bands_have_the_mean_of_one_over_f_without_bias():
+    f = np.arange(1, 5000) * 1e-3
+    found = experiment.in_bands(f, 3 / f, 2.0, 1e-3, 4.0, 12)
+    assert found.density == pytest.approx(3 / found.frequency, rel=1e-12)
+    assert np.sum(found.averages) == 2 * np.count_nonzero((f >= 1e-3) & (f < 4.0))
+    assert found.error == pytest.approx(found.averages**-0.5)
+    exact = experiment.fit_slope(
+        experiment.Spectrum(found.frequency, 5 * found.frequency**-1.5, np.full(12, 1e12)), 1e-9
+    )
+    assert exact.value == pytest.approx(-1.5, abs=1e-9)
+
+
+# -- drift rates --------------------------------------------------------------------------------------------
+
+
+def test_drift_rates_are_those_of_whole_records():
+    """The slow way: all in one array, fitted by np.polyfit."""
+    n, interval = 3000, 10.0
+    study = experiment.drift_rates([None, 77.5], 2, rng(4), LEVEL, n * interval, interval)
+    pairs = experiment.record(LEVEL, n, 4, rng(4))
+    t = np.arange(n) * interval
+    for g in range(2):
+        noise = pairs[:, 2 * g] + 1j * pairs[:, 2 * g + 1]
+        for p, period in enumerate((None, 77.5)):
+            turn = 1 if period is None else np.exp(1j * theory.roll_phase(np.arange(n), period))
+            z = complex(*DRIFTS) * t / YEAR
+            back = (z / turn + noise) * turn
+            fitted = [np.polyfit(t, part, 1)[0] * YEAR for part in (back.real, back.imag)]
+            scale = np.max(abs(study.errors))
+            assert study.errors[p, g] == pytest.approx(np.array(fitted) - np.array(DRIFTS), abs=1e-8 * scale)
+
+
+def test_standard_errors_of_short_records_agree_with_the_exact_ones():
+    n, gyros = 2400, 400
+    study = experiment.drift_rates([None, 600.0, 77.5], gyros, rng(12), duration=n * 10.0)
+    exact = [theory.drift_error(LEVEL, n, p) for p in study.periods]
+    assert study.uncertainty() == pytest.approx(1 / 40)
+    assert np.max(abs(study.standard_error() / exact - 1)) < 4 * study.uncertainty()
+    assert np.max(abs(np.mean(study.errors, axis=(1, 2)))) < 4 * max(exact) / math.sqrt(2 * gyros)
+
+
+def test_the_stored_survey_agrees_with_theory():
+    study = experiment.survey()
+    assert study.errors.shape == (5, 128, 2)
+    closed = [
+        theory.drift_error_unrolled(LEVEL, at_rest=True)
+        if p is None
+        else theory.drift_error_rolled(LEVEL, p, YEAR, study.interval)
+        for p in study.periods
+    ]
+    z = (study.standard_error() / closed - 1) / study.uncertainty()
+    assert np.max(abs(z)) < 3.5
+    # What rolling buys, from simulation alone.
+    gain = study.standard_error()[0] / study.standard_error()[-1]
+    expected = theory.rolling_gain(77.5) * (8 / 9) ** 0.5
+    assert gain == pytest.approx(expected, rel=4 * 2**0.5 * study.uncertainty())
+
+
+def test_the_stored_survey_is_computed_again_for_one_gyro_to_the_last_digit():
+    study = experiment.drift_rates(experiment.SURVEY_PERIODS, 1, experiment.survey_rng())
+    assert study.samples == 3153600
+    lines = experiment.SURVEY.read_text(encoding="utf-8").splitlines()
+    assert experiment.write_survey(study).splitlines() == lines[:2]
+    assert experiment.write_survey(experiment.survey()).splitlines() == lines
+
+
+def peak(samples):
+    tracemalloc.start()
+    try:
+        experiment.drift_rates([None, 77.5], 8, rng(), duration=samples * 10.0)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_memory_does_not_grow_with_the_record():
+    peak(100)
+    block = 2**18 // 8
+    assert peak(5 * block) < 1.05 * peak(2 * block)
+
+
+# -- filters ---------------------------------------------------------------------------------------------------
+
+
+def test_filtered_drifts_agree_with_lag_and_exact_noise():
+    study = checks.filter_study()
+    expected = checks.expected_squares(study)
+    assert np.max(abs(study.error - expected) / study.uncertainty) < 4
+    assert np.max(study.uncertainty / study.error) < 0.06
+    closed = theory.filtered_error(study.drift, theory.FLOWN_DENSITY, study.bandwidth)
+    at_best = [1, 4]
+    assert study.error[at_best] == pytest.approx(closed[at_best], rel=0.08)
+    assert np.argmin(study.error[:3]) == 1 == np.argmin(study.error[3:])
+
+
+def test_the_image_behind_filters_is_that_of_their_gain():
+    n = 20000
+    for weights in (theory.single_pole(400.0), theory.moving_average(1300.0)):
+        image = experiment.image_behind(weights, 6600.0, 600.0, n)
+        gain = float(theory.filter_gain(weights, 2 / 600.0))
+        at_end = 6600.0 / YEAR * 10 * n
+        # The ramp has grown by the filter's memory meanwhile.
+        assert np.max(abs(image)) == pytest.approx(gain * at_end, rel=0.02)
+    whole = experiment.image_behind(theory.moving_average(1200.0), 6600.0, 600.0, n)
+    assert np.max(abs(whole)) < 0.02 * 6600.0 / YEAR * 10 * n
+
+
+# -- roll rate -----------------------------------------------------------------------------------------------------
+
+
+def test_wandering_roll_rates_agree_with_theory():
+    errors = checks.walk_errors()
+    sizes = np.sqrt(np.mean(errors**2, axis=1))
+    for size, reset in zip(sizes, (None, 60000.0), strict=True):
+        expected = theory.rate_walk_error(DRIFTS[0], checks.WALK, reset=reset)
+        assert size == pytest.approx(expected, rel=4 / math.sqrt(2 * errors.shape[1]))
+    assert sizes[0] > 300 * sizes[1]
+
+
+def test_sinusoidal_roll_rates_agree_with_theory():
+    period, step, trials, a = 6000.0, 100.0, 150, 1e-6
+    rates = experiment.rate_sines(a, period, trials, 60 * 1000, step, rng(7))
+    errors = experiment.roll_rate_errors(6600.0, rates, step, [None, 60, 120, 30])
+    sizes = np.sqrt(np.mean(errors**2, axis=1))
+    expected = theory.rate_sine_error(6600.0, a, period)
+    # The mean of sin² over random phases has the relative standard error sqrt(1/2)/sqrt(trials).
+    assert sizes[:3] == pytest.approx([expected] * 3, rel=4 * 0.5 * math.sqrt(0.5 / trials))
+    assert np.max(abs(errors[1] - errors[0])) < 1e-3 * expected
+    assert sizes[3] < 0.01 * expected
+
+
+def test_rate_walks_have_their_variance():
+    ends = np.array([walk[-1] for walk in experiment.rate_walks(2e-6, 500, 100, 5.0, rng(3))])
+    assert np.mean(ends**2) == pytest.approx(2e-6 * 500, rel=4 * math.sqrt(2 / 500))
+
+
+# -- refusals -------------------------------------------------------------------------------------------------
+
+REFUSED = [
+    (experiment.drift_rates, ([], 1, rng()), "got 1 gyros and 0 roll periods; needed at least 1 of each"),
+    (experiment.drift_rates, ([None], 0, rng()), "got 0 gyros and 1 roll periods"),
+    (experiment.drift_rates, ([-5.0], 1, rng()), "got a roll period of -5.0 s; needed more than 0, or None"),
+    (experiment.drift_rates, ([None], 1, rng(), 1.0, 10.0), "got 10 s with a sample every 10 s; needed at least 2"),
+    (experiment.drift_rates, ([None], 1, rng(), 1.0, 10.0, 0.0), "got 10.0 s with a sample every 0.0 s; needed two"),
+    (experiment.drift_rates, ([None], 1, rng(), 1.0, math.nan), "got nan s with a sample every 10.0 s; needed two"),
+    (experiment.drift_rates, ([math.inf], 1, rng()), "got a roll period of inf s; needed more than 0, or None"),
+    (experiment.drift_rates, ([None], 1, rng(), 1.0, 1e4, 1e1, (math.nan, 0.0)), "got drifts .*; needed finite"),
+    (experiment.derolled_record, ((0.0, math.inf), 1.0, 600.0, rng(), 10), "got drifts .*; needed finite numbers"),
+    (experiment.derolled_record, ((0.0, 0.0), 1.0, 0.0, rng(), 10), "got a roll period of 0.0 s, a sample every 10"),
+    (experiment.filter_study, (1.0, [], 1, rng()), r"got bandwidths \(\) Hz; needed at least one, and each above 0"),
+    (experiment.filter_study, (1.0, [1.0, -1.0], 1, rng()), r"got bandwidths \(1.0, -1.0\) Hz; needed at least one"),
+    (experiment.filter_study, (1.0, [1e-9], 1, rng()), "needed each above .* Hz; take a longer record"),
+    (experiment.spectra, (1.0, rng(), 1, 1.0, 600.0, 100), "got 1.66667 turns; needed a whole number above 25"),
+    (experiment.spectra, (1.0, rng(), 1, 1.0, 600.0, 600), "got 10 turns; needed a whole number above 25"),
+    (experiment.image_behind, (np.ones(50), 1.0, 600.0, 60), "got 60 samples for a filter of 50; needed 60 more"),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments", "message"), REFUSED)
+def test_refused_with_what_came_and_what_was_needed(function, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        function(*arguments)

@@ -1,0 +1,186 @@
+"""gpbnb.rolling.flicker: the response, the density over four decades, causality, reproducibility, bounded memory."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tracemalloc
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb.rolling import experiment, theory
+from gpbnb.rolling.flicker import LONGEST, exponentials, flicker, record
+
+LEVEL = 7.0
+
+
+def rng(seed=0):
+    return np.random.default_rng(seed)
+
+
+# -- the response ---------------------------------------------------------------------------------
+
+
+def test_the_response_is_that_of_the_binomial_coefficients():
+    h = theory.impulse_response(200)
+    exact = [Fraction(math.comb(2 * k, k), 4**k) for k in range(200)]
+    # One rounding for the quotient and one for the product of each lag.
+    assert all(
+        abs(Fraction(x) / y - 1) <= 2 * k * Fraction(2) ** -52 for k, (x, y) in enumerate(zip(h, exact, strict=True))
+    )
+    assert len(theory.impulse_response(1)) == 1
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9])
+def test_a_sum_of_exponentials_is_the_response_to_the_accuracy_asked_for(accuracy):
+    longest = 10**6
+    poles, weights = exponentials(accuracy, longest)
+    h = theory.impulse_response(longest)
+    lags = np.unique(np.geomspace(1, longest - 1, 80).astype(int))
+    error = [abs(math.fsum(weights * poles**k) / h[k] - 1) for k in lags]
+    assert max(error) <= accuracy
+    assert max(error) > accuracy / 30  # no more exponentials than needed
+    assert len(poles) < 150
+
+
+def test_it_is_accurate_for_three_thousand_years():
+    poles, weights = exponentials()
+    for k in (1e7, 1e8, 1e9, 1e10):
+        # Stirling's series for binom(2k, k)/4^k
+        assert math.fsum(weights * poles**k) * math.sqrt(math.pi * k) * (1 + 1 / (8 * k)) == pytest.approx(1, abs=1e-6)
+    assert np.all((poles > 0) & (poles <= 1))
+    assert np.all(weights > 0)
+
+
+def test_the_noise_is_white_noise_through_the_full_response():
+    """The slow way: a convolution with every lag."""
+    n, seed = 5000, 11
+    white = math.sqrt(math.pi * LEVEL) * rng(seed).spawn(2)[1].standard_normal(n)
+    slow = np.convolve(white, theory.impulse_response(n))[:n]
+    fast = record(LEVEL, n, 2, rng(seed))[:, 1]
+    assert np.max(abs(fast - slow)) < 2e-6 * np.max(abs(slow))
+
+
+# -- what a record depends on -----------------------------------------------------------------------
+
+
+def test_blocks_channels_and_length_do_not_change_a_record():
+    whole = record(LEVEL, 1000, 3, rng(5))
+    pieces = np.concatenate(list(flicker(LEVEL, 1000, 3, rng(5), block=37)))
+    assert np.array_equal(whole, pieces)
+    assert np.array_equal(whole[:, :1], record(LEVEL, 1000, 1, rng(5)))
+    assert np.array_equal(whole[:400], record(LEVEL, 400, 3, rng(5)))
+    assert not np.array_equal(whole, record(LEVEL, 1000, 3, rng(6)))
+    assert [len(b) for b in flicker(LEVEL, 100, 1, rng(), block=40)] == [40, 40, 20]
+
+
+def test_channels_are_independent():
+    x = record(1.0, 2**15, 6, rng(8))
+    k = np.arange(1, len(x))
+    inverse = np.concatenate([[1.0], np.cumprod((k - 1.5) / k)])  # the difference of order one half the other way
+    white = signal.fftconvolve(x, inverse[:, np.newaxis], axes=0)[: len(x)]
+    assert np.std(white) == pytest.approx(math.sqrt(math.pi), rel=0.01)
+    correlation = np.corrcoef(white.T)[np.triu_indices(6, 1)]
+    assert np.max(abs(correlation)) < 4 / math.sqrt(2**15)
+
+
+def test_the_level_is_a_variance():
+    assert np.allclose(record(9.0, 500, 1, rng(2)), 3 * record(1.0, 500, 1, rng(2)), rtol=1e-13)
+    assert not record(0.0, 50, 1, rng(2)).any()
+
+
+def test_the_variance_grows_as_the_sum_of_squares_of_the_response():
+    n, channels = 300, 4000
+    last = record(LEVEL, n, channels, rng(3))[-1]
+    expected = math.pi * LEVEL * np.sum(theory.impulse_response(n) ** 2)
+    assert np.mean(last**2) == pytest.approx(expected, rel=4 * math.sqrt(2 / channels))
+
+
+# -- the density --------------------------------------------------------------------------------------
+
+
+def test_the_slope_over_four_decades():
+    found = experiment.noise_spectrum(rng(2), samples=2**20, channels=4)
+    slope = experiment.fit_slope(found)
+    assert abs(slope.value + 1) < 3.5 * slope.error < 0.01
+    assert slope.decades > 4
+    expected = theory.flicker_density(theory.LEVEL, found.frequency, theory.INTERVAL)
+    z = (found.density / expected - 1) / found.error
+    # 24 nearly normal values: their mean square has the standard error sqrt(2/24) = 0.3.
+    assert 0.1 < np.mean(z**2) < 1.9
+    assert np.max(abs(z)) < 4
+
+
+@pytest.mark.parametrize("exponent", [0.9, 1.1])
+def test_another_slope_would_be_noticed(exponent):
+    """White noise through the fractional difference of another order."""
+    n = 2**18
+    k = np.arange(1, n)
+    h = np.concatenate([[1.0], np.cumprod((k - 1 + exponent / 2) / k)])
+    white = rng(1).standard_normal((4, n))
+    x = np.array([signal.fftconvolve(w, h)[:n] for w in white]).T
+    f, p, averages = experiment.welch(x, 10.0, 2**16)
+    slope = experiment.fit_slope(experiment.in_bands(f, p, averages, 4 / (2**16 * 10), 0.012, 20))
+    assert abs(slope.value + 1) > 20 * slope.error
+    assert slope.value == pytest.approx(-exponent, abs=0.02)  # sampling adds to the slope where the order is another
+
+
+def test_the_standard_error_of_a_band_is_right():
+    """White noise, whose density is known and level: the spread over bands and records is that stated."""
+    z = []
+    for seed in range(12):
+        x = rng(seed).standard_normal((2**14, 2))
+        f, p, averages = experiment.welch(x, 1.0, 2**11)
+        band = experiment.in_bands(f, p, averages, 0.05, 0.45, 8)
+        mean = [np.sum(f[(f >= a) & (f < b)]) / np.sum(f[(f >= a) & (f < b)] > 0) / m for a, b, m in _edges(band)]
+        z += list((band.density / (2 * np.array(mean)) - 1) / band.error)
+    # 96 values: their mean square has the standard error sqrt(2/96) = 0.14.
+    assert np.mean(np.square(z)) == pytest.approx(1, abs=0.6)
+
+
+def _edges(band):
+    edges = np.geomspace(0.05, 0.45, 9)
+    return [(a, b, m) for (a, b), m in zip(itertools.pairwise(edges), band.frequency, strict=True)]
+
+
+# -- memory and refusals --------------------------------------------------------------------------------
+
+
+def peak(samples):
+    tracemalloc.start()
+    try:
+        for _ in flicker(1.0, samples, 2, rng(), block=2**12):
+            pass
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_memory_does_not_grow_with_the_length():
+    peak(10)
+    short, long = peak(2**13), peak(2**17)
+    assert long < 1.2 * short
+    assert short < 2**20
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        (flicker, (-1.0, 10, 1, rng()), "got a noise level of -1.0; needed a finite number"),
+        (flicker, (math.nan, 10, 1, rng()), "got a noise level of nan"),
+        (flicker, (math.inf, 10, 1, rng()), "got a noise level of inf"),
+        (flicker, (1.0, 0, 1, rng()), "got 0 samples, 1 channels, blocks of 32768; needed at least 1 of each"),
+        (flicker, (1.0, 5, 0, rng()), "got 5 samples, 0 channels"),
+        (flicker, (1.0, 5, 1, rng(), 0), "blocks of 0"),
+        (flicker, (1.0, LONGEST + 1, 1, rng()), "needed at most 10000000000; take several records"),
+        (exponentials, (0.5,), "got an accuracy of 0.5; needed 1e-12 to 0.1"),
+        (exponentials, (1e-13,), "got an accuracy of 1e-13"),
+        (exponentials, (1e-6, 0), "got 0 samples; needed 1 to"),
+    ],
+)
+def test_refused_at_once(function, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        function(*arguments)

@@ -1,0 +1,154 @@
+"""Rotations in t digits: digit for digit as with exact arithmetic, within their bounds, and what they cost."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import oracles
+import pytest
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rolling import experiment, theory
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FORMATS = [
+    FloatFormat(b, t, r) for b, t in ((2, 5), (2, 24), (2, 53), (10, 3), (10, 8), (10, 12), (16, 6)) for r in Rounding
+]
+PERIODS = [600.0, 77.5]
+
+
+def exact_angle(n, period):
+    """Cosine and sine of n steps of 10 s, as Fractions; the whole angle, not its part of a turn."""
+    with mpmath.workdps(60):
+        x = 2 * mpmath.pi * 10 * n / mpmath.mpf(period)
+        return [Fraction(mpmath.nstr(f(x), 50)) for f in (mpmath.cos, mpmath.sin)]
+
+
+def slow(fmt, period, steps):
+    def fl(x):
+        return oracles.rounded(x, fmt.base, fmt.precision, fmt.rounding is NEAREST)
+
+    a, b = (fl(x) for x in exact_angle(1, period))
+    c, s = Fraction(1), Fraction(0)
+    for n in range(1, steps + 1):
+        c, s = fl(fl(c * a) - fl(s * b)), fl(fl(s * a) + fl(c * b))
+        yield n, c, s
+
+
+def errors_of(n, c, s, period):
+    cosine, sine = exact_angle(n, period)
+    size = float(mpmath.sqrt(mpmath.mpf(float((c - cosine) ** 2 + (s - sine) ** 2))))
+    amplitude = math.sqrt(float(c * c + s * s)) - 1
+    phase = float((s * cosine - c * sine) / (c * cosine + s * sine))
+    return size, amplitude, math.atan(phase)
+
+
+@pytest.mark.parametrize("fmt", FORMATS)
+@pytest.mark.parametrize("period", PERIODS)
+def test_the_compiled_recursion_is_that_of_exact_fractions(fmt, period):
+    marks = [1, 2, 7, 40, 100]
+    found = experiment.recursion(fmt, period, marks)
+    expected = {n: errors_of(n, c, s, period) for n, c, s in slow(fmt, period, 100) if n in marks}
+    for i, n in enumerate(marks):
+        size, amplitude, phase = expected[n]
+        assert found.size[i] == pytest.approx(size, rel=1e-7, abs=1e-30)
+        # The oracle's amplitude is a difference of two numbers near one.
+        assert found.amplitude[i] == pytest.approx(amplitude, abs=1e-15 + size**2)
+        assert found.phase[i] == pytest.approx(phase, rel=1e-6, abs=1e-16 + 1e-9 * size)
+    assert (found.method, found.period, list(found.step)) == ("recursion", period, marks)
+
+
+@pytest.mark.parametrize("fmt", FORMATS)
+@pytest.mark.parametrize("period", PERIODS)
+def test_errors_are_within_their_bounds_and_not_far_below(fmt, period):
+    marks = list(range(1, 200, 7))
+    for rotate, least in ((experiment.recursion, 0.005), (experiment.direct, 0.15)):
+        found = rotate(fmt, period, marks)
+        assert np.all(found.size <= found.bound)
+        assert np.max(found.size / found.bound) > least
+        # Amplitude and phase are the two parts of the error.
+        small = found.size < 1e-3
+        both = np.hypot(found.amplitude, found.phase)
+        assert both[small] == pytest.approx(found.size[small], rel=2e-3)
+
+
+def test_direct_evaluation_is_that_of_the_rounded_product():
+    fmt, period, n = FloatFormat(10, 7), 77.5, 123457
+    found = experiment.direct(fmt, period, [n])
+    angle = fmt.round(fmt.round(theory.roll_rate(period)) * fmt.round(n * 10))
+    with mpmath.workdps(50):
+        x = mpmath.mpf(angle.numerator) / angle.denominator
+        c, s = (fmt.round(Fraction(mpmath.nstr(f(x), 40))) for f in (mpmath.cos, mpmath.sin))
+    assert found.size[0] == pytest.approx(errors_of(n, c, s, period)[0], rel=1e-9)
+    assert found.bound[0] == pytest.approx(theory.direct_bound(2 * math.pi * n * 10 / period, fmt.unit_roundoff))
+
+
+def test_a_year_is_within_its_bound():
+    marks = np.unique(np.geomspace(1, 3153600, 40).astype(int))
+    for fmt in (FloatFormat(10, 10), FloatFormat(2, 40), FloatFormat(10, 12, CHOP)):
+        found = experiment.recursion(fmt, 77.5, marks)
+        ratio = found.size / found.bound
+        assert np.max(ratio) <= 1
+        assert np.max(ratio) > 0.005
+        assert found.bound[-1] == pytest.approx(3153600 * (1 + 2 * 2**0.5) * float(fmt.unit_roundoff), rel=0.01)
+
+
+def test_chopping_shrinks_the_amplitude_steadily():
+    marks = np.linspace(1000, 20000, 5).astype(int)
+    found = experiment.recursion(FloatFormat(10, 10, CHOP), 77.5, marks)
+    assert np.all(found.amplitude < 0)
+    assert np.all(np.diff(found.amplitude) < 0)
+    assert found.amplitude[-1] / found.amplitude[0] == pytest.approx(20, rel=0.2)
+
+
+def test_a_rounded_rotation_may_lock_into_a_cycle():
+    """With sixty samples a turn and few digits the error stops growing; the bound knows nothing of it."""
+    found = experiment.recursion(FloatFormat(10, 4), 600.0, [60000, 60060, 120000, 600000])
+    assert found.size[2] == found.size[0] == found.size[1] == found.size[3]
+
+
+def test_a_rotation_that_is_chopped_away_is_no_wrong_digit():
+    with pytest.raises(OverflowError, match="got a result beyond the range of float64"):
+        experiment.recursion(FloatFormat(2, 5, CHOP), 600.0, [20000])
+
+
+def test_what_a_rotation_costs_a_drift():
+    found = experiment.recursion(FloatFormat(10, 8), 77.5, [10, 100, 1000])
+    errors = found.size * np.array([100, 1000, 10000]) * 6600.0 / theory.YEAR
+    assert found.drift_error(6600.0) == pytest.approx(np.max(errors))
+
+
+@pytest.mark.parametrize(("method", "base"), [("recursion", 10), ("direct", 10), ("direct", 2)])
+def test_digits_needed_for_an_error(method, base):
+    marks = [1000, 5000, 20000]
+    rotate = {"recursion": experiment.recursion, "direct": experiment.direct}[method]
+    digits = experiment.digits_needed_observed(method, base, 6600.0, 77.5, marks, 1e-6)
+    assert rotate(FloatFormat(base, digits), 77.5, marks).drift_error(6600.0) <= 1e-6
+    assert rotate(FloatFormat(base, digits - 1), 77.5, marks).drift_error(6600.0) > 1e-6
+    steps = marks[-1]
+
+    def bound(beta):
+        if method == "recursion":
+            return theory.recursion_bound(steps, beta)
+        return theory.direct_bound(2 * math.pi * steps * 10 / 77.5, beta)
+
+    limit = 1e-6 / (6600.0 * steps * 10 / theory.YEAR)
+    assert digits <= theory.digits_needed(bound, base, limit) <= digits + 12 * (base == 2) + 4 * (base == 10)
+
+
+@pytest.mark.parametrize(
+    ("fmt", "steps", "message"),
+    [
+        (FloatFormat(3, 5), [1], "needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer"),
+        (FloatFormat(10, 19), [1], "got FloatFormat"),
+        (FloatFormat(10, 8), [], r"got steps \[\]; needed numbers of samples that ascend from 0 or later"),
+        (FloatFormat(10, 8), [3, 3], "that ascend"),
+        (FloatFormat(10, 8), [-1, 3], "that ascend"),
+    ],
+)
+def test_recursions_refuse(fmt, steps, message):
+    with pytest.raises(ValueError, match=message):
+        experiment.recursion(fmt, 600.0, steps)

@@ -1,0 +1,81 @@
+"""gpbnb.rolling.tables: every number in a cell is that of theory or experiment."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rolling import experiment, tables, theory
+
+
+def test_registers():
+    formats = [FloatFormat(10, 6), FloatFormat(10, 10, Rounding.CHOP), FloatFormat(2, 24)]
+    body = tables.registers(600.0, formats).body
+    assert [cells[:2] for cells in body] == [
+        (name, case)
+        for name in ("6 decimal digits", "10 decimal digits, chopped", "24 bits")
+        for case in ("worst", "as rounded")
+    ]
+    for i, fmt in enumerate(formats):
+        for j, error in enumerate(
+            (float(theory.worst_rate_error(600.0, fmt)), abs(experiment.rounded_rate_error(600.0, fmt)))
+        ):
+            cells = [float(cell) for cell in body[2 * i + j][2:]]
+            across = theory.off_tuned_drift(6600.0, error)
+            expected = [error, error * theory.YEAR, theory.off_tuned_loss(error), across]
+            assert cells == pytest.approx(expected, rel=6e-3)
+
+
+def test_phase_costs():
+    (cells,) = tables.phase_costs({"one degree": math.radians(1)}).body
+    x, y = theory.phase_error_cost(theory.DRIFTS, math.radians(1))
+    assert cells[0] == "one degree"
+    assert float(cells[1].removesuffix(" %")) == pytest.approx(100 * math.sin(math.radians(1)) ** 2, rel=5e-3)
+    assert [float(cells[2]), float(cells[3])] == pytest.approx([x, y], rel=5e-3)
+
+
+def test_drift_errors():
+    study = experiment.survey()
+    body = tables.drift_errors(study).body
+    assert [cells[0] for cells in body] == ["none", "6000 s", "600 s", "200 s", "77.5 s"]
+    plain = theory.drift_error_unrolled(study.level, at_rest=True)
+    for i, cells in enumerate(body):
+        closed = plain
+        if i:
+            closed = theory.drift_error_rolled(study.level, study.periods[i], theory.YEAR, study.interval)
+        found = study.standard_error()[i]
+        value, spread = cells[1].split(" ± ")
+        assert float(value) == pytest.approx(found, rel=6e-3)
+        assert float(spread) == pytest.approx(found * study.uncertainty(), rel=0.5)
+        assert float(cells[2]) == pytest.approx(closed, rel=6e-3)
+        assert float(cells[3]) == pytest.approx((found / closed - 1) / study.uncertainty(), abs=0.06)
+        assert float(cells[4]) == pytest.approx(plain / closed, rel=6e-3)
+
+
+def test_filters():
+    named = {"pole": theory.single_pole(500.0), "turn": theory.moving_average(1200.0)}
+    body = tables.filters(named, 6600.0, 10.0, 600.0, 9000, 10.0).body
+    for (name, weights), cells in zip(named.items(), body, strict=True):
+        assert cells[0] == name
+        image = experiment.image_behind(weights, 6600.0, 600.0, 9000)
+        density = theory.flicker_density(10.0, 1 / 600, 10.0)
+        expected = [
+            6600.0 / theory.YEAR * theory.filter_lag(weights),
+            math.sqrt(density * theory.noise_bandwidth(weights)),
+            math.sqrt(theory.pedestal(weights, 10.0, 9000, 600.0)),
+            math.sqrt(theory.filtered_variance(weights, 10.0, 9000, 600.0)),
+            np.max(abs(image)),
+        ]
+        assert [float(cell) for cell in cells[1:]] == pytest.approx(expected, rel=0.05, abs=1e-9)
+
+
+def test_needed():
+    steps = [100, 1000, 4000]
+    body = tables.needed([600.0], [10], 6600.0, steps, 1e-4).body
+    assert [cells[2] for cells in body] == ["recursion", "direct"]
+    for cells in body:
+        observed = experiment.digits_needed_observed(cells[2], 10, 6600.0, 600.0, steps, 1e-4)
+        assert int(cells[3]) == observed <= int(cells[4]) <= observed + 4

@@ -1,0 +1,326 @@
+"""gpbnb.rolling.theory: closed forms against quadrature, sums and the printed numbers."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import mpmath
+import numpy as np
+import pytest
+from scipy import integrate, signal, special
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.rolling import theory
+from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
+
+CHOP = Rounding.CHOP
+
+
+# -- roll and deroll --------------------------------------------------------------------------------
+
+
+def test_the_rotation_is_that_of_5_and_its_transpose_undoes_it():
+    phase = 0.7
+    r = theory.rotation(phase)
+    assert r.tolist() == [[math.cos(phase), math.sin(phase)], [-math.sin(phase), math.cos(phase)]]
+    assert np.allclose(r.T @ r, np.eye(2), atol=4e-16)
+
+
+@pytest.mark.parametrize("phase", [1e-9, 0.01, math.radians(1), -2.0])
+def test_the_cost_of_a_phase_error_is_that_of_the_matrices(phase):
+    off = theory.rotation(0.3 + phase).T @ theory.rotation(0.3) - np.eye(2)
+    assert theory.phase_error_cost(DRIFTS, phase) == pytest.approx(off @ np.array(DRIFTS), abs=2e-12)
+
+
+def test_a_degree_costs_more_than_frame_dragging():
+    x, y = theory.phase_error_cost(DRIFTS, math.radians(1))
+    assert x == pytest.approx(6600 * (math.cos(math.radians(1)) - 1) - 40 * math.sin(math.radians(1)))
+    assert y > 2.8 * DRIFTS[1]
+
+
+@pytest.mark.parametrize("error", [1e-3, 1.0, 6000.0])
+def test_the_largest_phase_has_that_cost(error):
+    phase = theory.largest_phase(DRIFTS, error)
+    assert math.hypot(*theory.phase_error_cost(DRIFTS, phase)) == pytest.approx(error, rel=1e-12)
+
+
+def test_fitted_drifts_of_constant_and_linear_phases():
+    constant = theory.fitted_drift(DRIFTS, lambda t: np.full(t.shape, 0.2))
+    assert constant - np.array(DRIFTS) == pytest.approx(theory.phase_error_cost(DRIFTS, 0.2), rel=1e-11)
+    small = 1e-9 / YEAR
+    assert theory.off_tuned_drift(6600.0, small) == pytest.approx(6600e-9, rel=1e-9)
+    for rate in (3e-8, 5e-7):  # up to 16 rad
+
+        def integrand(x, part, rate=rate):
+            return 12 * (x - 0.5) * x * part(rate * YEAR * x)
+
+        expected = [integrate.quad(integrand, 0, 1, args=(part,), epsabs=1e-12)[0] for part in (math.cos, math.sin)]
+        assert theory.fitted_drift((1.0, 0.0), lambda t, r=rate: r * t) == pytest.approx(expected, abs=1e-10)
+
+
+# -- registers -----------------------------------------------------------------------------------------
+
+
+def test_the_roll_rate_is_exact_to_55_digits():
+    with mpmath.workdps(70):
+        exact = 2 * mpmath.pi / 600
+        error = abs(mpmath.mpf(theory.roll_rate(600.0).numerator) / theory.roll_rate(600.0).denominator / exact - 1)
+    assert error < mpmath.mpf(10) ** -55
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(b, t, r) for b in (2, 3, 10, 16) for t in (3, 6, 10) for r in Rounding])
+@pytest.mark.parametrize("period", [600.0, 77.5, 0.3])
+def test_the_worst_error_of_the_rate_bounds_the_error_of_each_rate_of_its_binade(fmt, period):
+    worst = theory.worst_rate_error(period, fmt)
+    rate = theory.roll_rate(period)
+    assert abs(fmt.round(rate) - rate) <= worst
+    _, _, e = fmt.split(rate)
+    unit = Fraction(fmt.base) ** (e - fmt.precision)
+    assert worst == (unit if fmt.rounding is CHOP else unit / 2)
+
+
+def test_the_printed_sample_calculations():
+    six, ten = (float(theory.worst_rate_error(600.0, FloatFormat(10, t))) for t in (6, 10))
+    assert six == pytest.approx(0.5e-7, rel=1e-15)
+    assert ten == pytest.approx(0.5e-11, rel=1e-15)
+    assert theory.off_tuned_loss(six) == pytest.approx(1 - math.cos(0.5e-7 * YEAR), rel=1e-12)
+    assert theory.off_tuned_loss(ten) == pytest.approx(1.234e-8, rel=0.01)  # printed for 40,000 years, not 39,848
+    assert theory.off_tuned_drift(6600.0, ten) == pytest.approx(6600 * ten * YEAR, rel=1e-7)
+
+
+# -- spectra ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("cycles", [0.0, 1e-6, 0.3, 1.0, 7.5, 40.25])
+def test_the_density_of_a_ramp_is_that_of_its_transform(cycles):
+    w = 2 * math.pi * cycles
+    with mpmath.workdps(30):
+        value = complex(mpmath.quad(lambda x: x * mpmath.expj(-w * x), mpmath.linspace(0, 1, 2 + int(2 * cycles))))
+    expected = 2 * abs(value) ** 2 * YEAR**3 * (40.0 / YEAR) ** 2
+    assert float(theory.ramp_density(40.0, YEAR, cycles / YEAR)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_printed_density_falls_too_fast():
+    f = np.array([100.0, 200.0]) / YEAR
+    for function, power in ((theory.ramp_density, 2), (None, 4)):
+        d = theory.printed_ramp_density(40.0, f) if function is None else function(40.0, YEAR, f)
+        assert d[0] / d[1] == pytest.approx(2**power, rel=1e-6)
+
+
+def test_the_density_of_samples_is_that_of_the_response():
+    h, f = theory.impulse_response(2**20), 0.2
+    response = abs(np.sum(h * np.exp(-2j * np.pi * f * np.arange(len(h))))) ** 2
+    expected = 2 * math.pi * LEVEL * 10 * response
+    # The response is cut off where it is 1/sqrt(pi n); the alternating rest is of that size.
+    assert float(theory.flicker_density(LEVEL, f / 10, 10.0)) == pytest.approx(expected, rel=2e-3)
+    assert float(theory.flicker_density(LEVEL, 1e-9, 10.0)) == pytest.approx(LEVEL / 1e-9, rel=1e-12)
+
+
+def test_derolled_noise_is_that_of_both_sidebands():
+    f = np.array([0.0, 1e-4, 1e-3])
+    found = theory.derolled_density(LEVEL, 77.5, f)
+    assert found[0] == pytest.approx(LEVEL * 77.5)
+    roll = 1 / 77.5
+    assert found == pytest.approx(LEVEL / 2 * (1 / (roll - f) + 1 / (roll + f)))
+    power = integrate.quad(lambda x: float(theory.derolled_density(LEVEL, 77.5, x)), 0, 1e-3)[0]
+    assert theory.rectified_power(LEVEL, 77.5, 1e-3) == pytest.approx(power, rel=1e-9)
+
+
+# -- sums of noise -----------------------------------------------------------------------------------------
+
+
+def test_the_variance_of_a_sum_is_that_of_the_covariance_matrix():
+    n = 60
+    h = theory.impulse_response(n)
+    root = np.array([[h[m - i] if m >= i else 0.0 for i in range(n)] for m in range(n)])
+    a = np.random.default_rng(1).standard_normal(n)
+    assert theory.variance_of_sum(a, 3.0) == pytest.approx(math.pi * 3 * a @ root @ root.T @ a, rel=1e-12)
+
+
+def test_the_slope_weights_fit_lines():
+    a = theory.slope_weights(101, 10.0)
+    t = np.arange(101) * 10.0
+    assert np.sum(a) == pytest.approx(0, abs=1e-18)
+    assert np.sum(a * t) == pytest.approx(1, rel=1e-13)
+    y = np.random.default_rng(2).standard_normal(101)
+    assert np.sum(a * y) == pytest.approx(np.polyfit(t, y, 1)[0], rel=1e-10)
+
+
+def test_without_rolling_the_closed_forms_are_reached():
+    n = 30000
+    exact = theory.drift_error(LEVEL, n)
+    assert exact == pytest.approx(theory.drift_error_unrolled(LEVEL, n * 10.0, at_rest=True), rel=1e-3)
+    # Noise that is much older than the record: the record is its last part.
+    age = 400 * 500
+    a = np.concatenate([np.zeros(age), theory.slope_weights(500)])
+    old = math.sqrt(theory.variance_of_sum(a, LEVEL)) * YEAR
+    assert old == pytest.approx(theory.drift_error_unrolled(LEVEL, 5000.0), rel=5e-3)
+    assert theory.drift_error_unrolled(LEVEL) / theory.drift_error_unrolled(LEVEL, at_rest=True) == pytest.approx(
+        3 / 8**0.5
+    )
+
+
+def test_the_integral_of_the_fit_is_a_quarter():
+    value = integrate.quad(lambda z: special.spherical_jn(1, z) ** 2 / z, 0, 200, limit=400)[0]
+    # The tail beyond z is less than 1/(2 z²).
+    assert value == pytest.approx(0.25, abs=1 / (2 * 200**2))
+
+
+@pytest.mark.parametrize(("period", "samples"), [(600.0, 6000), (77.5, 7750), (100.0, 1000)])
+def test_with_rolling_the_closed_form_is_reached_after_many_turns(period, samples):
+    exact = theory.drift_error(LEVEL, samples, period)
+    closed = theory.drift_error_rolled(LEVEL, period, samples * 10.0, 10.0)
+    # Slow noise leaks into the fit as log(n) over the number of turns.
+    assert exact == pytest.approx(closed, rel=math.log(samples) / (samples * 10 / period))
+    assert theory.drift_error_unrolled(1.0) / theory.drift_error_rolled(1.0, period) == pytest.approx(
+        theory.rolling_gain(period)
+    )
+
+
+def test_phases_of_roll():
+    assert theory.roll_phase([0, 15, 30, 60, 75], 600.0) == pytest.approx([0, math.pi / 2, math.pi, 0, math.pi / 2])
+    assert np.all(theory.roll_phase(np.arange(1000), 77.5) < 2 * math.pi)
+
+
+# -- filters -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tau", [50.0, 700.0])
+def test_a_single_pole_is_the_recursion(tau):
+    weights = theory.single_pole(tau)
+    impulse = np.zeros(50)
+    impulse[0] = 1
+    a = 1 - math.exp(-10 / tau)
+    assert weights[:50] == pytest.approx(signal.lfilter([a], [1, a - 1], impulse), rel=1e-12)
+    assert np.sum(weights) == pytest.approx(1, abs=2e-16 * len(weights) + 1e-15)
+    assert theory.filter_lag(weights) == pytest.approx(10 * (1 - a) / a, rel=1e-12)
+    assert theory.noise_bandwidth(weights) == pytest.approx(a / (2 - a) / 20, rel=1e-12)
+    f = np.array([0.0, 1e-4, 3e-3, 0.05])
+    _, response = signal.freqz([a], [1, a - 1], worN=2 * np.pi * f * 10)
+    assert theory.filter_gain(weights, f) == pytest.approx(abs(response), rel=1e-9)
+
+
+def test_a_moving_average_over_whole_turns_stops_the_roll_frequency_and_its_double():
+    weights = theory.moving_average(775.0)
+    assert len(weights) == 78 or len(weights) == 77
+    weights = theory.moving_average(600.0)
+    assert np.max(theory.filter_gain(weights, [1 / 600, 2 / 600])) < 1e-14
+    assert theory.filter_lag(weights) == pytest.approx(295.0)
+    assert theory.noise_bandwidth(weights) == pytest.approx(1 / 1200)
+    assert theory.pedestal(weights, LEVEL, 5000, 600.0) < 1e-20
+
+
+def test_filtered_noise_in_the_limits():
+    weights = theory.moving_average(600.0)
+    rolled = theory.filtered_variance(weights, LEVEL, 3000, 600.0)
+    assert rolled == pytest.approx(LEVEL * 600 * theory.noise_bandwidth(weights), rel=0.3)
+    single = theory.filtered_variance(np.ones(1), LEVEL, 500, None)
+    assert single == pytest.approx(math.pi * LEVEL * np.sum(theory.impulse_response(500) ** 2), rel=1e-12)
+    assert theory.filtered_variance(np.ones(1), LEVEL, 500, 77.5) == pytest.approx(single, rel=1e-12)
+
+
+def test_the_pedestal_is_what_exceeds_the_band():
+    tau, n = 2000.0, 40000
+    weights = theory.single_pole(tau)
+    total = theory.filtered_variance(weights, LEVEL, n, 77.5)
+    band = theory.FLOWN_DENSITY * theory.noise_bandwidth(weights)
+    slow = theory.pedestal(weights, LEVEL, n, 77.5)
+    assert slow > 0.02 * band
+    # All of the noise is counted as slow, so that the pedestal is somewhat too large.
+    assert total < band + slow < total + 0.3 * slow
+
+
+@pytest.mark.parametrize("drift", [40.0, 6600.0])
+def test_the_best_bandwidth_is_the_best(drift):
+    density = theory.FLOWN_DENSITY
+    best = theory.best_bandwidth(drift, density)
+    least = float(theory.filtered_error(drift, density, best))
+    around = theory.filtered_error(drift, density, best * np.geomspace(0.1, 10, 201))
+    assert np.argmin(around) == 100
+    assert least == pytest.approx(0.75 * (drift / YEAR * density) ** (2 / 3), rel=1e-12)
+    assert density * best == pytest.approx(2 / 3 * least)
+    for weights in (theory.single_pole(1 / (4 * best)), theory.moving_average(1 / (2 * best))):
+        lag, width = theory.filter_lag(weights), theory.noise_bandwidth(weights)
+        # Sampled filters differ from continuous ones by half an interval.
+        assert (drift / YEAR * lag) ** 2 + density * width == pytest.approx(least, rel=10 * best * 4)
+    assert float(theory.signal_to_noise(drift, YEAR, least)) == pytest.approx(drift**2 / 3 / least)
+
+
+@pytest.mark.parametrize(("period", "samples"), [(600.0, 600), (600.0, 6000), (75.0, 1500)])
+def test_the_image_in_a_fit_is_the_sum(period, samples):
+    n = np.arange(samples)
+    image = 6600.0 / YEAR * 10 * n * np.cos(2 * theory.roll_phase(n, period))
+    expected = float(np.sum(theory.slope_weights(samples) * image)) * YEAR
+    assert theory.image_in_fit(6600.0, period, samples) == pytest.approx(expected, rel=1e-9)
+
+
+# -- roll rate ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reset", [None, 25])
+def test_a_wandering_rate_is_the_sum_over_its_steps(reset):
+    n, step, q, k = 2000, 50.0, 1e-20, 6600.0
+    weights = theory.slope_weights(n, step) * k * step * (np.arange(n) + 0.5)
+    total = 0.0
+    for i in range(0, n):
+        rate = np.zeros(n)
+        rate[i:] = math.sqrt(q * step)
+        begin = np.concatenate([[0.0], np.cumsum(rate)[:-1]]) * step
+        phase = begin + rate * step / 2
+        if reset:
+            phase = phase - np.repeat(begin[::reset], reset)[:n]
+        total += np.sum(weights * phase) ** 2
+    expected = theory.rate_walk_error(k, q, n * step, reset and reset * step)
+    assert math.sqrt(total) == pytest.approx(expected, rel=2e-3 if reset is None else 0.02)
+
+
+def test_a_sinusoidal_rate():
+    a, period, k = 1e-6, 6000.0, 6600.0
+    expected = k * a * period / (2 * math.pi) / math.sqrt(2)
+    assert theory.rate_sine_error(k, a, period) == pytest.approx(expected)
+    assert theory.rate_sine_error(k, a, period, 12000.0) == pytest.approx(expected)
+    assert theory.rate_sine_error(k, a, period, 3000.0) == 0
+
+
+# -- rotations ------------------------------------------------------------------------------------------------------
+
+
+def test_the_bounds_of_rotations():
+    beta = Fraction(1, 2 * 10**9)
+    assert theory.recursion_bound(0, beta) == 0
+    assert theory.recursion_bound(1000, beta) == pytest.approx(1000 * (1 + 2 * math.sqrt(2)) * float(beta), rel=1e-5)
+    assert theory.recursion_bound(10**7, Fraction(1, 100)) == math.inf
+    assert theory.direct_bound(1e4, beta) == pytest.approx(3e4 * float(beta), rel=1e-3)
+
+
+@pytest.mark.parametrize("base", [2, 10])
+def test_digits_needed_is_the_least(base):
+    def bound(beta):
+        return theory.recursion_bound(3153600, beta)
+
+    digits = theory.digits_needed(bound, base, 1 / 6600)
+    betas = [FloatFormat(base, digits + d).unit_roundoff for d in (-1, 0)]
+    assert bound(betas[1]) <= 1 / 6600 < bound(betas[0])
+
+
+REFUSED = [
+    (theory.largest_phase, (DRIFTS, 0.0), "got an error of 0.0 for a drift of 6600.12; needed 0 < error <= 13200.2"),
+    (theory.largest_phase, (DRIFTS, 1e5), "got an error of 100000.0"),
+    (theory.roll_rate, (0.0,), "got a roll period of 0.0 s; needed a positive number; leave rolling out for none"),
+    (theory.roll_rate, (math.inf,), "got a roll period of inf s"),
+    (theory.rectified_power, (LEVEL, 600.0, 1 / 600), "needed less than the roll frequency 0.00166667 Hz"),
+    (theory.variance_of_sum, ([[1.0]], LEVEL), r"got weights of shape \(1, 1\); needed \(n,\)"),
+    (theory.variance_of_sum, ([], LEVEL), r"got weights of shape \(0,\)"),
+    (theory.slope_weights, (1,), "got 1 samples; needed at least 2 to fit a line"),
+    (theory.moving_average, (4.0,), "got a length of 4.0 s; needed at least the interval of 10.0 s"),
+    (theory.single_pole, (0.0,), "got a time constant of 0.0 s; needed more than 0"),
+    (theory.image_in_fit, (1.0, 77.5, 100), "got 12.9032 turns; needed a whole number of them; shorten the record"),
+    (theory.digits_needed, (lambda beta: 1.0, 10, 0.5), "got a bound above 0.5 at 399 digits; needed one that falls"),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments", "message"), REFUSED)
+def test_refused_with_what_came_and_what_was_needed(function, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        function(*arguments)
