@@ -104,7 +104,8 @@ def test_the_errors_of_all_steps_are_a_change_of_the_given_matrix(n):
         assert (found.upper - found.given - found.change).applyfunc(sp.simplify) != sp.zeros(n, n)
         assert found.change[0, :] == sp.zeros(1, n)
         assert found.change[:, 0] == sp.zeros(n, 1)
-        assert found.lower.is_lower and found.upper.is_upper
+        assert found.lower.is_lower
+        assert found.upper.is_upper
         assert all(found.lower[i, i] == 1 for i in range(n))
 
 
@@ -143,7 +144,7 @@ def test_a_row_is_exact_in_products_of_its_errors(terms):
     assert sp.expand(value.subs(none) - right + sum(products)) == 0
 
 
-@pytest.mark.parametrize("equation", (76, 77, 78, 79))
+@pytest.mark.parametrize("equation", [76, 77, 78, 79])
 def test_printed_lines_leave_nothing_of_first_order(equation):
     assert derivation.leftover(equation) == 0
 
