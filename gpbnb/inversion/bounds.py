@@ -175,7 +175,7 @@ def ball(a: FloatArray, x: FloatArray, bits: int | None = None) -> float:
         return _upper(_column_sum(_balls(x) - inverse))
 
 
-def a_posteriori(a: FloatArray, x: FloatArray, bits: int | None = None) -> float:
+def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
     r"""Bound from the residual, computed with more digits than X has.
 
     .. math:: R = I - AX, \qquad A^{-1} - X = XR\,(I - R)^{-1}, \qquad
@@ -185,7 +185,8 @@ def a_posteriori(a: FloatArray, x: FloatArray, bits: int | None = None) -> float
 
     Parameters
     ----------
-    a, x : (n, n), a matrix and its computed inverse, or any other guess of it.
+    a : (n, n), a FloatArray, or exact numbers.
+    x : (n, n), its computed inverse, or any other guess of it.
     bits : of the balls' midpoints; by default four times those of the format and 64 more, so that A X has room.
 
     Raises
@@ -221,7 +222,7 @@ def _bits(fmt: FloatFormat) -> int:
     return max(2, math.ceil(fmt.precision * math.log2(fmt.base)))
 
 
-def _balls(a: FloatArray) -> Any:
+def _balls(a: Any) -> Any:
     return flint.arb_mat(rationals(a))
 
 
@@ -257,7 +258,8 @@ def rationals(a: Any) -> Any:
         entries = [(m * base**e, 1) if e >= 0 else (m, base**-e) for m, e in pairs]
     else:
         entries = [(x.numerator, x.denominator) for x in exact(a).ravel()]
-    return flint.fmpq_mat(*a.shape, [flint.fmpq(p, q) for p, q in entries])
+    rows, columns = a.shape
+    return flint.fmpq_mat(rows, columns, [flint.fmpq(p, q) for p, q in entries])
 
 
 def true_inverse(a: Any) -> Any:
@@ -351,8 +353,8 @@ def smallest_precision(
         best = min(best, bound)
     reached = f"the best bound was {best:.3g}" if best < math.inf else "none had a bound at all"
     raise ValueError(
-        f"got the goal {float(goal):.3g}; needed one that an inverse of up to {largest} base-{base} digits is proved to "
-        f"reach, and {reached}; raise largest, or the goal"
+        f"got the goal {float(goal):.3g}; needed one that an inverse in at most {largest} base-{base} digits is proved "
+        f"to reach, and {reached}; raise largest, or the goal"
     )
 
 

@@ -21,7 +21,7 @@ from gpbnb import linalg
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.inversion import bounds, procedure, theory
-from gpbnb.inversion.procedure import NORMS, Reading
+from gpbnb.inversion.procedure import Reading
 
 # -- one inverse beside its bounds ----------------------------------------------------------------
 
@@ -157,9 +157,10 @@ def tally(trials: Sequence[Trial], names: Sequence[str]) -> tuple[Tally, ...]:
         having = [one for one in trials if name in one.bounds]
         ratios = np.array([one.ratio(name) for one in having])
         worst = having[int(np.argmin(ratios))] if having else None
-        of = (float(f(ratios)) if having else np.nan for f in (np.min, np.median, np.max))
+        smallest, median, largest = (float(f(ratios)) if having else np.nan for f in (np.min, np.median, np.max))
         violations = sum(one.violates(name) for one in having)
-        result.append(Tally(name, len(trials), len(trials) - len(having), violations, *of, worst))
+        absent = len(trials) - len(having)
+        result.append(Tally(name, len(trials), absent, violations, smallest, median, largest, worst))
     return tuple(result)
 
 
@@ -282,7 +283,8 @@ RANDOM_SIZES = {n: 3000 if n <= 6 else 1000 if n <= 10 else 100 for n in range(2
 def variant_cells() -> list[Cell]:
     """All families of matrices, n = 2 ... 20, with and without pivoting: for every reading and bound."""
     cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
-    return [Cell(*case, tuple(range(2, 21)), 2, (SEED, i)) for i, case in enumerate(cases)]
+    sizes = tuple(range(2, 21))
+    return [Cell(family, fmt, pivot, sizes, 2, (SEED, i)) for i, (family, fmt, pivot) in enumerate(cases)]
 
 
 def random_cells() -> list[Cell]:

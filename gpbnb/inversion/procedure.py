@@ -1,8 +1,8 @@
 r"""The procedure of Figure III-1: a bound of the error of an inverse, computed beside the inverse itself.
 
 One function for each box of the chart, and :func:`run` for the whole. The inverse is computed in the arithmetic of the
-format; the errors are then evaluated from its digits by the formulas of :mod:`gpbnb.inversion.theory`. Whatever the text
-leaves open is a :class:`Reading`.
+format; the errors are then evaluated from its digits by the formulas of :mod:`gpbnb.inversion.theory`. Whatever the
+text leaves open is a :class:`Reading`.
 
 Source: hung1984, ch. II, section 11; the texts of the boxes are in hung1982, ch. III.
 """
@@ -63,7 +63,7 @@ def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
 
     found = linalg.lu(a, pivot)
     n, order = len(a), found.permutation
-    work = cast(FloatArray, a[order])
+    work = a[order]
     zero = a.format.array(0)
     stages, multipliers = [work], []
     for k in range(n - 1):
@@ -147,7 +147,7 @@ NORMS: dict[str, Norm] = {
     "spectral": lambda a: np.linalg.norm(np.asarray(a, dtype=np.float64), 2),
 }
 
-#: What the norm is taken of: the matrix of (95), as the last box says; the factors of (96); every summand, as (61), (62).
+#: What norms are taken of: the matrix of (95), as the last box says; the factors of (96); every summand, (61), (62).
 FORMS = ("chart", "(96)", "norms throughout")
 
 
@@ -157,7 +157,7 @@ class Reading:
 
     Parameters
     ----------
-    signed : ε has one sign throughout, as (59), (60) and (87)-(90) are printed; else sizes are added up, as in (61), (62).
+    signed : ε has one sign throughout, as printed in (59), (60) and (87)-(90); else sizes are added up, (61), (62).
     form : of :data:`FORMS`.
     triangular : the inverse in (94) is that of A_T, to which ΔA and Δb belong; else that of A.
     norm : of :data:`NORMS`; "column sum" is that of the report, (22).
@@ -215,7 +215,7 @@ def resultant_errors(first: Perturbation, second: Perturbation) -> Perturbation:
 
 
 def bracket(errors: Perturbation, solution: Any, signed: bool = True) -> NDArray[Any]:
-    r"""E of (95), columns :math:`\delta b_j - \delta A\,\hat x_j`; of sizes, :math:`|\delta b_j| + |\delta A||\hat x_j|`."""
+    r"""E of (95), columns :math:`\delta b_j - \delta A\hat x_j`; of sizes, :math:`|\delta b_j| + |\delta A||\hat x_j|`."""
     x = _plain(solution)
     e = errors.right - errors.matrix @ x if signed else abs(errors.right) + abs(errors.matrix) @ abs(x)
     return np.asarray(e)
@@ -305,10 +305,10 @@ def _sum_of_norms(reduction: Reduction, beta: Any, second: Perturbation, norm: N
     stages, rights = ([_plain(part) for part in parts] for parts in reduction[:2])
     first = theory.printed_triangularization_norm(reduction.stages, beta, norm)
     # (62) for all columns at once, so that one norm serves throughout
-    right = beta * sum(
-        3 * norm(theory.trailing(rights[k], k, columns=False))
-        + 2 * norm(theory.trailing(rights[k - 1], k, columns=False))
+    right = sum(
+        weight * beta * norm(theory.trailing(rights[i], k, columns=False))
         for k in range(1, len(stages))
+        for weight, i in ((3, k), (2, k - 1))
     )
     return (first + norm(second.matrix)) * norm(_plain(reduction.solution)) + right + norm(second.right)
 
