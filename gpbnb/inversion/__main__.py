@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for sweep in given.sweeps:
         cells_of, names = experiment.SWEEPS[sweep]
         cells = cells_of()[: given.first]
-        with tqdm(total=sum(cell.count for cell in cells), desc=sweep, unit="inverse", disable=None) as bar:
+        with tqdm(total=sum(cell.count for cell in cells), desc=sweep, unit="inverse") as bar:
             rows = experiment.sweep_rows(cells, names, bar.update)
         path = given.folder / f"{sweep}.csv"
         with path.open("w", encoding="utf-8", newline="") as file:

@@ -9,7 +9,7 @@ nothing. They differ in what they look at:
 :func:`higham`                the computed factors
 :func:`higham_probabilistic`  the same; holds but for a probability, if roundings are random
 :func:`rule_of_thumb`         the same, with the root of the count of roundings; proves nothing
-:func:`ball`                  nothing of the computation: ball arithmetic of as many bits inverts A again
+:func:`ball`                  nothing of the computation: A is inverted again, in ball arithmetic
 :func:`a_posteriori`          the residual of X, in ball arithmetic of more bits
 ============================  =========================================================================
 """
@@ -147,12 +147,15 @@ def _norm(sizes: NDArray[np.float64]) -> float:
 # -- ball arithmetic ------------------------------------------------------------------------------
 
 
-def ball(a: FloatArray, x: FloatArray, bits: int | None = None) -> float:
+def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None = None) -> float:
     r"""Bound from inverting A in ball arithmetic, :math:`\||X - \mathrm{mid}| + \mathrm{rad}\|`.
 
     Parameters
     ----------
-    a, x : (n, n), a matrix and its computed inverse, or any other guess of it.
+    a : (n, n), a FloatArray, or exact numbers.
+    x : (n, n), its computed inverse, or any other guess of it.
+    preconditioned : A is first multiplied by an approximate inverse, in sums of products that are rounded once, so that
+        elimination starts near the identity; else elimination with partial pivoting of A itself.
     bits : of the balls' midpoints; by default as many as the format has.
 
     Raises
@@ -166,7 +169,7 @@ def ball(a: FloatArray, x: FloatArray, bits: int | None = None) -> float:
     precision = _bits(x.format) if bits is None else bits
     with _working(precision):
         try:
-            inverse = _balls(a).inv()
+            inverse = _balls(a).solve(_identity(len(x)), algorithm="precond" if preconditioned else "lu")
         except ZeroDivisionError:
             raise ValueError(
                 f"got a matrix that {precision} bits cannot tell from a singular one; needed another; use more bits"

@@ -273,6 +273,22 @@ def error_readings() -> tuple[Column, ...]:
     return tuple(result)
 
 
+def pairs(
+    norm: str = "column sum", relative: bool = False, source: str = "its own digits"
+) -> list[tuple[Column, Column]]:
+    """Readings of both columns that belong together: a bound, and the error of elimination with the same wordlength."""
+    errors = {
+        (one.wordlength, one.norm, one.relative): one
+        for one in error_readings()
+        if one.detail == "elimination, against the matrix as given"
+    }
+    return [
+        (one, errors[one.wordlength, norm, relative])
+        for one in bound_readings()
+        if (one.norm, one.relative) == (norm, relative) and one.detail.endswith(source)
+    ]
+
+
 @dataclass(frozen=True)
 class Search:
     """What came of a search among readings: agreements in all digits, beside those that chance alone would give.
@@ -281,8 +297,8 @@ class Search:
     ----------
     agreements : numbers that agree with the print in each digit; `numbers` were compared.
     columns : readings of which all three do.
-    expected : how many agreements chance alone would give, if digits are spread as usual and every power of ten is right:
-        a generous count.
+    expected : how many agreements chance alone would give, if digits are spread as usual and each power of ten is
+        right: a generous count.
     closest : the reading with the smallest :attr:`Column.distance`.
     """
 

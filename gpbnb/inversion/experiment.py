@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial
@@ -29,7 +30,17 @@ from gpbnb.inversion.procedure import Reading
 PRINTED = tuple(reading for reading in procedure.readings() if reading.norm == "column sum")
 
 #: Bounds of a second look, see :func:`trial`.
-BETTER = ("corrected", "strict", "Wilkinson", "Higham", "probabilistic", "rule of thumb", "ball", "a posteriori")
+BETTER = (
+    "corrected",
+    "strict",
+    "Wilkinson",
+    "Higham",
+    "probabilistic",
+    "rule of thumb",
+    "ball",
+    "preconditioned ball",
+    "a posteriori",
+)
 
 
 #: Those that can prove nothing.
@@ -131,6 +142,7 @@ _BOUNDS |= {
     "probabilistic": lambda c: bounds.higham_probabilistic(c.factors, c.x),
     "rule of thumb": lambda c: bounds.rule_of_thumb(c.factors, c.x),
     "ball": lambda c: bounds.ball(c.a, c.x),
+    "preconditioned ball": lambda c: bounds.ball(c.a, c.x, preconditioned=True),
     "a posteriori": lambda c: bounds.a_posteriori(c.a, c.x),
 }
 ALL_BOUNDS = tuple(_BOUNDS)
@@ -183,9 +195,13 @@ def _symmetric(n: int, rng: np.random.Generator) -> NDArray[Any]:
 
 
 def _nearly_singular(n: int, rng: np.random.Generator) -> NDArray[Any]:
-    """The last row is that of a sum of the others, but for a thousandth."""
+    return conditioned(n, 3, rng)
+
+
+def conditioned(n: int, digits: float, rng: np.random.Generator) -> NDArray[Any]:
+    """The last row is the sum of the others, but for a part of 10**-digits, which the condition number undoes."""
     a = _uniform(n, rng)
-    a[-1] = a[:-1].sum(axis=0) + a[-1] / 1000
+    a[-1] = a[:-1].sum(axis=0) + a[-1] * Fraction(10.0**-digits)
     return a
 
 
@@ -263,6 +279,43 @@ class Cell:
         return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
 
 
+def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
+    """Random matrices of growing size, inverted with pivoting beside :data:`BETTER`."""
+    return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
+
+
+def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np.random.Generator) -> list[Trial]:
+    """Matrices of one size that are nearer and nearer to singular, see :func:`conditioned`, beside :data:`BETTER`.
+
+    Those that the format cannot tell from singular are left out.
+    """
+    trials = []
+    for d in digits:
+        with suppress(np.linalg.LinAlgError):
+            trials.append(trial(fmt.array(conditioned(n, d, rng)), True, BETTER, "nearly singular"))
+    return trials
+
+
+def worst_small(
+    names: Sequence[str], fmt: FloatFormat, n: int, largest: int, draws: int, rng: np.random.Generator
+) -> dict[str, Trial]:
+    """Among matrices of random integers up to `largest` in size, those whose error exceeds each bound the most.
+
+    Pivoting is on. `draws` matrices are looked at; the singular ones, and those with an exact inverse, do not count.
+    """
+    worst: dict[str, Trial] = {}
+    for _ in range(draws):
+        a = fmt.array(rng.integers(-largest, largest + 1, (n, n)))
+        try:
+            one = trial(a, True, names, "small integers")
+        except np.linalg.LinAlgError:
+            continue
+        for name in names:
+            if one.error and (name not in worst or one.ratio(name) < worst[name].ratio(name)):
+                worst[name] = one
+    return worst
+
+
 SEED = 1984
 _NEAREST, _CHOP = Rounding.NEAREST, Rounding.CHOP
 
@@ -284,7 +337,7 @@ def variant_cells() -> list[Cell]:
     """All families of matrices, n = 2 ... 20, with and without pivoting: for every reading and bound."""
     cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
     sizes = tuple(range(2, 21))
-    return [Cell(family, fmt, pivot, sizes, 2, (SEED, i)) for i, (family, fmt, pivot) in enumerate(cases)]
+    return [Cell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
 
 
 def random_cells() -> list[Cell]:

@@ -1,0 +1,129 @@
+"""Tables of the chapter on matrix inversion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gpbnb.inversion.example import PLACES, PRINTED, Claim, Column, Possible, Search
+from gpbnb.inversion.experiment import Frozen, Trial
+from gpbnb.tables import Table, digits
+
+
+def table1(readings: Sequence[tuple[Column, Column]]) -> Table:
+    """The six numbers of Table 1 in some readings, each with its ratio to the printed one."""
+    header = ("wordlength", "reading", *(f"{name}, {p}" for name in ("bound", "error") for p in PLACES))
+    printed = ("as printed", "", *(f"{float(value):.3e}" for name in ("bound", "error") for value in PRINTED[name]))
+    body = [
+        (
+            str(bound.wordlength),
+            _math(bound.detail),
+            *(
+                f"{value:.3e} ({ratio:.3g})"
+                for column in (bound, error)
+                for value, ratio in zip(column.values, column.ratios, strict=True)
+            ),
+        )
+        for bound, error in readings
+    ]
+    return Table(f"Table 1 in {len(body)} readings", header, (printed, *body))
+
+
+def searches(found: Sequence[Search]) -> Table:
+    """Agreements between readings and print, beside chance, and the reading that comes closest."""
+    header = (
+        "column",
+        "readings",
+        "numbers",
+        "agree in four digits",
+        "expected by chance",
+        "closest reading",
+        "its numbers",
+        "over the print",
+    )
+    body = [
+        (
+            {"bound": "By proposed method", "error": "Actual value"}[one.column],
+            str(one.readings),
+            str(one.numbers),
+            str(one.agreements),
+            f"{one.expected:.2g}",
+            _reading(one.closest),
+            ", ".join(f"{value:.3e}" for value in one.closest.values),
+            ", ".join(f"{ratio:.3g}" for ratio in one.closest.ratios),
+        )
+        for one in found
+    ]
+    return Table(f"{len(body)} searches", header, tuple(body))
+
+
+def claims(found: Sequence[Claim]) -> Table:
+    """In how many readings each sentence about Table 1 holds."""
+    body = [(one.name, f"{one.holds} of {one.readings}", _math(one.exception) or "none") for one in found]
+    return Table(f"{len(body)} claims", ("claim", "holds in", "first exception"), tuple(body))
+
+
+def possibilities(found: Sequence[Possible]) -> Table:
+    """Which of the printed errors some matrix of numbers of a wordlength has, in each norm."""
+    lines: dict[tuple[str, str, str], list[str]] = {}
+    for one in found:
+        key = one.wordlength.kind, one.norm, "relative" if one.relative else "absolute"
+        lines.setdefault(key, []).append("no" if one.witness is None else "yes")
+    header = (
+        "wordlength",
+        "norm",
+        "error",
+        *(f"{p} places: {v}" for p, v in zip(PLACES, PRINTED["error"], strict=True)),
+    )
+    return Table(f"{len(found)} searches", header, tuple((*key, *line) for key, line in lines.items()))
+
+
+def violations(result: Frozen, bounds: Sequence[str]) -> Table:
+    """Violations of some bounds by family of matrices, of how many inversions."""
+    families = [str(row["family"]) for row in result.select(format="all", bound=bounds[0])]
+    body = []
+    for family in families:
+        rows = {name: result.select(family=family, format="all", bound=name)[0] for name in bounds}
+        counts = (rows[name]["violations"] for name in bounds)
+        body.append((family, rows[bounds[0]]["trials"], *counts))
+    header = ("matrices", "inversions", *map(_math, bounds))
+    return Table(f"violations in {len(body)} families", header, tuple(body))
+
+
+def summary(result: Frozen, bounds: Sequence[str]) -> Table:
+    """Each bound over all inversions of a sweep: how often it says nothing, is violated, and how far it is off."""
+    body = []
+    for name in bounds:
+        (row,) = result.select(family="all", format="all", bound=name)
+        body.append((_math(name), *(str(row[key]) for key in ("trials", "absent", "violations", *_RATIOS))))
+    header = ("bound", "inversions", "says nothing", "violated", *(f"bound / error: {name}" for name in _RATIOS))
+    return Table(f"{len(body)} bounds", header, tuple(body))
+
+
+_RATIOS = ("smallest", "median", "largest")
+
+
+def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
+    """Single inverses: the matrix, what the format makes of it, its error, and each bound."""
+    body = [
+        (
+            _math(name),
+            "; ".join(" ".join(map(str, row)) for row in one.matrix),
+            digits(one.matrix.format),
+            "; ".join(" ".join(map(str, row)) for row in one.computed),
+            f"{float(one.error):.3e}",
+            *(f"{one.bounds[bound]:.3e}" if bound in one.bounds else "none" for bound in bounds),
+        )
+        for name, one in trials.items()
+    ]
+    header = ("example", "matrix, by rows", "format", "computed inverse", "error", *map(_math, bounds))
+    return Table(f"{len(body)} worked examples", header, tuple(body))
+
+
+def _reading(one: Column) -> str:
+    return f"{one.wordlength}; {_math(one.detail)}; {one.norm}, {'relative' if one.relative else 'absolute'}"
+
+
+def _math(text: str) -> str:
+    """Names of readings with the inverse in mathematics."""
+    words = text.split(", ")
+    return ", ".join({"A": "$A^{-1}$", "A_T": "$A_T^{-1}$"}.get(word, word) for word in words)
