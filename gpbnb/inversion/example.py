@@ -235,11 +235,12 @@ def bound_readings() -> tuple[Column, ...]:
         for source in ("its own digits", "more digits"):
             computing = formats if source == "its own digits" else [FloatFormat(10, 50)] * 3
             reductions = [procedure.as_floats(procedure.reduce(fmt.array(MATRIX))) for fmt in computing]
-            for reading in procedure.readings():
-                outcomes = [
-                    procedure.evaluate(reduction, float(fmt.unit_roundoff), reading)
-                    for reduction, fmt in zip(reductions, formats, strict=True)
-                ]
+            all_outcomes = [
+                procedure.evaluate_all(reduction, float(fmt.unit_roundoff), procedure.readings())
+                for reduction, fmt in zip(reductions, formats, strict=True)
+            ]
+            for outcomes in zip(*all_outcomes, strict=True):
+                reading = outcomes[0].reading
                 detail = f"{str(reading).removesuffix(f', {reading.norm}')}, {source}"
                 for relative in (False, True):
                     values = tuple(float(o.relative_bound if relative else o.bound) for o in outcomes)

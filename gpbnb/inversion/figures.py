@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
+from matplotlib.ticker import MaxNLocator
 
 from gpbnb.inversion.example import PLACES, PRINTED, Column
 from gpbnb.inversion.experiment import Frozen, Trial
@@ -26,31 +27,31 @@ class Box(NamedTuple):
 
 #: Figure III-1: the computation at the left, its errors at the right.
 CHART: Mapping[str, Box] = {
-    "given": Box(0.25, 0.95, "Given matrix $A$", ("triangularize",)),
-    "triangularize": Box(0.25, 0.79, "Triangularize $A$ into $A_T$", ("transform", "errors of A_T")),
+    "given": Box(0.24, 0.97, "Given matrix $A$", ("triangularize",)),
+    "triangularize": Box(0.24, 0.82, "Triangularize $A$ into $A_T$", ("transform", "errors of A_T")),
     "transform": Box(
-        0.25, 0.60, "The same for each $u_j$:\n$A x_j = u_j$ becomes $A_T x_j = b_j$", ("substitute", "errors of b")
+        0.24, 0.64, "The same for each $u_j$:\n$A x_j = u_j$ becomes $A_T x_j = b_j$", ("substitute", "errors of b")
     ),
     "substitute": Box(
-        0.25,
-        0.38,
+        0.24,
+        0.43,
         "Back substitution in $A_T x_j = b_j$\ngives $\\hat A^{-1} = [x_1 \\;\\ldots\\; x_n]$",
-        ("back errors", "inverse"),
+        ("errors of x", "inverse"),
     ),
-    "errors of A_T": Box(0.77, 0.79, "$\\tilde A$, error in $A_T$, (59)", ("errors of b",)),
-    "errors of b": Box(0.77, 0.64, "$\\tilde b_j$, error in $b_j$, (60)", ("sum",)),
-    "sum": Box(
-        0.77, 0.49, "$\\delta A = \\tilde A + \\Delta A$,  $\\delta b_j = \\tilde b_j + \\Delta b_j$", ("inverse",)
+    "errors of A_T": Box(0.76, 0.82, "$\\tilde A$, error in $A_T$, (59)", ("errors of b",)),
+    "errors of b": Box(0.76, 0.64, "$\\tilde b_j$, error in $b_j$, (60)", ("errors of x",)),
+    "errors of x": Box(0.76, 0.43, "$\\Delta A$ once, each $\\Delta b_j$, (89), (90)", ("sum of errors",)),
+    "sum of errors": Box(
+        0.76, 0.28, "$\\delta A = \\tilde A + \\Delta A$,  $\\delta b_j = \\tilde b_j + \\Delta b_j$", ("inverse",)
     ),
-    "back errors": Box(0.77, 0.34, "$\\Delta A$ once, each $\\Delta b_j$, (89), (90)", ("sum",)),
     "inverse": Box(
         0.5,
-        0.17,
+        0.13,
         "$\\delta(A^{-1}) = \\hat A^{-1}\\;[\\,\\delta b_1 - \\delta A\\,x_1"
         " \\;\\ldots\\; \\delta b_n - \\delta A\\,x_n\\,]$, (95)",
         ("norm",),
     ),
-    "norm": Box(0.5, 0.03, "$\\|\\delta(A^{-1})\\|$, the error bound for $A^{-1}$", ()),
+    "norm": Box(0.5, 0.0, "$\\|\\delta(A^{-1})\\|$, the error bound for $A^{-1}$", ()),
 }
 
 
@@ -58,10 +59,10 @@ def flow_chart(ax: Axes) -> list[Artist]:
     """Figure III-1, drawn anew: boxes and arrows."""
     ax.set_axis_off()
     ax.set_xlim(0, 1)
-    ax.set_ylim(-0.02, 1.02)
+    ax.set_ylim(-0.05, 1.02)
     drawn = {}
     for name, box in CHART.items():
-        errors = name.startswith(("errors", "sum", "back"))
+        errors = "errors" in name
         style = {
             "boxstyle": "round,pad=0.45",
             "facecolor": "#FBEADF" if errors else "#DCEBF5",
@@ -136,7 +137,7 @@ def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
 def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: str = "size") -> list[Artist]:
     """Bound over error: medians with the range as a band against the size, or points against the condition number."""
     artists: list[Artist] = []
-    for name, marker, colour in zip(bounds, "osD^vP", _colours(len(bounds)), strict=False):
+    for name, marker, colour in zip(bounds, "osD^Pv", _colours(len(bounds)), strict=False):
         having = [one for one in trials if name in one.bounds and one.error]
         if against == "condition":
             x = [one.condition for one in having]
@@ -150,7 +151,10 @@ def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: st
         artists += ax.plot(sizes, [np.median(g) for g in groups], marker=marker, color=colour, lw=1, label=name)
     artists.append(ax.axhline(1, color=BOUND, lw=1.2))
     ax.set_yscale("log")
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     if against == "condition":
+        limit = float(1 / trials[0].matrix.format.unit_roundoff)
+        artists.append(ax.axvline(limit, color=REFERENCE, ls=":", label=r"$1/\beta$"))
         ax.set_xscale("log")
     label(ax, "condition number (no unit)" if against == "condition" else "rows $n$", "bound / error (no unit)")
     return artists

@@ -9,7 +9,7 @@ Source: hung1984, ch. II, section 11; the texts of the boxes are in hung1982, ch
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple, cast
@@ -257,23 +257,32 @@ def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) ->
 
     Parameters
     ----------
-    reduction : of FloatArrays or exact entries, for an exact bound, or of float64.
+    reduction : of FloatArrays or exact entries, for an exact bound, or of float64; of an inverse, so that its first
+        right-hand sides are the columns of the identity.
     beta : unit roundoff β.
     reading : by default with signs, the norm of (95), and the computed inverse of A.
     """
-    reading = reading or Reading()
-    norm = NORMS[reading.norm]
+    return next(evaluate_all(reduction, beta, (reading or Reading(),)))
+
+
+def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) -> Iterator[Outcome]:
+    """The same in several readings, with what they share computed once."""
     solution = _plain(reduction.solution)
-    first = triangularization_errors(reduction, beta, reading.signed)
-    second = back_substitution_errors(reduction, beta, reading.signed)
-    errors = resultant_errors(first, second)
-    front = _upper_inverse(reduction.stages[-1]) if reading.triangular else solution
-    if reading.form == "norms throughout":
-        bound = norm(front) * _sum_of_norms(reduction, beta, second, norm)
-    else:
-        e = bracket(errors, solution, reading.signed)
-        bound = norm(inverse_error(front, e, reading.signed)) if reading.form == "chart" else norm(front) * norm(e)
-    return Outcome(reading, reduction, beta, errors, bound, norm(solution))
+    second = {signed: back_substitution_errors(reduction, beta, signed) for signed in (True, False)}
+    errors = {s: resultant_errors(triangularization_errors(reduction, beta, s), second[s]) for s in second}
+    brackets = {signed: bracket(errors[signed], solution, signed) for signed in errors}
+    # The rows of the errors are in the order of elimination; so are the columns of the inverse before them.
+    order = np.argmax(_plain(reduction.rights[0]) != 0, axis=1)
+    fronts = {False: solution[:, order], True: _upper_inverse(reduction.stages[-1])}
+    for reading in several:
+        norm, front, e = NORMS[reading.norm], fronts[reading.triangular], brackets[reading.signed]
+        if reading.form == "norms throughout":
+            bound = norm(front) * _sum_of_norms(reduction, beta, second[False], norm)
+        elif reading.form == "chart":
+            bound = norm(inverse_error(front, e, reading.signed))
+        else:
+            bound = norm(front) * norm(e)
+        yield Outcome(reading, reduction, beta, errors[reading.signed], bound, norm(solution))
 
 
 def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> Outcome:
