@@ -247,7 +247,7 @@ def changed_residue() -> Finding:
     line = hat + a**-1 * change * hat - a**-1 * u_j - a**-1 * residue
     second = (a**-1 * u_j).subs(u_j, a * h) - h
     return compare(
-        bool(sp.expand(line) == 0 and sp.expand(second) == 0),
+        zero(line) and zero(second),
         "both sides of the line agree, and $A^{-1}u_j=h_j$",
         note="(41) and the residue are definitions",
     )
@@ -260,13 +260,12 @@ def changed_error() -> Finding:
 
 @CHECKS.add("hung1982.III.eq42")
 def changed_error_1982() -> Finding:
-    numbers = [42, 43]
-    scanned = [43, 43]
+    numbered, cited = (CHECKS.get(f"hung1982.III.eq{number}") for number in (43, 42))
     right = _step(derivation.first_approach, 2)
     return compare(
-        scanned == numbers and right,
-        "the equation is right; the next one has the number 43 too, and the text below cites this one as (42)",
-        Verdict.OCR if right else Verdict.WRONG,
+        numbered is changed_error_1982 and right,
+        "the equation is right; (43) is the number of the next one, and the text below cites this one as (42)",
+        Verdict.OCR if cited is changed_error_1982 and right else Verdict.WRONG,
         otherwise_note="the scan shows (43) twice",
     )
 
@@ -705,12 +704,15 @@ def _partial_size(n: int, k: int) -> int:
     return sum(bool(theory.trailing(exact(np.ones((n, n), int)), k)[i].any()) for i in range(n))
 
 
+#: The index of the matrix on the left of (58), and that of its block, as printed.
+INDICES_58 = ("j", "i")
+
+
 @CHECKS.add("hung1984.II.eq58")
 def partial_matrix() -> Finding:
-    of_the_matrix, of_the_block = "A_j", "n-i"
     right = all(_partial_size(n, k) == n - k for n in (3, 4, 5) for k in range(1, n))
     return compare(
-        of_the_matrix[-1] == of_the_block[-1],
+        INDICES_58[0] == INDICES_58[1],
         f"$A_i$ has a block of $n-i$ rows, {_partial_size(5, 2)} for $n=5$, $i=2$",
         Verdict.TYPO if right else Verdict.WRONG,
         otherwise_note="one index with two names, $j$ on the left and $i$ in the block",
@@ -814,7 +816,7 @@ def perturbation_defined() -> Finding:
     a, change = sp.symbols("A Delta", commutative=False)
     hat = a + change
     return compare(
-        bool(sp.expand(hat - a - change) == 0),
+        zero(hat - a - change),
         "$\\Delta A=\\hat A-A$, and so on",
         note="definitions of a backward error",
     )
@@ -1035,14 +1037,18 @@ def _weights_counted() -> bool:
     return derivation.back_substitution_weights().holds
 
 
+def _cases_85(k: int, j: int, n: int) -> tuple[bool, bool]:
+    """The first two conditions of (85), as printed in 1984."""
+    return k == j, 1 <= k <= j <= n
+
+
 @CHECKS.add("hung1984.II.eq85")
 def weights() -> Finding:
     n = 4
-    conditions = {(k, j): ((k == j), (1 <= k <= j <= n)) for k in range(1, n + 1) for j in range(1, n + 1)}
-    twice = sum(all(both_hold) for both_hold in conditions.values())
+    twice = sum(all(_cases_85(k, j, n)) for k in range(1, n + 1) for j in range(1, n + 1))
     return compare(
         twice == 0,
-        f"$1\\le k<j\\le n$; as printed, the {twice} diagonal entries of $n={n}$ have two values",
+        f"$1\\le k<j\\le n$; as printed, {twice} entries have two values for $n={n}$, those of the diagonal",
         Verdict.TYPO if _weights_counted() else Verdict.WRONG,
         otherwise_note="$k<j$ is meant, and printed in (87) and in hung1982",
     )
@@ -1218,15 +1224,16 @@ def relative_error_norm() -> Finding:
     )
 
 
+def operations(n: int) -> tuple[int, int]:
+    """Multiplications and divisions of the inverse, and of its bound (96)."""
+    reduce = sum((n - k) * (1 + (n - k) + n) for k in range(1, n))
+    solve = n * sum(n - k + 1 for k in range(1, n + 1))
+    sums = 2 * sum((n - k) ** 2 + (n - k) * n for k in range(1, n))  # by 3 and by 2, (59) and (60)
+    return reduce + solve, sums + n * (n - 1) // 2 + n * n + n**3 + 1  # (89), (90), (95), (96)
+
+
 @CHECKS.add(*both("s11-3.computation"))
 def computation() -> Finding:
-    def operations(n: int) -> tuple[int, int]:
-        """Multiplications and divisions of the inverse, and of its bound (95), (96)."""
-        reduce = sum((n - k) * (1 + (n - k) + n) for k in range(1, n))
-        solve = n * sum(n - k + 1 for k in range(1, n + 1))
-        sums = 2 * sum((n - k) ** 2 + (n - k) * n for k in range(1, n))  # by 3 and by 2, (59) and (60)
-        return reduce + solve, sums + n * (n - 1) // 2 + n * n + n**3 + 1  # (89), (90), (95), (96)
-
     three, twenty = operations(3), operations(20)
     return compare(
         min(three[1] / three[0], twenty[1] / twenty[0]) > 1,
@@ -1460,13 +1467,16 @@ def claims_1982() -> Finding:
     return compare(all(bool(part.agrees) for part in parts), "; ".join(part.recomputed for part in parts))
 
 
+#: What the text of 11.4 cites, and the only figure there is.
+FIGURES = ("Figure 1", "Figure III-1")
+
+
 @CHECKS.add(*both("s11-4.reference-to-figure-1"))
 def reference_to_figure() -> Finding:
-    cited, meant = "Figure 1", "Figure III-1"
-    only = [key for key in CHECKS if "figure-iii-1" in key]
+    cited, meant = FIGURES
     return compare(
-        cited == meant or not only,
+        cited == meant,
         f"the one flow chart of these sections is {meant}",
-        Verdict.TYPO if len(only) == 2 else Verdict.INCONSISTENT,
+        Verdict.TYPO if any("figure-iii-1" in key for key in CHECKS) else Verdict.INCONSISTENT,
         otherwise_note="Figure III-1 is meant",
     )
