@@ -197,7 +197,7 @@ class Column:
         return all(p > q for p, q in zip(self.values, self.values[1:], strict=False))
 
 
-def agree(value: float, printed: str) -> bool:
+def agree(value: float | Fraction, printed: str) -> bool:
     """Whether a value, rounded or chopped to the digits that are printed, is the printed one."""
     low, high = _interval(printed)
     return bool(low <= Fraction(value) < high)
