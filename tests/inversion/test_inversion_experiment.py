@@ -142,22 +142,38 @@ class TestSweeps:
         assert all(cell.family == "random" and cell.pivot for cell in experiment.random_cells())
 
     def test_a_cell_by_hand(self):
-        cell = experiment.Cell("random", FloatFormat(10, 4), True, (2, 3), 4, (7,))
-        names = ("signed, chart, A", "a posteriori")
+        # In four digits some of these are regular and some are not, and the second bound is absent for some.
+        cell = experiment.Cell("nearly singular", FloatFormat(10, 4), True, (2, 3), 20, (8,))
+        names = ("signed, chart, A", "Higham")
         trials = [one for one in cell.trials(names) if one]
         rows = experiment.cell_rows(cell, experiment.cell_sample(cell, names))
         assert [row["bound"] for row in rows] == list(names)
-        for row, tally in zip(rows, experiment.tally(trials, names), strict=True):
-            assert (row["family"], row["format"], row["pivot"], row["n"]) == ("random", "10:4:nearest", "yes", "2-3")
-            assert int(row["trials"]) == tally.trials == 8 - int(row["failed"])
-            assert int(row["absent"]) == tally.absent
-            assert int(row["violations"]) == tally.violations
-            assert row["median"] == f"{tally.median:.4g}"
-            assert row["smallest"] == f"{tally.smallest:.4g}"
-            assert row["largest"] == f"{tally.largest:.4g}"
-            having = [one.ratio(tally.bound) for one in trials if tally.bound in one.bounds]
-            assert int(row["tight"]) == sum(ratio <= 1.1 for ratio in having)
-            assert tally.worst.ratio(tally.bound) == tally.smallest
+        for row, name in zip(rows, names, strict=True):
+            assert (row["family"], row["format"], row["pivot"]) == ("nearly singular", "10:4:nearest", "yes")
+            assert (row["n"], row["failed"], row["exact"]) == ("2-3", str(40 - len(trials)), "0")
+            assert int(row["trials"]) == len(trials)
+            having = [one for one in trials if name in one.bounds]
+            regular = [one for one in trials if one.condition * 5e-4 <= 0.01]
+            assert int(row["absent"]) == len(trials) - len(having)
+            assert int(row["regular"]) == len(regular)
+            assert int(row["violations"]) == sum(one.error > Fraction(one.bounds[name]) for one in having)
+            assert int(row["violations_regular"]) == sum(one.violates(name) for one in having if one in regular)
+            ratios = [float(one.bounds[name] / one.error) for one in having]
+            assert row["smallest"] == f"{min(ratios):.4g}"
+            assert row["median"] == f"{np.median(ratios):.4g}"
+            assert row["largest"] == f"{max(ratios):.4g}"
+            assert row["smallest_regular"] == f"{min(one.ratio(name) for one in having if one in regular):.4g}"
+            assert int(row["tight"]) == sum(ratio <= 1.1 for ratio in ratios)
+        assert 0 < len(regular) < len(trials)
+        assert int(rows[1]["absent"]) > 0
+        assert int(rows[0]["violations"]) > 0
+
+    def test_exact_inverses_have_no_ratio(self):
+        sample = experiment.Sample(("a posteriori",))
+        sample.add(experiment.trial(FMT.array([[2, 0], [0, 4]]), names=("a posteriori",)))
+        (row,) = sample.rows("x", "x", "x", "x")
+        assert (row["trials"], row["exact"], row["absent"], row["violations"]) == ("1", "1", "0", "0")
+        assert (row["median"], row["tight"]) == ("", "0")
 
     def test_singular_ones_are_counted_apart(self):
         cell = experiment.Cell("Hilbert", FloatFormat(10, 1), True, tuple(range(2, 9)), 1, (0,))
@@ -194,7 +210,7 @@ class TestKept:
             parts = [row for row in kept.select(bound=name) if row["format"] != "all"]
             (whole,) = kept.select(bound=name, family="all")
             assert len(parts) == len(cells())
-            for count in ("trials", "failed", "absent", "violations", "tight"):
+            for count in ("trials", "failed", "exact", "absent", "violations", "regular", "tight"):
                 assert sum(int(row[count]) for row in parts) == int(whole[count])
         assert sum(int(row["trials"]) + int(row["failed"]) for row in parts) == sum(cell.count for cell in cells())
 

@@ -76,7 +76,7 @@ def test_table1(ax):
 
 def test_violations(ax):
     rows = [
-        {"family": family, "format": "all", "bound": bound, "trials": "40", "violations": str(k + 2 * i)}
+        {"family": family, "format": "all", "bound": bound, "regular": "40", "violations_regular": str(k + 2 * i)}
         for i, family in enumerate(("random", "Kahan", "all"))
         for k, bound in enumerate(("x", "y"))
     ]

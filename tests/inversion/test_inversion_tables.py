@@ -63,6 +63,8 @@ ROWS = tuple(
         "failed": "0",
         "absent": "3",
         "violations": str(k),
+        "regular": "30",
+        "violations_regular": str(7 + k),
         "smallest": "0.5",
         "median": "2",
         "largest": "9",
@@ -77,6 +79,8 @@ def test_violations():
     table = tables.violations(Frozen({}, ROWS), ("signed, chart, A_T", "ball"))
     assert table.header == ("matrices", "inversions", "signed, chart, $A_T^{-1}$", "ball")
     assert table.body == (("random", "40", "0", "1"), ("Kahan", "40", "0", "1"), ("all", "40", "0", "1"))
+    regular = tables.violations(Frozen({}, ROWS), ("signed, chart, A_T", "ball"), regular=True)
+    assert regular.body[0] == ("random", "30", "7", "8")
 
 
 def test_summary():
