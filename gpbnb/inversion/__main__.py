@@ -28,12 +28,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"got {', '.join(sorted(unknown))}; needed one of {', '.join(experiment.SWEEPS)}")
     for sweep in given.sweeps:
         cells_of, names = experiment.SWEEPS[sweep]
+        origin = provenance(sweep)
         cells = cells_of()[: given.first]
         with tqdm(total=sum(cell.count for cell in cells), desc=sweep, unit="inverse") as bar:
             rows = experiment.sweep_rows(cells, names, bar.update)
         path = given.folder / f"{sweep}.csv"
         with path.open("w", encoding="utf-8", newline="") as file:
-            for key, value in provenance(sweep).items():
+            for key, value in origin.items():
                 file.write(f"# {key}: {value}\n")
             writer = csv.DictWriter(file, fieldnames=list(rows[0]), lineterminator="\n")
             writer.writeheader()

@@ -66,6 +66,11 @@ class Trial:
         """Rows of the matrix."""
         return len(self.matrix)
 
+    @property
+    def regular(self) -> bool:
+        """Whether the condition number is at most :data:`REGULAR` over β: the inverse has two digits and more."""
+        return self.condition * float(self.matrix.format.unit_roundoff) <= REGULAR
+
     def ratio(self, bound: str) -> float:
         """Bound over error; infinity for an exact inverse with a bound above zero."""
         if not self.error:
@@ -145,34 +150,6 @@ _BOUNDS |= {
     "a posteriori": lambda c: bounds.a_posteriori(c.a, c.x),
 }
 ALL_BOUNDS = tuple(_BOUNDS)
-
-
-@dataclass(frozen=True)
-class Tally:
-    """A bound over many trials: in how many it exists and is violated, and bound over error, smallest to largest."""
-
-    bound: str
-    trials: int
-    absent: int
-    violations: int
-    smallest: float
-    median: float
-    largest: float
-    worst: Trial | None
-
-
-def tally(trials: Sequence[Trial], names: Sequence[str]) -> tuple[Tally, ...]:
-    """Count the violations of each bound; `worst` is the trial with the smallest bound over error."""
-    result = []
-    for name in names:
-        having = [one for one in trials if name in one.bounds]
-        ratios = np.array([one.ratio(name) for one in having])
-        worst = having[int(np.argmin(ratios))] if having else None
-        smallest, median, largest = (float(f(ratios)) if having else np.nan for f in (np.min, np.median, np.max))
-        violations = sum(one.violates(name) for one in having)
-        absent = len(trials) - len(having)
-        result.append(Tally(name, len(trials), absent, violations, smallest, median, largest, worst))
-    return tuple(result)
 
 
 # -- matrices -------------------------------------------------------------------------------------
@@ -329,7 +306,7 @@ RANDOM_FORMATS = (
 )
 
 #: How many random inversions of each size, in each format.
-RANDOM_SIZES = {n: 3000 if n <= 6 else 1000 if n <= 10 else 100 for n in range(2, 21)}
+RANDOM_SIZES = {n: 3000 if n <= 6 else 1010 if n <= 10 else 100 for n in range(2, 21)}
 
 
 def variant_cells() -> list[Cell]:
@@ -352,35 +329,57 @@ SWEEPS: dict[str, tuple[Callable[[], list[Cell]], tuple[str, ...]]] = {
 }
 
 _FIELDS = ("family", "format", "pivot", "n", "bound")
-_COUNTS = ("trials", "failed", "absent", "violations", "tight")
-_RATIOS = ("smallest", "median", "largest")
+_COUNTS = ("trials", "failed", "exact", "absent", "violations", "regular", "violations_regular", "tight")
+_RATIOS = ("smallest", "smallest_regular", "median", "largest")
+
+#: A bound is tight if it is at most so many times the error.
 TIGHT = 1.1
+
+#: Condition number times unit error up to which first-order analysis can be expected to say something.
+REGULAR = 0.01
 
 
 class Sample:
-    """What is kept of trials: for each bound its ratios to the error, and how often it was absent or violated."""
+    """What is kept of trials: for each bound how often it was absent or violated, and its ratios to the error.
+
+    `failed` counts matrices that are singular in the format, `exact` inverses without error, which have no ratio;
+    `regular` matrices have a condition number of at most :data:`REGULAR` over β.
+    """
 
     def __init__(self, names: Sequence[str]) -> None:
-        self.trials = self.failed = 0
-        self.ratios: dict[str, list[float]] = {name: [] for name in names}
+        self.trials = self.failed = self.exact = self.regular = 0
+        self.present = dict.fromkeys(names, 0)
         self.violations = dict.fromkeys(names, 0)
+        self.violations_regular = dict.fromkeys(names, 0)
+        self.ratios: dict[str, list[float]] = {name: [] for name in names}
+        self.ratios_regular: dict[str, list[float]] = {name: [] for name in names}
 
     def add(self, one: Trial | None) -> None:
-        """Count a trial."""
+        """Count a trial; None for a matrix that is singular in the format."""
         if one is None:
             self.failed += 1
             return
+        regular = one.regular
         self.trials += 1
+        self.exact += not one.error
+        self.regular += regular
         for name in one.bounds:
-            self.ratios[name].append(one.ratio(name))
+            self.present[name] += 1
             self.violations[name] += one.violates(name)
+            self.violations_regular[name] += regular and one.violates(name)
+            if one.error:
+                self.ratios[name].append(one.ratio(name))
+                if regular:
+                    self.ratios_regular[name].append(one.ratio(name))
 
     def merge(self, other: Sample) -> None:
         """Count the trials of another sample."""
-        self.trials, self.failed = self.trials + other.trials, self.failed + other.failed
-        for name, ratios in other.ratios.items():
-            self.ratios[name] += ratios
-            self.violations[name] += other.violations[name]
+        for name in ("trials", "failed", "exact", "regular"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for counts in ("present", "violations", "violations_regular", "ratios", "ratios_regular"):
+            mine = getattr(self, counts)
+            for name, count in getattr(other, counts).items():
+                mine[name] = mine[name] + count
 
     def rows(self, *where: str) -> list[dict[str, str]]:
         """One row of text a bound, with four digits of every ratio."""
@@ -389,13 +388,18 @@ class Sample:
             counts = (
                 self.trials,
                 self.failed,
-                self.trials - len(ratios),
+                self.exact,
+                self.trials - self.present[name],
                 self.violations[name],
+                self.regular,
+                self.violations_regular[name],
                 sum(r <= TIGHT for r in ratios),
             )
-            of = [f"{f(ratios):.4g}" if ratios else "" for f in (np.min, np.median, np.max)]
-            fields = (*where, name, *map(str, counts), *of)
-            result.append(dict(zip((*_FIELDS, *_COUNTS, *_RATIOS), fields, strict=True)))
+            pairs = ((np.min, ratios), (np.min, self.ratios_regular[name]), (np.median, ratios), (np.max, ratios))
+            of = [f"{f(r):.4g}" if r else "" for f, r in pairs]
+            result.append(
+                dict(zip((*_FIELDS, *_COUNTS, *_RATIOS), (*where, name, *map(str, counts), *of), strict=True))
+            )
         return result
 
 

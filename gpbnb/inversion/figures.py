@@ -117,13 +117,13 @@ def table1(bounds: Sequence[Column], errors: Sequence[Column], ax: Axes) -> list
 
 
 def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
-    """Share of the inversions of each family whose error exceeds a bound, a bar for each bound."""
+    """Share of the regular matrices of each family whose error exceeds a bound, a bar for each bound."""
     families = [str(row["family"]) for row in result.select(format="all", bound=bounds[0]) if row["family"] != "all"]
     width = 0.8 / len(bounds)
     artists: list[Artist] = []
     for k, (name, colour) in enumerate(zip(bounds, _colours(len(bounds)), strict=True)):
         rows = [result.select(family=family, format="all", bound=name)[0] for family in families]
-        share = [100 * int(row["violations"]) / int(row["trials"]) for row in rows]
+        share = [100 * int(row["violations_regular"]) / max(1, int(row["regular"])) for row in rows]
         bars = ax.bar(
             np.arange(len(families)) + (k - (len(bounds) - 1) / 2) * width, share, width, color=colour, label=name
         )

@@ -77,29 +77,27 @@ def possibilities(found: Sequence[Possible]) -> Table:
     return Table(f"{len(found)} searches", header, tuple((*key, *line) for key, line in lines.items()))
 
 
-def violations(result: Frozen, bounds: Sequence[str]) -> Table:
-    """Violations of some bounds by family of matrices, of how many inversions."""
+def violations(result: Frozen, bounds: Sequence[str], regular: bool = False) -> Table:
+    """Violations of some bounds by family of matrices, of how many inversions; or of the regular matrices alone."""
+    trials, counts = ("regular", "violations_regular") if regular else ("trials", "violations")
     families = [str(row["family"]) for row in result.select(format="all", bound=bounds[0])]
     body = []
     for family in families:
-        rows = {name: result.select(family=family, format="all", bound=name)[0] for name in bounds}
-        counts = (rows[name]["violations"] for name in bounds)
-        body.append((family, rows[bounds[0]]["trials"], *counts))
+        rows = [result.select(family=family, format="all", bound=name)[0] for name in bounds]
+        body.append((family, rows[0][trials], *(row[counts] for row in rows)))
     header = ("matrices", "inversions", *map(_math, bounds))
     return Table(f"violations in {len(body)} families", header, tuple(body))
 
 
 def summary(result: Frozen, bounds: Sequence[str]) -> Table:
     """Each bound over all inversions of a sweep: how often it says nothing, is violated, and how far it is off."""
+    keys = ("trials", "absent", "violations", "smallest", "median", "largest")
     body = []
     for name in bounds:
         (row,) = result.select(family="all", format="all", bound=name)
-        body.append((_math(name), *(str(row[key]) for key in ("trials", "absent", "violations", *_RATIOS))))
-    header = ("bound", "inversions", "says nothing", "violated", *(f"bound / error: {name}" for name in _RATIOS))
-    return Table(f"{len(body)} bounds", header, tuple(body))
-
-
-_RATIOS = ("smallest", "median", "largest")
+        body.append((_math(name), *(str(row[key]) for key in keys)))
+    ratios = (f"bound / error: {name}" for name in keys[3:])
+    return Table(f"{len(body)} bounds", ("bound", "inversions", "says nothing", "exceeded", *ratios), tuple(body))
 
 
 def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:

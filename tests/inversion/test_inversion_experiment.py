@@ -138,18 +138,18 @@ class TestSweeps:
         variants = experiment.variant_cells()
         assert {cell.family for cell in variants} == set(experiment.FAMILIES)
         assert all(cell.sizes == tuple(range(2, 21)) for cell in variants)
-        assert sum(cell.count for cell in experiment.random_cells()) == 100_000
+        assert sum(cell.count for cell in experiment.random_cells()) == 100_200
         assert all(cell.family == "random" and cell.pivot for cell in experiment.random_cells())
 
     def test_a_cell_by_hand(self):
         # In four digits some of these are regular and some are not, and the second bound is absent for some.
-        cell = experiment.Cell("nearly singular", FloatFormat(10, 4), True, (2, 3), 20, (8,))
+        cell = experiment.Cell("graded", FloatFormat(10, 4), True, (2, 3), 20, (29,))
         names = ("signed, chart, A", "Higham")
         trials = [one for one in cell.trials(names) if one]
         rows = experiment.cell_rows(cell, experiment.cell_sample(cell, names))
         assert [row["bound"] for row in rows] == list(names)
         for row, name in zip(rows, names, strict=True):
-            assert (row["family"], row["format"], row["pivot"]) == ("nearly singular", "10:4:nearest", "yes")
+            assert (row["family"], row["format"], row["pivot"]) == ("graded", "10:4:nearest", "yes")
             assert (row["n"], row["failed"], row["exact"]) == ("2-3", str(40 - len(trials)), "0")
             assert int(row["trials"]) == len(trials)
             having = [one for one in trials if name in one.bounds]
@@ -162,7 +162,8 @@ class TestSweeps:
             assert row["smallest"] == f"{min(ratios):.4g}"
             assert row["median"] == f"{np.median(ratios):.4g}"
             assert row["largest"] == f"{max(ratios):.4g}"
-            assert row["smallest_regular"] == f"{min(one.ratio(name) for one in having if one in regular):.4g}"
+            of_regular = [one.ratio(name) for one in having if one in regular]
+            assert row["smallest_regular"] == (f"{min(of_regular):.4g}" if of_regular else "")
             assert int(row["tight"]) == sum(ratio <= 1.1 for ratio in ratios)
         assert 0 < len(regular) < len(trials)
         assert int(rows[1]["absent"]) > 0
@@ -241,7 +242,7 @@ class TestKept:
 
     def test_a_posteriori_reaches_its_goal(self):
         (whole,) = experiment.frozen("random").select(family="all", bound="a posteriori")
-        assert int(whole["trials"]) + int(whole["failed"]) == 100_000
+        assert int(whole["trials"]) >= 100_000
         assert float(whole["median"]) <= 1.1
         assert int(whole["tight"]) > int(whole["trials"]) / 2
 
