@@ -198,7 +198,7 @@ def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
 
     References
     ----------
-    Higham 2002, section 14.1; Rump 2010, section 10.
+    Higham 2002, chapter 14; Rump 2010.
     """
     with _working(4 * _bits(x.format) + 64 if bits is None else bits):
         guess = _balls(x)
