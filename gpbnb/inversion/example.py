@@ -369,9 +369,13 @@ def claims() -> tuple[Claim, ...]:
 
 @dataclass(frozen=True)
 class Possible:
-    """Whether a printed error is that of any matrix of numbers of a wordlength, and one such matrix."""
+    """Whether a printed error is that of any matrix of numbers of a wordlength, and one such matrix.
+
+    `reference` is the matrix whose inverse it is held against: "given", or "stored" in the wordlength.
+    """
 
     wordlength: Wordlength
+    reference: str
     places: int
     norm: str
     relative: bool
@@ -384,25 +388,32 @@ SEARCHED = ("column sum", "row sum", "largest entry", "Frobenius")
 
 
 def possible(
-    wordlength: Wordlength, places: int, norm: str, relative: bool = False, printed: str | None = None
+    wordlength: Wordlength,
+    places: int,
+    norm: str,
+    relative: bool = False,
+    printed: str | None = None,
+    reference: str = "given",
 ) -> Possible:
     """Look through all matrices X of a wordlength for one whose error has the printed norm.
 
-    The error is against the inverse of the matrix as given. How X was computed does not matter: rounding plays no part,
-    only which numbers there are.
+    How X was computed does not matter: rounding plays no part, only which numbers there are.
 
     Parameters
     ----------
     printed : an error norm as text; that of Table 1 by default.
+    reference : the error is against the inverse of the matrix as "given", or as "stored" in the wordlength.
 
     Raises
     ------
-    ValueError : `norm` is not one of :data:`SEARCHED`.
+    ValueError : `norm` is not one of :data:`SEARCHED`, or `reference` is another word.
     """
     if norm not in SEARCHED:
         raise ValueError(f"norm: got {norm!r}; needed one of {', '.join(SEARCHED)}")
+    if reference not in ("given", "stored"):
+        raise ValueError(f"reference: got {reference!r}; needed 'given' or 'stored'")
     printed = printed or PRINTED["error"][PLACES.index(places)]
-    true = _inverse(matrix())
+    true = _inverse(matrix() if reference == "given" else _each(matrix(), wordlength.rounder(places)))
     scale = Fraction(float(NORMS[norm](true))) if relative else Fraction(1)
     low, high = (end * scale for end in _interval(printed))
     square = norm == "Frobenius"
@@ -422,16 +433,20 @@ def possible(
                 witness[index] = min(candidates[index])[1]
             for index, value in zip(group, chosen, strict=True):
                 witness[index] = value
-            return Possible(wordlength, places, norm, relative, printed, witness)
-    return Possible(wordlength, places, norm, relative, printed, None)
+            return Possible(wordlength, reference, places, norm, relative, printed, witness)
+    return Possible(wordlength, reference, places, norm, relative, printed, None)
 
 
 @cache
 def all_possible() -> tuple[Possible, ...]:
-    """Every wordlength, its rounding aside, which does not matter here; one of a digit more; every norm searched."""
-    wordlengths = [Wordlength(kind, Rounding.NEAREST) for kind in (*KINDS, "t = places + 2")]
-    cases = product(wordlengths, SEARCHED, (False, True), PLACES)
-    return tuple(possible(wordlength, places, norm, relative) for wordlength, norm, relative, places in cases)
+    """Every wordlength, one of a digit more, and every norm searched.
+
+    Rounding matters only where three digits cannot hold the matrix as given.
+    """
+    given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in (*KINDS, "t = places + 2")]
+    stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding]
+    cases = product((*given, *stored), SEARCHED, (False, True), PLACES)
+    return tuple(possible(w, places, norm, relative, None, r) for (w, r), norm, relative, places in cases)
 
 
 def _groups(norm: str) -> list[list[tuple[int, int]]]:

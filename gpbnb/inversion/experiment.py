@@ -415,8 +415,14 @@ def cell_sample(cell: Cell, names: Sequence[str], done: Callable[[], Any] | None
 
 def cell_rows(cell: Cell, sample: Sample) -> list[dict[str, str]]:
     """The rows of one cell of a sweep, as they are kept."""
+    return sample.rows(*_where(cell).values())
+
+
+def _where(cell: Cell) -> dict[str, str]:
+    """How the rows of a cell are told from others."""
     sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
-    return sample.rows(cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
+    texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
+    return dict(zip(_FIELDS, texts, strict=False))
 
 
 def sweep_rows(
@@ -433,6 +439,26 @@ def sweep_rows(
         for family, sample in families.items():
             rows += sample.rows(family, "all", "all", "all")
     return rows + whole.rows("all", "all", "all", "all")
+
+
+def worst(bound: str, sweep: str = "variants") -> Trial:
+    """Of the regular matrices of a kept sweep, the one whose error is largest beside a bound; computed anew.
+
+    Parameters
+    ----------
+    bound : one of those of the sweep, as text.
+
+    Raises
+    ------
+    ValueError : the sweep does not have the bound.
+    """
+    rows = [row for row in frozen(sweep).select(bound=bound) if row["format"] != "all" and row["smallest_regular"]]
+    if not rows:
+        raise ValueError(f"got bound {bound!r}; needed one of {', '.join(SWEEPS[sweep][1])}")
+    row = min(rows, key=lambda row: float(row["smallest_regular"]))
+    (cell,) = (cell for cell in SWEEPS[sweep][0]() if all(row[key] == text for key, text in _where(cell).items()))
+    regular = (one for one in cell.trials((bound,)) if one is not None and one.error and one.regular)
+    return min(regular, key=lambda one: one.ratio(bound))
 
 
 def format_name(fmt: FloatFormat) -> str:

@@ -66,7 +66,8 @@ def possibilities(found: Sequence[Possible]) -> Table:
     """Which of the printed errors some matrix of numbers of a wordlength has, in each norm."""
     lines: dict[tuple[str, str, str], list[str]] = {}
     for one in found:
-        key = one.wordlength.kind, one.norm, "relative" if one.relative else "absolute"
+        wordlength = one.wordlength.kind if one.reference == "given" else f"{one.wordlength}, matrix stored so"
+        key = wordlength, one.norm, "relative" if one.relative else "absolute"
         lines.setdefault(key, []).append("no" if one.witness is None else "yes")
     header = (
         "wordlength",
@@ -98,6 +99,25 @@ def summary(result: Frozen, bounds: Sequence[str]) -> Table:
         body.append((_math(name), *(str(row[key]) for key in keys)))
     ratios = (f"bound / error: {name}" for name in keys[3:])
     return Table(f"{len(body)} bounds", ("bound", "inversions", "says nothing", "exceeded", *ratios), tuple(body))
+
+
+def worst(trials: Mapping[str, Trial]) -> Table:
+    """For each bound the inverse whose error exceeds it the most."""
+    body = [
+        (
+            _math(name),
+            f"{one.family}, {one.n} rows",
+            f"{digits(one.matrix.format)}, {one.matrix.format.rounding.value}",
+            "yes" if one.pivot else "no",
+            f"{one.condition:.3g}",
+            f"{float(one.error):.3e}",
+            f"{one.bounds[name]:.3e}",
+            f"{one.ratio(name):.3g}",
+        )
+        for name, one in trials.items()
+    ]
+    header = ("bound", "matrix", "format", "pivoting", "condition", "error", "its bound", "bound / error")
+    return Table(f"{len(body)} inversions", header, tuple(body))
 
 
 def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:

@@ -229,8 +229,9 @@ class TestPossible:
     def test_every_witness_has_the_printed_error(self):
         found = [one for one in example.all_possible() if one.witness is not None]
         assert found
-        true = exact_inverse()
         for one in found:
+            assert one.reference == "given"
+            true = exact_inverse()
             scale = norm_of(true, one.norm) if one.relative else 1
             assert example.agree(norm_of(one.witness - true, one.norm) / scale, one.printed)
             for index in np.ndindex(3, 3):
@@ -263,9 +264,35 @@ class TestPossible:
             assert norm_of(best, norm) > Fraction(PRINTED["error"][1]) * Fraction("1.001")
             assert example.possible(MORE, 5, norm).witness is None
 
-    def test_other_norms_are_refused(self):
+    @pytest.mark.parametrize("rounding", [NEAREST, CHOP])
+    def test_against_the_matrix_as_stored(self, rounding):
+        # Three digits: the error of the best inverse of the stored matrix is found possible.
+        wordlength = Wordlength("t = places", rounding)
+        fl = wordlength.rounder(3)
+        stored = example._each(example.matrix(), fl)
+        true = example._inverse(stored)
+        assert (true @ stored == np.eye(3, dtype=int)).all()
+        for norm in example.SEARCHED:
+            error = norm_of(example.round_once(stored, fl) - true, norm)
+            found = example.possible(wordlength, 3, norm, printed=f"{float(error):.3e}", reference="stored")
+            assert example.agree(norm_of(found.witness - true, norm), found.printed)
+            assert found.reference == "stored"
+        for norm in example.SEARCHED:  # and the largest error of the best inverse is above the print
+            assert norm_of(example.round_once(stored, fl) - true, norm) > Fraction(PRINTED["error"][0])
+
+    def test_all_of_them(self):
+        found = example.all_possible()
+        assert len(found) == 6 * 4 * 2 * 3
+        assert sum(one.reference == "stored" for one in found) == 2 * 4 * 2 * 3
+        for one in found:
+            within = one.wordlength.kind != "t = places + 2"
+            assert not within or one.witness is None
+
+    def test_other_words_are_refused(self):
         with pytest.raises(ValueError, match="norm: got 'spectral'; needed one of column sum, row sum"):
             example.possible(MORE, 3, "spectral")
+        with pytest.raises(ValueError, match="reference: got 'rounded'; needed 'given' or 'stored'"):
+            example.possible(MORE, 3, "row sum", reference="rounded")
 
     @pytest.mark.parametrize(("y", "up", "down"), [("0.1000", "0.1001", "0.09999"), ("-0.1000", "-0.09999", "-0.1001"),
                                                    ("0.9999", "1", "0.9998"), ("2", "2.001", "1.999")])  # fmt: skip

@@ -248,6 +248,20 @@ class TestKept:
         assert float(whole["median"]) <= 1.1
         assert int(whole["tight"]) > int(whole["trials"]) / 2
 
+    @pytest.mark.parametrize("bound", ["signed, (96), A_T", "sizes, chart, A_T"])
+    def test_the_worst_is_the_one_that_was_kept(self, bound):
+        one = experiment.worst(bound)
+        assert one.regular
+        assert one.violates(bound)
+        least = min(float(row["smallest_regular"] or "inf") for row in experiment.frozen("variants").select(bound=bound))
+        assert f"{one.ratio(bound):.4g}" == f"{least:.4g}"
+        again = experiment.trial(one.matrix, one.pivot, (bound,))
+        assert (again.error, again.bounds) == (one.error, one.bounds)
+
+    def test_no_such_bound(self):
+        with pytest.raises(ValueError, match="got bound 'best'; needed one of signed, chart, A, signed, chart, A_T"):
+            experiment.worst("best")
+
     def test_no_such_sweep(self):
         with pytest.raises(ValueError, match="got sweep 'all'; needed one of variants, random"):
             experiment.frozen("all")

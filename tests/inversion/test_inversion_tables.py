@@ -48,7 +48,8 @@ def test_claims():
 def test_possibilities():
     found = example.all_possible()
     table = tables.possibilities(found)
-    assert len(table.body) == 4 * 4 * 2
+    assert len(table.body) == 6 * 4 * 2
+    assert table.body[-1][0] == "t = places, chop, matrix stored so"
     answers = [answer for line in table.body for answer in line[3:]]
     assert answers == ["no" if one.witness is None else "yes" for one in found]
     assert table.header[3] == "3 places: 7.782e-5"
@@ -86,6 +87,14 @@ def test_violations():
 def test_summary():
     table = tables.summary(Frozen({}, ROWS), ("ball",))
     assert table.body == (("ball", "40", "3", "1", "0.5", "2", "9"),)
+
+
+def test_worst():
+    one = experiment.trial(FloatFormat(10, 3).array([[-12, -11], [-17, 83]]), True, ("signed, chart, A",), "by hand")
+    (line,) = tables.worst({"signed, chart, A": one}).body
+    assert line[:4] == ("signed, chart, $A^{-1}$", "by hand, 2 rows", "3 decimal digits, nearest", "yes")
+    bound = one.bounds["signed, chart, A"]
+    assert line[4:] == (f"{one.condition:.3g}", f"{float(one.error):.3e}", f"{bound:.3e}", f"{bound / one.error:.3g}")
 
 
 def test_worked():
