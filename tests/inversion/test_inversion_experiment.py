@@ -253,7 +253,9 @@ class TestKept:
         one = experiment.worst(bound)
         assert one.regular
         assert one.violates(bound)
-        least = min(float(row["smallest_regular"] or "inf") for row in experiment.frozen("variants").select(bound=bound))
+        least = min(
+            float(row["smallest_regular"] or "inf") for row in experiment.frozen("variants").select(bound=bound)
+        )
         assert f"{one.ratio(bound):.4g}" == f"{least:.4g}"
         again = experiment.trial(one.matrix, one.pivot, (bound,))
         assert (again.error, again.bounds) == (one.error, one.bounds)
