@@ -15,7 +15,7 @@ from gpbnb.derivation import Derivation, Step, errors, first_order, held, over, 
 EPSILON = sp.Symbol("epsilon")
 N, J, K = sp.symbols("n j k", integer=True, positive=True)
 
-#: Matrices and columns: A and its change Δ, L, A_T, the changes of (91) and (92), u, x, r and h.
+#: Symbols of the matrices A, its change Δ, L, A_T and the changes of (91) and (92), and of the columns u, x, r and h.
 A, DELTA, L, A_T = sp.symbols(r"A \Delta L A_T", commutative=False)
 A_TILDE, DELTA_A, B_TILDE, DELTA_B = sp.symbols(r"\tilde{A} {\Delta\!A} \tilde{b} {\Delta\!b}", commutative=False)
 X_HAT, X, H_HAT, H, ERROR, B, D_X = sp.symbols(r"\hat{x} x \hat{h} h E b {\Delta\!x}", commutative=False)

@@ -30,7 +30,7 @@ from gpbnb.inversion.procedure import NORMS
 #: The matrix, as printed.
 MATRIX = (("3.235", "-1.234", "3.256"), ("1.023", "-5.235", "0.921"), ("1.336", "2.120", "-8.235"))
 
-#: Table 1, as printed: places after the decimal point, and the two columns of error norms.
+#: The printed numbers of Table 1, places after the decimal point and the two columns of error norms.
 PLACES = (3, 5, 8)
 PRINTED = {"bound": ("3.706e-2", "3.706e-4", "3.706e-7"), "error": ("7.782e-5", "4.530e-7", "4.672e-10")}
 

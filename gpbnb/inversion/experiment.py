@@ -322,7 +322,7 @@ def random_cells() -> list[Cell]:
     return [Cell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
 
 
-#: The sweeps whose results are kept in the package: cells and bounds of each.
+#: Cells and bounds of each sweep whose results are kept in the package.
 SWEEPS: dict[str, tuple[Callable[[], list[Cell]], tuple[str, ...]]] = {
     "variants": (variant_cells, ALL_BOUNDS),
     "random": (random_cells, BETTER[2:]),

@@ -25,7 +25,7 @@ class Box(NamedTuple):
     follows: tuple[str, ...]
 
 
-#: Figure III-1: the computation at the left, its errors at the right.
+#: The boxes of Figure III-1, the computation at the left, its errors at the right.
 CHART: Mapping[str, Box] = {
     "given": Box(0.24, 0.97, "Given matrix $A$", ("triangularize",)),
     "triangularize": Box(0.24, 0.82, "Triangularize $A$ into $A_T$", ("transform", "errors of A_T")),

@@ -139,6 +139,7 @@ def _replaced(a: FloatArray, corner: tuple[int, int], block: FloatArray) -> Floa
 
 # -- its errors, from the digits of the computation -----------------------------------------------
 
+#: Norms by name.
 NORMS: dict[str, Norm] = {
     "column sum": theory.column_sum,
     "row sum": lambda a: abs(a).sum(axis=1).max(),
@@ -147,7 +148,7 @@ NORMS: dict[str, Norm] = {
     "spectral": lambda a: np.linalg.norm(np.asarray(a, dtype=np.float64), 2),
 }
 
-#: What norms are taken of: the matrix of (95), as the last box says; the factors of (96); every summand, (61), (62).
+#: What norms are taken of, the matrix of (95), as the last box says, the factors of (96), or every summand, (61), (62).
 FORMS = ("chart", "(96)", "norms throughout")
 
 
