@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from gpbnb.inversion.example import PLACES, PRINTED, Column
 from gpbnb.inversion.experiment import Frozen, Trial
+from gpbnb.inversion.tables import in_math
 from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
 
 
@@ -96,7 +97,8 @@ def table1(bounds: Sequence[Column], errors: Sequence[Column], ax: Axes) -> list
     ):
         x = np.repeat(np.arange(len(PLACES)) + shift, len(columns))
         y = np.array([one.values for one in columns]).T.ravel()
-        artists += ax.plot(x, y, "_", ms=11, color=colour, alpha=0.25, label=name)
+        artists += ax.plot(x, y, "_", ms=11, color=colour, alpha=0.25)
+        ax.plot([], [], "_", ms=11, color=colour, label=name)  # in the legend without the haze
         values = [float(value) for value in PRINTED[printed]]
         marker = "s" if printed == "bound" else "o"
         artists += ax.plot(
@@ -125,7 +127,11 @@ def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
         rows = [result.select(family=family, format="all", bound=name)[0] for family in families]
         share = [100 * int(row["violations_regular"]) / max(1, int(row["regular"])) for row in rows]
         bars = ax.bar(
-            np.arange(len(families)) + (k - (len(bounds) - 1) / 2) * width, share, width, color=colour, label=name
+            np.arange(len(families)) + (k - (len(bounds) - 1) / 2) * width,
+            share,
+            width,
+            color=colour,
+            label=in_math(name),
         )
         artists += list(bars)
     ax.set_xticks(range(len(families)), [family.replace(" ", "\n") for family in families], fontsize=9)

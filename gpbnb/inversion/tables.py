@@ -12,13 +12,13 @@ from gpbnb.tables import Table, digits
 def table1(readings: Sequence[tuple[Column, Column]]) -> Table:
     """The six numbers of Table 1 in some readings, each with its ratio to the printed one."""
     header = ("wordlength", "reading", *(f"{name}, {p}" for name in ("bound", "error") for p in PLACES))
-    printed = ("as printed", "", *(f"{float(value):.3e}" for name in ("bound", "error") for value in PRINTED[name]))
+    printed = ("as printed", "", *(_number(float(value)) for name in ("bound", "error") for value in PRINTED[name]))
     body = [
         (
             str(bound.wordlength),
-            _math(bound.detail),
+            in_math(bound.detail),
             *(
-                f"{value:.3e} ({ratio:.3g})"
+                f"{_number(value)} ({ratio:.3g})"
                 for column in (bound, error)
                 for value, ratio in zip(column.values, column.ratios, strict=True)
             ),
@@ -48,7 +48,7 @@ def searches(found: Sequence[Search]) -> Table:
             str(one.agreements),
             f"{one.expected:.2g}",
             _reading(one.closest),
-            ", ".join(f"{value:.3e}" for value in one.closest.values),
+            ", ".join(map(_number, one.closest.values)),
             ", ".join(f"{ratio:.3g}" for ratio in one.closest.ratios),
         )
         for one in found
@@ -58,7 +58,7 @@ def searches(found: Sequence[Search]) -> Table:
 
 def claims(found: Sequence[Claim]) -> Table:
     """In how many readings each sentence about Table 1 holds."""
-    body = [(one.name, f"{one.holds} of {one.readings}", _math(one.exception) or "none") for one in found]
+    body = [(one.name, f"{one.holds} of {one.readings}", in_math(one.exception) or "none") for one in found]
     return Table(f"{len(body)} claims", ("claim", "holds in", "first exception"), tuple(body))
 
 
@@ -86,7 +86,7 @@ def violations(result: Frozen, bounds: Sequence[str], regular: bool = False) -> 
     for family in families:
         rows = [result.select(family=family, format="all", bound=name)[0] for name in bounds]
         body.append((family, rows[0][trials], *(row[counts] for row in rows)))
-    header = ("matrices", "inversions", *map(_math, bounds))
+    header = ("matrices", "inversions", *map(in_math, bounds))
     return Table(f"violations in {len(body)} families", header, tuple(body))
 
 
@@ -96,22 +96,23 @@ def summary(result: Frozen, bounds: Sequence[str]) -> Table:
     body = []
     for name in bounds:
         (row,) = result.select(family="all", format="all", bound=name)
-        body.append((_math(name), *(str(row[key]) for key in keys)))
-    ratios = (f"bound / error: {name}" for name in keys[3:])
-    return Table(f"{len(body)} bounds", ("bound", "inversions", "says nothing", "exceeded", *ratios), tuple(body))
+        ratios = (_number(float(row[key])) if "e" in row[key] else row[key] for key in keys[3:])
+        body.append((in_math(name), *(row[key] for key in keys[:3]), *ratios))
+    names = (f"bound / error: {name}" for name in keys[3:])
+    return Table(f"{len(body)} bounds", ("bound", "inversions", "says nothing", "exceeded", *names), tuple(body))
 
 
 def worst(trials: Mapping[str, Trial]) -> Table:
     """For each bound the inverse whose error exceeds it the most."""
     body = [
         (
-            _math(name),
+            in_math(name),
             f"{one.family}, {one.n} rows",
             f"{digits(one.matrix.format)}, {one.matrix.format.rounding.value}",
             "yes" if one.pivot else "no",
-            f"{one.condition:.3g}",
-            f"{float(one.error):.3e}",
-            f"{one.bounds[name]:.3e}",
+            f"{one.condition:.0f}",
+            _number(float(one.error)),
+            _number(one.bounds[name]),
             f"{one.ratio(name):.3g}",
         )
         for name, one in trials.items()
@@ -124,24 +125,30 @@ def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
     """Single inverses: the matrix, what the format makes of it, its error, and each bound."""
     body = [
         (
-            _math(name),
+            in_math(name),
             "; ".join(" ".join(map(str, row)) for row in one.matrix),
             digits(one.matrix.format),
             "; ".join(" ".join(map(str, row)) for row in one.computed),
-            f"{float(one.error):.3e}",
-            *(f"{one.bounds[bound]:.3e}" if bound in one.bounds else "none" for bound in bounds),
+            _number(float(one.error)),
+            *(_number(one.bounds[bound]) if bound in one.bounds else "none" for bound in bounds),
         )
         for name, one in trials.items()
     ]
-    header = ("example", "matrix, by rows", "format", "computed inverse", "error", *map(_math, bounds))
+    header = ("example", "matrix, by rows", "format", "computed inverse", "error", *map(in_math, bounds))
     return Table(f"{len(body)} worked examples", header, tuple(body))
 
 
 def _reading(one: Column) -> str:
-    return f"{one.wordlength}; {_math(one.detail)}; {one.norm}, {'relative' if one.relative else 'absolute'}"
+    return f"{one.wordlength}; {in_math(one.detail)}; {one.norm}, {'relative' if one.relative else 'absolute'}"
 
 
-def _math(text: str) -> str:
-    """Names of readings with the inverse in mathematics."""
+def in_math(text: str) -> str:
+    """Set the inverse in the name of a reading in mathematics."""
     words = text.split(", ")
     return ", ".join({"A": "$A^{-1}$", "A_T": "$A_T^{-1}$"}.get(word, word) for word in words)
+
+
+def _number(value: float) -> str:
+    """Four digits and a power of ten."""
+    digits_, exponent = f"{value:.3e}".split("e")
+    return rf"${digits_}\cdot 10^{{{int(exponent)}}}$"

@@ -78,12 +78,12 @@ def test_violations(ax):
     rows = [
         {"family": family, "format": "all", "bound": bound, "regular": "40", "violations_regular": str(k + 2 * i)}
         for i, family in enumerate(("random", "Kahan", "all"))
-        for k, bound in enumerate(("x", "y"))
+        for k, bound in enumerate(("x", "chart, A_T"))
     ]
-    bars = figures.violations(Frozen({}, tuple(rows)), ("x", "y"), ax)
+    bars = figures.violations(Frozen({}, tuple(rows)), ("x", "chart, A_T"), ax)
     assert [bar.get_height() for bar in bars] == [0, 5, 2.5, 7.5]
     assert [label.get_text() for label in ax.get_xticklabels()] == ["random", "Kahan"]
-    assert legend_of(ax) == ["x", "y"]
+    assert legend_of(ax) == ["x", "chart, $A_T^{-1}$"]
     assert "(%)" in ax.get_ylabel()
 
 
