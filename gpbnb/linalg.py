@@ -1,16 +1,19 @@
 """Linear algebra in t-digit arithmetic, each result with its order of operations stated.
 
 The order is the content: another order gives other digits. It is the order of hung1984, ch. II.
-Operands are FloatArrays of one format, and so are results.
+Operands are FloatArrays of one format, and so are results. Where their carrier has compiled loops, elimination runs in
+:mod:`gpbnb._kernels.elimination`; the loops here serve every format and every exponent, with the same digits.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from functools import lru_cache
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb._kernels.carriers import Compiled
 from gpbnb.floatarray import FloatArray
 
 
@@ -99,6 +102,11 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
     hung1984, ch. II, (45)-(58).
     """
     n = _square(a)
+    if (compiled := _factored(a, pivot)) is not None:
+        factors, order = compiled
+        identity = a.format.array(np.eye(n, dtype=int))
+        lower = cast(FloatArray, np.where(np.tri(n, k=-1, dtype=bool), factors, identity))
+        return LU(lower, cast(FloatArray, np.triu(cast(Any, factors))), order)
     order = np.arange(n)
     work = a
     uppers: list[FloatArray] = []
@@ -117,9 +125,8 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
             multipliers[i] = _joined(multipliers[i], ratio[i - k - 1 : i - k])
         work = work[1:, 1:] + (-ratio)[:, np.newaxis] * head[1:]
     zeros, one = a.format.array([0] * n), a.format.array([1])
-    lower = [_joined(row, one, zeros[i + 1 :]) for i, row in enumerate(multipliers)]
-    upper = [_joined(zeros[:i], row) for i, row in enumerate(uppers)]
-    return LU(_rows(lower), _rows(upper), order)
+    lowers = [_joined(row, one, zeros[i + 1 :]) for i, row in enumerate(multipliers)]
+    return LU(_rows(lowers), _rows([_joined(zeros[:i], row) for i, row in enumerate(uppers)]), order)
 
 
 def solve(a: FloatArray, b: FloatArray, pivot: bool = False) -> FloatArray:
@@ -154,8 +161,11 @@ def solve(a: FloatArray, b: FloatArray, pivot: bool = False) -> FloatArray:
     _check(b, "b")
     if b.ndim not in (1, 2) or b.shape[0] != n:
         raise ValueError(f"b: got shape {b.shape} with a of shape {a.shape}; needed ({n},) or ({n}, p)")
+    columns = b if b.ndim == 2 else b[:, np.newaxis]
+    if (compiled := _solved(a, columns, pivot)) is not None:
+        return compiled if b.ndim == 2 else compiled[:, 0]
     lower, upper, order = lu(a, pivot)
-    columns = b[order] if b.ndim == 2 else b[order][:, np.newaxis]
+    columns = columns[order]
     reduced = []
     for k in range(n):
         reduced.append(columns[0])
@@ -189,6 +199,45 @@ def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
     hung1984, ch. II, (33) and (93).
     """
     return solve(a, a.format.array(np.eye(_square(a), dtype=int)), pivot)
+
+
+def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
+    """Both factors in one array, and the order of the rows; None where the carrier cannot do it."""
+    carrier = a._carrier
+    if not isinstance(carrier, Compiled):
+        return None
+    factors, order = carrier.pack(a._parts), np.arange(len(a))
+    try:
+        column = _loops().lu(carrier.tag, factors, order, pivot)
+    except OverflowError:
+        return None
+    if column >= 0:
+        raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot))
+    return FloatArray._wrap(carrier, carrier.unpack(factors), a.format), order
+
+
+def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
+    """Solutions for the columns of b (n, p); None where the carrier cannot do it."""
+    carrier = a._carrier
+    if not isinstance(carrier, Compiled) or b._carrier is not carrier:
+        return None
+    if (compiled := _factored(a, pivot)) is None:
+        return None
+    factors, order = carrier.pack(compiled[0]._parts), compiled[1]
+    columns = carrier.pack(b[order]._parts)
+    try:
+        _loops().reduce(carrier.tag, factors, columns)
+        _loops().substitute(carrier.tag, factors, columns)
+    except OverflowError:
+        return None
+    return FloatArray._wrap(carrier, carrier.unpack(columns), a.format)
+
+
+@lru_cache(maxsize=1)
+def _loops() -> Any:
+    from gpbnb._kernels import elimination
+
+    return elimination
 
 
 def _joined(*parts: FloatArray) -> FloatArray:

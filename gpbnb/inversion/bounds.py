@@ -1,0 +1,376 @@
+r"""Bounds of the error of a computed inverse that can be trusted, from a priori to a posteriori.
+
+Each bounds :math:`\|X - A^{-1}\|`, with the column sum norm (22), where X is the inverse of the t-digit matrix A as
+:func:`gpbnb.linalg.inv` computes it. Each is a float64 above the value of its formula, or ValueError where it proves
+nothing. They differ in what they look at:
+
+============================  =========================================================================
+:func:`wilkinson`             the size of the numbers that occurred
+:func:`higham`                the computed factors
+:func:`higham_probabilistic`  the same; holds but for a probability, if roundings are random
+:func:`rule_of_thumb`         the same, with the root of the count of roundings; proves nothing
+:func:`ball`                  nothing of the computation: A is inverted again, in ball arithmetic
+:func:`a_posteriori`          the residual of X, in ball arithmetic of more bits
+============================  =========================================================================
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import flint
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb import linalg
+from gpbnb.bounds import exact, gamma, gamma_probabilistic
+from gpbnb.floatarray import FloatArray
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.linalg import LU
+
+# -- a priori: from the count of roundings --------------------------------------------------------
+
+
+def wilkinson(factors: LU, x: FloatArray) -> float:
+    r"""Bound from the growth of the numbers, after Wilkinson.
+
+    .. math:: \|X - A^{-1}\| \le \|X\|\,\frac{g}{1-g}, \qquad
+        g = \gamma_{3n}\,n\,l\,n\,u\,\|X\|
+
+    with l and u the largest sizes of entries of the factors; with partial pivoting l = 1. A product :math:`n l\,n u`
+    bounds :math:`\||L||U|\|`.
+
+    Parameters
+    ----------
+    factors : what :func:`gpbnb.linalg.lu` made of A.
+    x : (n, n), the computed inverse.
+
+    Raises
+    ------
+    ValueError : g ≥ 1, or 3nβ ≥ 1: more digits are needed.
+
+    References
+    ----------
+    Wilkinson 1961; Higham 2002, Theorem 9.5.
+    """
+    n = len(x)
+    norm = _norm(abs(x.to_float()))
+    largest = float(np.max(abs(factors.lower.to_float()))) * float(np.max(abs(factors.upper.to_float())))
+    g = _count(n, x.format) * n * n * largest * norm
+    return _solved(norm * g, g, n)
+
+
+def higham(factors: LU, x: FloatArray) -> float:
+    r"""Bound from the computed factors, entry by entry.
+
+    Each column of X solves :math:`(A + \Delta A_j)\hat x_j = u_j` with
+    :math:`|\Delta A_j| \le \gamma_{3n} P^T|\hat L||\hat U|`, so that
+
+    .. math:: \|X - A^{-1}\| \le \frac{\||X|G\|}{1 - \|G\|}, \qquad G = \gamma_{3n} P^T|\hat L||\hat U||X|.
+
+    Parameters
+    ----------
+    factors, x : as in :func:`wilkinson`.
+
+    Raises
+    ------
+    ValueError : ‖G‖ ≥ 1, or 3nβ ≥ 1: more digits are needed.
+
+    References
+    ----------
+    Higham 2002, Theorem 9.4.
+    """
+    return _from_factors(factors, x, _count(len(x), x.format))
+
+
+def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> float:
+    r"""The same with :math:`3\tilde\gamma_n + \tilde\gamma_n^2` for :math:`\gamma_{3n}`, of size √n β.
+
+    Exceeded with at most the probability `failure` if the roundings are independent with mean zero: each of the
+    3n³ products in the n² inner products of the factors and the 2n² of the solutions may take its share.
+
+    Raises
+    ------
+    ValueError : ‖G‖ ≥ 1; or the format chops, so that roundings do not have mean zero.
+
+    References
+    ----------
+    Higham & Mary 2019.
+    """
+    if x.format.rounding is not Rounding.NEAREST:
+        raise ValueError(f"got {x.format}; needed rounding to nearest, whose errors may have mean zero; use higham")
+    n = len(x)
+    one = gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3))
+    return _from_factors(factors, x, 3 * one + one * one)
+
+
+def rule_of_thumb(factors: LU, x: FloatArray) -> float:
+    r"""The same with :math:`\sqrt{3n}\,\beta` for :math:`\gamma_{3n}`: what is to be expected, and no bound.
+
+    References
+    ----------
+    Wilkinson 1961, who puts the root in place of the count.
+    """
+    return _from_factors(factors, x, math.sqrt(3 * len(x)) * float(x.format.unit_roundoff))
+
+
+def _count(n: int, fmt: FloatFormat) -> float:
+    return float(gamma(3 * n, fmt.unit_roundoff))
+
+
+def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
+    sizes = abs(x.to_float())
+    product = abs(factors.lower.to_float()) @ abs(factors.upper.to_float())
+    rows = np.empty_like(product)
+    rows[factors.permutation] = product
+    g = weight * (rows @ sizes)
+    return _solved(_norm(sizes @ g), _norm(g), len(x))
+
+
+def _solved(first: float, ratio: float, n: int) -> float:
+    """First over 1 - ratio, rounded up: no number here has seen more than 8n roundings of float64."""
+    slack = 1 + 16 * n * 2.0**-53
+    if not ratio * slack < 1:
+        raise ValueError(f"got ‖G‖ = {ratio:.3g}; needed less than 1, or nothing is proved; use more digits")
+    return first * slack / (1 - ratio * slack) * slack
+
+
+def _norm(sizes: NDArray[np.float64]) -> float:
+    return float(sizes.sum(axis=0).max())
+
+
+# -- ball arithmetic ------------------------------------------------------------------------------
+
+
+def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None = None) -> float:
+    r"""Bound from inverting A in ball arithmetic, :math:`\||X - \mathrm{mid}| + \mathrm{rad}\|`.
+
+    Parameters
+    ----------
+    a : (n, n), a FloatArray, or exact numbers.
+    x : (n, n), its computed inverse, or any other guess of it.
+    preconditioned : A is first multiplied by an approximate inverse, in sums of products that are rounded once, so that
+        elimination starts near the identity; else elimination with partial pivoting of A itself.
+    bits : of the balls' midpoints; by default as many as the format has.
+
+    Raises
+    ------
+    ValueError : the balls are too wide to tell A from a singular matrix.
+
+    References
+    ----------
+    Johansson 2017; A is inverted by python-flint.
+    """
+    precision = _bits(x.format) if bits is None else bits
+    with _working(precision):
+        try:
+            inverse = _balls(a).solve(_identity(len(x)), algorithm="precond" if preconditioned else "lu")
+        except ZeroDivisionError:
+            raise ValueError(
+                f"got a matrix that {precision} bits cannot tell from a singular one; needed another; use more bits"
+            ) from None
+    with _working(precision + 64):
+        return _upper(_column_sum(_balls(x) - inverse))
+
+
+def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
+    r"""Bound from the residual, computed with more digits than X has.
+
+    .. math:: R = I - AX, \qquad A^{-1} - X = XR\,(I - R)^{-1}, \qquad
+        \|X - A^{-1}\| \le \frac{\|XR\|}{1 - \|R\|}
+
+    Every number is a ball, and the radii go into the bound: it holds whatever computed X.
+
+    Parameters
+    ----------
+    a : (n, n), a FloatArray, or exact numbers.
+    x : (n, n), its computed inverse, or any other guess of it.
+    bits : of the balls' midpoints; by default four times those of the format and 64 more, so that A X has room.
+
+    Raises
+    ------
+    ValueError : ‖R‖ < 1 could not be proved; X is no better than nothing.
+
+    References
+    ----------
+    Higham 2002, chapter 14; Rump 2010.
+    """
+    with _working(4 * _bits(x.format) + 64 if bits is None else bits):
+        guess = _balls(x)
+        residual = _identity(len(x)) - _balls(a) * guess
+        size = _upper(_column_sum(residual))
+        if not size < 1:
+            raise ValueError(
+                f"got ‖I - AX‖ up to {size:.3g}; needed less than 1, or nothing is proved; use more digits"
+            )
+        return _upper(_column_sum(guess * residual) / (1 - flint.arb(size)))
+
+
+@contextmanager
+def _working(bits: int) -> Iterator[None]:
+    before = flint.ctx.prec
+    flint.ctx.prec = bits
+    try:
+        yield
+    finally:
+        flint.ctx.prec = before
+
+
+def _bits(fmt: FloatFormat) -> int:
+    return max(2, math.ceil(fmt.precision * math.log2(fmt.base)))
+
+
+def _balls(a: Any) -> Any:
+    return flint.arb_mat(rationals(a))
+
+
+def _identity(n: int) -> Any:
+    return flint.arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+
+def _column_sum(a: Any) -> Any:
+    """Upper bound of the column sum norm of a matrix of balls, as an arb without radius."""
+    sums = [sum((entry.abs_upper() for entry in column), flint.arb(0)).upper() for column in a.transpose().tolist()]
+    largest = sums[0]
+    for one in sums[1:]:
+        largest = one if one > largest else largest
+    return largest
+
+
+def _upper(x: Any) -> float:
+    """A float64 not below any number of the ball."""
+    m, e = x.upper().man_exp()
+    exactly = Fraction(int(m)) * Fraction(2) ** int(e)
+    nearest = float(exactly)
+    return nearest if Fraction(nearest) >= exactly else math.nextafter(nearest, math.inf)
+
+
+# -- the true inverse -----------------------------------------------------------------------------
+
+
+def rationals(a: Any) -> Any:
+    """A matrix of exact numbers, or a FloatArray, as a matrix of python-flint's rationals."""
+    if isinstance(a, FloatArray):
+        base = a.format.base
+        pairs = zip(a._m.ravel(), a._e.ravel(), strict=True)
+        entries = [(m * base**e, 1) if e >= 0 else (m, base**-e) for m, e in pairs]
+    else:
+        entries = [(x.numerator, x.denominator) for x in exact(a).ravel()]
+    rows, columns = a.shape
+    return flint.fmpq_mat(rows, columns, [flint.fmpq(p, q) for p, q in entries])
+
+
+def true_inverse(a: Any) -> Any:
+    """The inverse, exact, as a matrix of python-flint's rationals.
+
+    Parameters
+    ----------
+    a : (n, n), a FloatArray, or exact numbers.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : `a` is singular.
+    """
+    try:
+        return rationals(a).inv()
+    except ZeroDivisionError:
+        raise np.linalg.LinAlgError(
+            "got a singular matrix; needed one with an inverse, in whatever precision; change an entry"
+        ) from None
+
+
+def true_error(x: Any, inverse: Any) -> Fraction:
+    """The column sum norm of X minus the true inverse, exact."""
+    columns = (rationals(x) - inverse).transpose().tolist()
+    largest = max(sum((abs(entry) for entry in column), flint.fmpq(0)) for column in columns)
+    return Fraction(int(largest.p), int(largest.q))
+
+
+# -- how many digits are enough? ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """A computed inverse and what is proved of it: its relative error norm is at most `bound`."""
+
+    fmt: FloatFormat
+    inverse: FloatArray
+    bound: float
+
+
+def smallest_precision(
+    a: Any,
+    goal: float,
+    base: int = 10,
+    rounding: Rounding = Rounding.NEAREST,
+    pivot: bool = True,
+    largest: int = 60,
+) -> Guarantee:
+    r"""Find the fewest digits in which the computed inverse of a matrix is proved to be good enough.
+
+    One precision after the other, from one digit on, the matrix is rounded, inverted in the format, and the result held
+    against the matrix as given by :func:`a_posteriori`. Proved is
+    :math:`\|X - A^{-1}\| \le \text{goal}\,\|A^{-1}\|`, rounding of the entries included.
+
+    Parameters
+    ----------
+    a : (n, n), exact: strings, ints, Fractions; a float counts with its exact binary value.
+    goal : relative error, above 0.
+    base, rounding : of the formats.
+    pivot : partial pivoting.
+    largest : precision to give up at.
+
+    Returns
+    -------
+    guarantee : the format, the inverse and its bound. By luck an inverse in few digits can be better than one in a few
+        more: what is proved is of this one.
+
+    Raises
+    ------
+    ValueError : `goal` is not above 0, `a` is not square, or no precision up to `largest` is enough.
+    numpy.linalg.LinAlgError : `a` is singular, so that no precision helps.
+    """
+    if not (isinstance(goal, (int, float, Fraction)) and goal > 0 and math.isfinite(goal)):
+        raise ValueError(f"goal: got {goal!r}; needed a relative error above 0, as 1e-6")
+    if largest < 1:
+        raise ValueError(f"largest: got {largest}; needed a precision of at least 1")
+    given = exact(a)
+    if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
+        raise ValueError(f"a: got shape {given.shape}; needed a square matrix (n, n), n at least 1")
+    true_inverse(given)
+    best = math.inf
+    for precision in range(1, largest + 1):
+        fmt = FloatFormat(base, precision, rounding)
+        try:
+            x = linalg.inv(fmt.array(given), pivot)
+            bound = _relative(a_posteriori(given, x), x)
+        except (np.linalg.LinAlgError, ValueError):  # singular in so few digits, or nothing proved
+            continue
+        if bound <= goal:
+            return Guarantee(fmt, x, bound)
+        best = min(best, bound)
+    reached = f"the best bound was {best:.3g}" if best < math.inf else "none had a bound at all"
+    raise ValueError(
+        f"got the goal {float(goal):.3g}; needed one that an inverse in at most {largest} base-{base} digits is proved "
+        f"to reach, and {reached}; raise largest, or the goal"
+    )
+
+
+def _relative(bound: float, x: FloatArray) -> float:
+    """From ‖X - A⁻¹‖ to a bound of it over ‖A⁻¹‖, which is at least ‖X‖ - bound."""
+    with _working(128):
+        norm = _column_sum_below(x) - flint.arb(bound)
+        if not norm > 0:
+            raise ValueError("got a bound above the norm of the inverse; needed a smaller one; use more digits")
+        return _upper(flint.arb(bound) / norm)
+
+
+def _column_sum_below(x: FloatArray) -> Any:
+    """Column sum norm of a FloatArray, as a ball."""
+    columns = rationals(x).transpose().tolist()
+    return flint.arb(max(sum((abs(entry) for entry in column), flint.fmpq(0)) for column in columns))

@@ -1,0 +1,529 @@
+"""The numerical example of section 11.4: Table 1, in every reading of it.
+
+The report gives a matrix, three wordlengths and six numbers, and leaves open what a wordlength of so many "places after
+decimal point" is, which norm was taken, and what was computed with how many digits. Here each number is computed in
+every way that comes to mind, with exact errors, and compared with the printed one.
+
+Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds import exact
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion import bounds, procedure
+from gpbnb.inversion.procedure import NORMS
+
+#: The matrix, as printed.
+MATRIX = (("3.235", "-1.234", "3.256"), ("1.023", "-5.235", "0.921"), ("1.336", "2.120", "-8.235"))
+
+#: The printed numbers of Table 1, places after the decimal point and the two columns of error norms.
+PLACES = (3, 5, 8)
+PRINTED = {"bound": ("3.706e-2", "3.706e-4", "3.706e-7"), "error": ("7.782e-5", "4.530e-7", "4.672e-10")}
+
+Rounder = Callable[[Fraction], Fraction]
+Matrix = NDArray[Any]
+
+# -- what a wordlength may be ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Wordlength:
+    """A reading of "places after decimal point".
+
+    Parameters
+    ----------
+    kind : "t = places", as in the significand .ddd of (1); "t = places + 1", as in d.ddd, or more; "fixed point", every
+        number rounded to so many decimals.
+    rounding : to nearest or chopped.
+
+    Raises
+    ------
+    ValueError : another kind.
+    """
+
+    kind: str
+    rounding: Rounding
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"fixed point|t = places( \+ [1-9])?", self.kind):
+            raise ValueError(f"kind: got {self.kind!r}; needed 't = places', 't = places + 1' or 'fixed point'")
+
+    def format(self, places: int) -> FloatFormat:
+        """The floating-point format; for fixed point, that of the unit error of numbers of size 1."""
+        more = 1 if self.kind == "fixed point" else int(self.kind.partition("+")[2] or 0)
+        return FloatFormat(10, places + more, self.rounding)
+
+    def rounder(self, places: int) -> Rounder:
+        """The rounding of one number."""
+        return self.fixed(places) if self.kind == "fixed point" else self.format(places).round
+
+    def fixed(self, places: int) -> Rounder:
+        """Rounding to a multiple of the last place, half away from zero or towards zero."""
+        unit = Fraction(1, 10**places)
+        half = Fraction(1, 2) if self.rounding is Rounding.NEAREST else 0
+
+        def fix(x: Fraction) -> Fraction:
+            steps = math.floor(abs(x) / unit + half)
+            return unit * (steps if x > 0 else -steps)
+
+        return fix
+
+    def __str__(self) -> str:
+        return f"{self.kind}, {self.rounding.value}"
+
+
+KINDS = ("t = places", "t = places + 1", "fixed point")
+WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KINDS, Rounding))
+
+# -- ways to invert, with a rounding after each operation -----------------------------------------
+
+
+def eliminate(a: Matrix, fl: Rounder) -> Matrix:
+    """Elimination and back substitution in the order of section 11; pivoting would not change it for this matrix."""
+    n = len(a)
+    rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
+    for k in range(n):
+        for i in range(k + 1, n):
+            m = -fl(rows[i][k] / rows[k][k])
+            rows[i] = [fl(p + fl(m * q)) if j > k else p for j, (p, q) in enumerate(zip(rows[i], rows[k], strict=True))]
+    for k in reversed(range(n)):
+        for c in range(n, 2 * n):
+            x = rows[k][c]
+            for i in range(k + 1, n):
+                x = fl(x - fl(rows[k][i] * rows[i][c]))
+            rows[k][c] = fl(x / rows[k][k])
+    return np.array([row[n:] for row in rows], dtype=object)
+
+
+def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
+    """Gauss-Jordan: each row is divided by its pivot and taken from all the others."""
+    n = len(a)
+    rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
+    for k in range(n):
+        pivot = rows[k][k]
+        rows[k] = [fl(p / pivot) for p in rows[k]]
+        for i in range(n):
+            if i != k:
+                m = rows[i][k]
+                rows[i] = [fl(p - fl(m * q)) for p, q in zip(rows[i], rows[k], strict=True)]
+    return np.array([row[n:] for row in rows], dtype=object)
+
+
+def round_once(a: Matrix, fl: Rounder) -> Matrix:
+    """The true inverse, each entry rounded: the best that a format can hold."""
+    return _each(_inverse(a), fl)
+
+
+METHODS: dict[str, Callable[[Matrix, Rounder], Matrix]] = {
+    "elimination": eliminate,
+    "Gauss-Jordan": gauss_jordan,
+    "rounded once": round_once,
+}
+
+
+def _each(a: Matrix, fl: Rounder) -> Matrix:
+    out = np.empty_like(a)
+    for index in np.ndindex(a.shape):
+        entry: Any = a[index]
+        out[index] = fl(entry)
+    return out
+
+
+def _inverse(a: Matrix) -> Matrix:
+    entries = [Fraction(int(x.p), int(x.q)) for x in bounds.true_inverse(a).entries()]
+    return np.array(entries, dtype=object).reshape(a.shape)
+
+
+# -- readings -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Column:
+    """One reading of a column of Table 1 and its three numbers.
+
+    Parameters
+    ----------
+    column : "bound" or "error".
+    wordlength, detail : the reading: the wordlength, and everything else in words.
+    norm : of :data:`gpbnb.inversion.procedure.NORMS`.
+    relative : divided by the norm of the inverse.
+    values : for each of :data:`PLACES`.
+    """
+
+    column: str
+    wordlength: Wordlength
+    detail: str
+    norm: str
+    relative: bool
+    values: tuple[float, ...]
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """Each number over the printed one."""
+        return tuple(v / float(p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
+
+    @property
+    def distance(self) -> float:
+        """Largest factor between a number and the printed one; 1 for equality."""
+        return max(max(r, 1 / r) if r else math.inf for r in self.ratios)
+
+    @property
+    def agreements(self) -> int:
+        """How many of the numbers agree with the printed one in each of its four digits."""
+        return sum(agree(v, p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
+
+    @property
+    def same_digits(self) -> bool:
+        """Whether all have the same four digits, and differ in the exponent."""
+        return len({f"{v:.3e}".split("e")[0] for v in self.values}) == 1
+
+    @property
+    def decreasing(self) -> bool:
+        """Whether more places give a smaller number."""
+        return all(p > q for p, q in zip(self.values, self.values[1:], strict=False))
+
+
+def agree(value: float | Fraction, printed: str) -> bool:
+    """Whether a value, rounded or chopped to the digits that are printed, is the printed one."""
+    low, high = _interval(printed)
+    return bool(low <= Fraction(value) < high)
+
+
+def chance(printed: str) -> float:
+    """Probability that the digits of a number agree with the printed ones, if their logarithm is uniform."""
+    low, high = _interval(printed)
+    return math.log10(high / low)
+
+
+def _interval(printed: str) -> tuple[Fraction, Fraction]:
+    """Numbers that are printed so if rounded, or if chopped."""
+    digits, exponent = printed.split("e")
+    unit = Fraction(10) ** (int(exponent) - len(digits.split(".")[1]))
+    return Fraction(printed) - unit / 2, Fraction(printed) + unit
+
+
+def matrix() -> Matrix:
+    """The matrix of the example, exact."""
+    return exact(np.array(MATRIX))
+
+
+@cache
+def bound_readings() -> tuple[Column, ...]:
+    """Every reading of the column "By proposed method".
+
+    Two wordlengths, rounded or chopped; the quantities from the computer of that wordlength or from one that has
+    :math:`10^{-50}` for unit error; every :func:`~gpbnb.inversion.procedure.readings` of the procedure in every norm;
+    absolute, (96), or relative, (97).
+    """
+    result = []
+    for wordlength in WORDLENGTHS[:4]:
+        formats = [wordlength.format(places) for places in PLACES]
+        for source in ("its own digits", "more digits"):
+            computing = formats if source == "its own digits" else [FloatFormat(10, 50)] * 3
+            reductions = [procedure.as_floats(procedure.reduce(fmt.array(MATRIX))) for fmt in computing]
+            all_outcomes = [
+                procedure.evaluate_all(reduction, float(fmt.unit_roundoff), procedure.readings())
+                for reduction, fmt in zip(reductions, formats, strict=True)
+            ]
+            for outcomes in zip(*all_outcomes, strict=True):
+                reading = outcomes[0].reading
+                detail = f"{str(reading).removesuffix(f', {reading.norm}')}, {source}"
+                for relative in (False, True):
+                    values = tuple(float(o.relative_bound if relative else o.bound) for o in outcomes)
+                    result.append(Column("bound", wordlength, detail, reading.norm, relative, values))
+    return tuple(result)
+
+
+@cache
+def error_readings() -> tuple[Column, ...]:
+    """Every reading of the column "Actual value".
+
+    Three wordlengths, rounded or chopped; three ways to invert; the error against the inverse of the matrix as given,
+    or, where three digits cannot hold it, as stored; every norm; absolute or relative.
+    """
+    given = matrix()
+    result = []
+    for wordlength, (method, invert) in product(WORDLENGTHS, METHODS.items()):
+        rounders = [wordlength.rounder(places) for places in PLACES]
+        stored = [_each(given, fl) for fl in rounders]
+        computed = [invert(a, fl) for a, fl in zip(stored, rounders, strict=True)]
+        references = {"given": [given] * 3} | ({"stored": stored} if (stored[0] != given).any() else {})
+        for reference, matrices in references.items():
+            true = [_inverse(a) for a in matrices]
+            for (name, norm), relative in product(NORMS.items(), (False, True)):
+                values = tuple(
+                    float(norm(x - t)) / (float(norm(t)) if relative else 1)
+                    for x, t in zip(computed, true, strict=True)
+                )
+                detail = f"{method}, against the matrix as {reference}"
+                result.append(Column("error", wordlength, detail, name, relative, values))
+    return tuple(result)
+
+
+def pairs(
+    norm: str = "column sum", relative: bool = False, source: str = "its own digits"
+) -> list[tuple[Column, Column]]:
+    """Readings of both columns that belong together: a bound, and the error of elimination with the same wordlength."""
+    errors = {
+        (one.wordlength, one.norm, one.relative): one
+        for one in error_readings()
+        if one.detail == "elimination, against the matrix as given"
+    }
+    return [
+        (one, errors[one.wordlength, norm, relative])
+        for one in bound_readings()
+        if (one.norm, one.relative) == (norm, relative) and one.detail.endswith(source)
+    ]
+
+
+@dataclass(frozen=True)
+class Search:
+    """What came of a search among readings: agreements in all digits, beside those that chance alone would give.
+
+    Parameters
+    ----------
+    agreements : numbers that agree with the print in each digit; `numbers` were compared.
+    columns : readings of which all three do.
+    expected : how many agreements chance alone would give, if digits are spread as usual and each power of ten is
+        right: a generous count.
+    closest : the reading with the smallest :attr:`Column.distance`.
+    """
+
+    column: str
+    readings: int
+    numbers: int
+    agreements: int
+    columns: int
+    expected: float
+    closest: Column
+
+
+def search(column: str) -> Search:
+    """Compare every reading of a column, "bound" or "error", with the print."""
+    found = bound_readings() if column == "bound" else error_readings()
+    return Search(
+        column,
+        len(found),
+        len(found) * len(PLACES),
+        sum(one.agreements for one in found),
+        sum(one.agreements == len(PLACES) for one in found),
+        len(found) * sum(chance(printed) for printed in PRINTED[column]),
+        min(found, key=lambda one: one.distance),
+    )
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of section 11.4, and in how many readings it holds."""
+
+    name: str
+    readings: int
+    holds: int
+    exception: str
+
+
+def claims() -> tuple[Claim, ...]:
+    """What the text says of Table 1, in every reading.
+
+    That a bound is conservative is asked of each bound beside the error of elimination with the same wordlength and
+    norm, both absolute or both relative.
+    """
+    read, errors = bound_readings(), {}
+    for one in error_readings():
+        if one.detail == "elimination, against the matrix as given":
+            errors[one.wordlength, one.norm, one.relative] = one.values
+
+    def conservative(one: Column) -> bool:
+        actual = errors[one.wordlength, one.norm, one.relative]
+        return all(v >= e for v, e in zip(one.values, actual, strict=True))
+
+    tests: dict[str, Callable[[Column], bool]] = {
+        "the bound decreases with the wordlength": lambda one: one.decreasing,
+        "all bounds have the same digits": lambda one: one.same_digits,
+        "the bounds are above the errors": conservative,
+    }
+    result = []
+    for name, test in tests.items():
+        failing = [one for one in read if not test(one)]
+        exception = f"{failing[0].wordlength}: {failing[0].detail}, {failing[0].norm}" if failing else ""
+        result.append(Claim(name, len(read), len(read) - len(failing), exception))
+    return tuple(result)
+
+
+# -- can the printed error come from any inverse of so many digits? -------------------------------
+
+
+@dataclass(frozen=True)
+class Possible:
+    """Whether a printed error is that of any matrix of numbers of a wordlength, and one such matrix.
+
+    `reference` is the matrix whose inverse it is held against: "given", or "stored" in the wordlength.
+    """
+
+    wordlength: Wordlength
+    reference: str
+    places: int
+    norm: str
+    relative: bool
+    printed: str
+    witness: Matrix | None
+
+
+#: Norms that are sums of sizes or squares over groups of entries, or the largest of them.
+SEARCHED = ("column sum", "row sum", "largest entry", "Frobenius")
+
+
+def possible(
+    wordlength: Wordlength,
+    places: int,
+    norm: str,
+    relative: bool = False,
+    printed: str | None = None,
+    reference: str = "given",
+) -> Possible:
+    """Look through all matrices X of a wordlength for one whose error has the printed norm.
+
+    How X was computed does not matter: rounding plays no part, only which numbers there are.
+
+    Parameters
+    ----------
+    printed : an error norm as text; that of Table 1 by default.
+    reference : the error is against the inverse of the matrix as "given", or as "stored" in the wordlength.
+
+    Raises
+    ------
+    ValueError : `norm` is not one of :data:`SEARCHED`, or `reference` is another word.
+    """
+    if norm not in SEARCHED:
+        raise ValueError(f"norm: got {norm!r}; needed one of {', '.join(SEARCHED)}")
+    if reference not in ("given", "stored"):
+        raise ValueError(f"reference: got {reference!r}; needed 'given' or 'stored'")
+    printed = printed or PRINTED["error"][PLACES.index(places)]
+    true = _inverse(matrix() if reference == "given" else _each(matrix(), wordlength.rounder(places)))
+    scale = Fraction(float(NORMS[norm](true))) if relative else Fraction(1)
+    low, high = (end * scale for end in _interval(printed))
+    square = norm == "Frobenius"
+    if square:
+        low, high = low * low, high * high
+    groups = _groups(norm)
+    entries: dict[tuple[int, ...], Any] = {index: true[index] for index in np.ndindex(true.shape)}
+    candidates = {index: _near(x, wordlength, places, high, square) for index, x in entries.items()}
+    least = [sum(min((size for size, _ in candidates[i]), default=high) for i in group) for group in groups]
+    for g, group in enumerate(groups):
+        others = [least[h] for h in range(len(groups)) if h != g]
+        if any(value >= high for value in others):
+            continue
+        if (chosen := _fit([candidates[i] for i in group], low, high)) is not None:
+            witness = np.empty_like(true)
+            for index in np.ndindex(true.shape):
+                witness[index] = min(candidates[index])[1]
+            for index, value in zip(group, chosen, strict=True):
+                witness[index] = value
+            return Possible(wordlength, reference, places, norm, relative, printed, witness)
+    return Possible(wordlength, reference, places, norm, relative, printed, None)
+
+
+@cache
+def all_possible() -> tuple[Possible, ...]:
+    """Every wordlength, one of a digit more, and every norm searched.
+
+    Rounding matters only where three digits cannot hold the matrix as given.
+    """
+    given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in (*KINDS, "t = places + 2")]
+    stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding]
+    cases = product((*given, *stored), SEARCHED, (False, True), PLACES)
+    return tuple(possible(w, places, norm, relative, None, r) for (w, r), norm, relative, places in cases)
+
+
+def _groups(norm: str) -> list[list[tuple[int, int]]]:
+    """Entries whose sizes are added up; the norm is the largest of the sums."""
+    n = range(len(MATRIX))
+    match norm:
+        case "column sum":
+            return [[(i, j) for i in n] for j in n]
+        case "row sum":
+            return [[(i, j) for j in n] for i in n]
+        case "largest entry":
+            return [[(i, j)] for i in n for j in n]
+        case _:
+            return [[(i, j) for i in n for j in n]]
+
+
+def _near(
+    x: Fraction, wordlength: Wordlength, places: int, most: Fraction, square: bool
+) -> list[tuple[Fraction, Fraction]]:
+    """Numbers of the wordlength near x, with their distance, or its square, below `most`; nearest first."""
+    found = []
+    for step in (1, -1):
+        y = _toward(x, wordlength, places, step)
+        while (size := (y - x) ** 2 if square else abs(y - x)) < most:
+            found.append((size, y))
+            y = _next(y, wordlength, places, step)
+    return sorted(set(found))
+
+
+def _toward(x: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
+    """The nearest number of the wordlength on one side of x, x itself included on the upper."""
+    chopped = Wordlength(wordlength.kind, Rounding.CHOP).rounder(places)(x)
+    if step > 0:
+        return chopped if chopped >= x else _next(chopped, wordlength, places, 1)
+    return chopped if chopped < x else _next(chopped, wordlength, places, -1)
+
+
+def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
+    """The neighbour of a number of the wordlength."""
+    if wordlength.kind == "fixed point":
+        return y + step * Fraction(1, 10**places)
+    if y == 0:
+        raise ValueError("got zero, which has no neighbour without a smallest exponent")
+    fmt = wordlength.format(places)
+    _, _, e = fmt.split(y)
+    unit = Fraction(10) ** (e - fmt.precision)
+    if step * y < 0 and abs(y) == Fraction(10) ** (e - 1):  # towards zero, at a power of ten
+        unit /= 10
+    return y + step * unit
+
+
+def _fit(
+    candidates: Sequence[Sequence[tuple[Fraction, Fraction]]], low: Fraction, high: Fraction
+) -> list[Fraction] | None:
+    """Choose one of each so that the sizes add up to at least `low` and less than `high`; None if there is no way."""
+    order = sorted(range(len(candidates)), key=lambda i: len(candidates[i]))
+    if not all(candidates):
+        return None
+    last = candidates[order[-1]]
+    sizes = [size for size, _ in last]
+
+    def choose(depth: int, total: Fraction) -> Iterator[list[Fraction]]:
+        if depth == len(order) - 1:
+            i = bisect_left(sizes, low - total)
+            if i < len(sizes) and total + sizes[i] < high:
+                yield [last[i][1]]
+            return
+        for size, value in candidates[order[depth]]:
+            if total + size >= high:
+                break
+            for rest in choose(depth + 1, total + size):
+                yield [value, *rest]
+
+    chosen = next(choose(0, Fraction(0)), None)
+    if chosen is None:
+        return None
+    values: list[Any] = [None] * len(candidates)
+    for i, value in zip(order, chosen, strict=True):
+        values[i] = value
+    return values

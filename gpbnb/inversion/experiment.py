@@ -1,0 +1,495 @@
+"""What does happen: inverses computed in a format, beside their true errors and every bound.
+
+True errors are exact rationals, by python-flint; a violation is one, however small.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, cached_property, partial
+from importlib import resources
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb import linalg
+from gpbnb.floatarray import FloatArray
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion import bounds, procedure, theory
+
+# -- one inverse beside its bounds ----------------------------------------------------------------
+
+#: Every reading of the printed procedure in the norm of the report.
+PRINTED = tuple(reading for reading in procedure.readings() if reading.norm == "column sum")
+
+#: Bounds of a second look, see :func:`trial`.
+BETTER = (
+    "corrected",
+    "strict",
+    "Wilkinson",
+    "Higham",
+    "probabilistic",
+    "rule of thumb",
+    "ball",
+    "preconditioned ball",
+    "a posteriori",
+)
+
+
+#: Those that can prove nothing.
+MAY_BE_ABSENT = BETTER[1:]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One computed inverse: its matrix, its error, and the bounds of that error, norms (22).
+
+    A bound that proves nothing is absent from `bounds`. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
+    """
+
+    family: str
+    matrix: FloatArray
+    computed: FloatArray
+    pivot: bool
+    condition: float
+    error: Fraction
+    bounds: Mapping[str, float]
+
+    @property
+    def n(self) -> int:
+        """Rows of the matrix."""
+        return len(self.matrix)
+
+    @property
+    def regular(self) -> bool:
+        """Whether the condition number is at most :data:`REGULAR` over β: the inverse has two digits and more."""
+        return self.condition * float(self.matrix.format.unit_roundoff) <= REGULAR
+
+    def ratio(self, bound: str) -> float:
+        """Bound over error; infinity for an exact inverse with a bound above zero."""
+        if not self.error:
+            return np.inf if self.bounds[bound] else 1.0
+        return float(Fraction(self.bounds[bound]) / self.error)
+
+    def violates(self, bound: str) -> bool:
+        """Whether the error exceeds the bound, decided exactly."""
+        return self.error > Fraction(self.bounds[bound])
+
+
+def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None, family: str = "") -> Trial:
+    """Invert a matrix, and bound the error of its inverse.
+
+    Parameters
+    ----------
+    a : (n, n).
+    names : of the bounds, those of :data:`PRINTED` as text and of :data:`BETTER`; all by default.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : the matrix is singular, or is so in the format.
+    """
+    inverse = bounds.true_inverse(a)
+    wanted = ALL_BOUNDS if names is None else tuple(names)
+    computing = _Computing(a, pivot)
+    evaluated = {}
+    for name in wanted:
+        try:
+            evaluated[name] = float(_BOUNDS[name](computing))
+        except ValueError:  # it proves nothing here
+            if name not in MAY_BE_ABSENT:
+                raise
+    error = bounds.true_error(computing.x, inverse)
+    zero = a.format.array(np.zeros(a.shape, dtype=int))
+    condition = float(bounds.true_error(a, bounds.rationals(zero))) * float(bounds.true_error(zero, inverse))
+    return Trial(family, a, computing.x, pivot, condition, error, evaluated)
+
+
+class _Computing:
+    """A matrix, its inverse, and what was left behind, each computed once and when it is needed."""
+
+    def __init__(self, a: FloatArray, pivot: bool) -> None:
+        self.a, self.pivot = a, pivot
+        self.x = linalg.inv(a, pivot)
+        self.beta = float(a.format.unit_roundoff)
+
+    @cached_property
+    def reduction(self) -> theory.Reduction:
+        return procedure.as_floats(procedure.reduce(self.a, self.pivot))
+
+    @cached_property
+    def factors(self) -> linalg.LU:
+        return linalg.lu(self.a, self.pivot)
+
+    @cached_property
+    def printed(self) -> dict[str, float]:
+        """The bound of every reading of the printed procedure."""
+        outcomes = procedure.evaluate_all(self.reduction, self.beta, PRINTED)
+        return {str(one.reading): float(one.bound) for one in outcomes}
+
+
+def _printed(name: str, c: _Computing) -> float:
+    return c.printed[name]
+
+
+_BOUNDS: dict[str, Callable[[_Computing], Any]] = {str(r): partial(_printed, str(r)) for r in PRINTED}
+_BOUNDS |= {
+    "corrected": lambda c: theory.bound(c.reduction, c.beta),
+    "strict": lambda c: theory.strict_bound(c.reduction, c.beta),
+    "Wilkinson": lambda c: bounds.wilkinson(c.factors, c.x),
+    "Higham": lambda c: bounds.higham(c.factors, c.x),
+    "probabilistic": lambda c: bounds.higham_probabilistic(c.factors, c.x),
+    "rule of thumb": lambda c: bounds.rule_of_thumb(c.factors, c.x),
+    "ball": lambda c: bounds.ball(c.a, c.x),
+    "preconditioned ball": lambda c: bounds.ball(c.a, c.x, preconditioned=True),
+    "a posteriori": lambda c: bounds.a_posteriori(c.a, c.x),
+}
+ALL_BOUNDS = tuple(_BOUNDS)
+
+
+# -- matrices -------------------------------------------------------------------------------------
+
+
+def _uniform(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Entries from -1 to 1, in steps of 2**-30: the same on every machine."""
+    return np.asarray(rng.integers(-(2**30), 2**30, (n, n)).astype(object) * Fraction(1, 2**30))
+
+
+def _graded(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    rows, columns = (Fraction(10) ** -rng.permutation(n).astype(object) for _ in range(2))
+    return rows[:, np.newaxis] * _uniform(n, rng) * columns
+
+
+def _symmetric(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    a = _uniform(n, rng)
+    return a + a.T
+
+
+def _nearly_singular(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    return conditioned(n, 3, rng)
+
+
+def conditioned(n: int, digits: float, rng: np.random.Generator) -> NDArray[Any]:
+    """The last row is the sum of the others, but for a part of 10**-digits, which the condition number undoes."""
+    a = _uniform(n, rng)
+    a[-1] = a[:-1].sum(axis=0) + a[-1] * Fraction(10.0**-digits)
+    return a
+
+
+def _hilbert(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    return _table(n, lambda i, j: Fraction(1, i + j + 1))
+
+
+def _wilkinson(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Wilkinson's matrix, whose last column doubles with each step of pivoted elimination, in random scales."""
+    a = _table(n, lambda i, j: Fraction(1) if i == j or j == n - 1 else Fraction(-1 if i > j else 0))
+    scale = 1 + _uniform(n, rng)[0] / 1000
+    return a * scale
+
+
+def _frank(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    return _table(n, lambda i, j: Fraction(n - max(i, j)) if j >= i - 1 else Fraction(0))
+
+
+def _kahan(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Upper triangular, s**i (1 on the diagonal, -c right of it), with s = 4/5 and c = 3/5."""
+    s, c = Fraction(4, 5), Fraction(3, 5)
+    return _table(n, lambda i, j: s**i * (1 if i == j else -c if j > i else 0))
+
+
+def _table(n: int, entry: Callable[[int, int], Fraction]) -> NDArray[Any]:
+    return np.array([[entry(i, j) for j in range(n)] for i in range(n)], dtype=object)
+
+
+FAMILIES: dict[str, Callable[[int, np.random.Generator], NDArray[Any]]] = {
+    "random": _uniform,
+    "graded": _graded,
+    "symmetric": _symmetric,
+    "nearly singular": _nearly_singular,
+    "Hilbert": _hilbert,
+    "Wilkinson": _wilkinson,
+    "Frank": _frank,
+    "Kahan": _kahan,
+}
+
+#: Those that are the same at every draw.
+FIXED = ("Hilbert", "Frank", "Kahan")
+
+
+# -- sweeps ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A part of a sweep that can be computed by itself: it has its own seed.
+
+    `sizes` are the numbers of rows, each drawn `repeats` times; a matrix that is the same at every draw, once.
+    """
+
+    family: str
+    fmt: FloatFormat
+    pivot: bool
+    sizes: tuple[int, ...]
+    repeats: int
+    seed: tuple[int, ...]
+
+    def trials(self, names: Iterable[str] | None = None) -> Iterator[Trial | None]:
+        """The trials, one after the other; None where the matrix is singular in the format."""
+        rng = np.random.default_rng(self.seed)
+        for n in self.sizes:
+            for _ in range(1 if self.family in FIXED else self.repeats):
+                a = self.fmt.array(FAMILIES[self.family](n, rng))
+                try:
+                    yield trial(a, self.pivot, names, self.family)
+                except np.linalg.LinAlgError:
+                    yield None
+
+    @property
+    def count(self) -> int:
+        """How many trials there are."""
+        return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
+
+
+def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
+    """Random matrices of growing size, inverted with pivoting beside :data:`BETTER`."""
+    return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
+
+
+def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np.random.Generator) -> list[Trial]:
+    """Matrices of one size that are nearer and nearer to singular, see :func:`conditioned`, beside :data:`BETTER`.
+
+    Those that the format cannot tell from singular are left out.
+    """
+    trials = []
+    for d in digits:
+        with suppress(np.linalg.LinAlgError):
+            trials.append(trial(fmt.array(conditioned(n, d, rng)), True, BETTER, "nearly singular"))
+    return trials
+
+
+def worst_small(
+    names: Sequence[str], fmt: FloatFormat, n: int, largest: int, draws: int, rng: np.random.Generator
+) -> dict[str, Trial]:
+    """Among matrices of random integers up to `largest` in size, those whose error exceeds each bound the most.
+
+    Pivoting is on. `draws` matrices are looked at; the singular ones, and those with an exact inverse, do not count.
+    """
+    worst: dict[str, Trial] = {}
+    for _ in range(draws):
+        a = fmt.array(rng.integers(-largest, largest + 1, (n, n)))
+        try:
+            one = trial(a, True, names, "small integers")
+        except np.linalg.LinAlgError:
+            continue
+        for name in names:
+            if one.error and (name not in worst or one.ratio(name) < worst[name].ratio(name)):
+                worst[name] = one
+    return worst
+
+
+SEED = 1984
+_NEAREST, _CHOP = Rounding.NEAREST, Rounding.CHOP
+
+#: The formats of the sweep over all readings and families, and of that over random matrices.
+VARIANT_FORMATS = (FloatFormat(10, 4), FloatFormat(10, 9), FloatFormat(2, 24), FloatFormat(10, 4, _CHOP))
+RANDOM_FORMATS = (
+    FloatFormat(2, 11),
+    FloatFormat(2, 24),
+    FloatFormat(2, 24, _CHOP),
+    FloatFormat(10, 8),
+    FloatFormat(16, 6, _CHOP),
+)
+
+#: How many random inversions of each size, in each format.
+RANDOM_SIZES = {n: 3000 if n <= 6 else 1010 if n <= 10 else 100 for n in range(2, 21)}
+
+
+def variant_cells() -> list[Cell]:
+    """All families of matrices, n = 2 ... 20, with and without pivoting: for every reading and bound."""
+    cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
+    sizes = tuple(range(2, 21))
+    return [Cell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
+
+
+def random_cells() -> list[Cell]:
+    """Random matrices by the hundred thousand, with pivoting: for the better bounds."""
+    cases = product(RANDOM_FORMATS, RANDOM_SIZES.items())
+    return [Cell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
+
+
+#: Cells and bounds of each sweep whose results are kept in the package.
+SWEEPS: dict[str, tuple[Callable[[], list[Cell]], tuple[str, ...]]] = {
+    "variants": (variant_cells, ALL_BOUNDS),
+    "random": (random_cells, BETTER[2:]),
+}
+
+_FIELDS = ("family", "format", "pivot", "n", "bound")
+_COUNTS = ("trials", "failed", "exact", "absent", "violations", "regular", "violations_regular", "tight")
+_RATIOS = ("smallest", "smallest_regular", "median", "largest")
+
+#: A bound is tight if it is at most so many times the error.
+TIGHT = 1.1
+
+#: Condition number times unit error up to which first-order analysis can be expected to say something.
+REGULAR = 0.01
+
+
+class Sample:
+    """What is kept of trials: for each bound how often it was absent or violated, and its ratios to the error.
+
+    `failed` counts matrices that are singular in the format, `exact` inverses without error, which have no ratio;
+    `regular` matrices have a condition number of at most :data:`REGULAR` over β.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.trials = self.failed = self.exact = self.regular = 0
+        self.present = dict.fromkeys(names, 0)
+        self.violations = dict.fromkeys(names, 0)
+        self.violations_regular = dict.fromkeys(names, 0)
+        self.ratios: dict[str, list[float]] = {name: [] for name in names}
+        self.ratios_regular: dict[str, list[float]] = {name: [] for name in names}
+
+    def add(self, one: Trial | None) -> None:
+        """Count a trial; None for a matrix that is singular in the format."""
+        if one is None:
+            self.failed += 1
+            return
+        regular = one.regular
+        self.trials += 1
+        self.exact += not one.error
+        self.regular += regular
+        for name in one.bounds:
+            self.present[name] += 1
+            self.violations[name] += one.violates(name)
+            self.violations_regular[name] += regular and one.violates(name)
+            if one.error:
+                self.ratios[name].append(one.ratio(name))
+                if regular:
+                    self.ratios_regular[name].append(one.ratio(name))
+
+    def merge(self, other: Sample) -> None:
+        """Count the trials of another sample."""
+        for name in ("trials", "failed", "exact", "regular"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for counts in ("present", "violations", "violations_regular", "ratios", "ratios_regular"):
+            mine = getattr(self, counts)
+            for name, count in getattr(other, counts).items():
+                mine[name] = mine[name] + count
+
+    def rows(self, *where: str) -> list[dict[str, str]]:
+        """One row of text a bound, with four digits of every ratio."""
+        result = []
+        for name, ratios in self.ratios.items():
+            counts = (
+                self.trials,
+                self.failed,
+                self.exact,
+                self.trials - self.present[name],
+                self.violations[name],
+                self.regular,
+                self.violations_regular[name],
+                sum(r <= TIGHT for r in ratios),
+            )
+            pairs = ((np.min, ratios), (np.min, self.ratios_regular[name]), (np.median, ratios), (np.max, ratios))
+            of = [f"{f(r):.4g}" if r else "" for f, r in pairs]
+            result.append(
+                dict(zip((*_FIELDS, *_COUNTS, *_RATIOS), (*where, name, *map(str, counts), *of), strict=True))
+            )
+        return result
+
+
+def cell_sample(cell: Cell, names: Sequence[str], done: Callable[[], Any] | None = None) -> Sample:
+    """Compute a cell; `done` is called after each trial."""
+    sample = Sample(names)
+    for one in cell.trials(names):
+        sample.add(one)
+        if done:
+            done()
+    return sample
+
+
+def cell_rows(cell: Cell, sample: Sample) -> list[dict[str, str]]:
+    """The rows of one cell of a sweep, as they are kept."""
+    return sample.rows(*_where(cell).values())
+
+
+def _where(cell: Cell) -> dict[str, str]:
+    """How the rows of a cell are told from others."""
+    sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
+    texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
+    return dict(zip(_FIELDS, texts, strict=False))
+
+
+def sweep_rows(
+    cells: Iterable[Cell], names: Sequence[str], done: Callable[[], Any] | None = None
+) -> list[dict[str, str]]:
+    """Compute cells: the rows of each, of each family together, and of all together."""
+    rows, whole, families = [], Sample(names), dict[str, Sample]()
+    for cell in cells:
+        sample = cell_sample(cell, names, done)
+        rows += cell_rows(cell, sample)
+        families.setdefault(cell.family, Sample(names)).merge(sample)
+        whole.merge(sample)
+    if len(families) > 1:
+        for family, sample in families.items():
+            rows += sample.rows(family, "all", "all", "all")
+    return rows + whole.rows("all", "all", "all", "all")
+
+
+def worst(bound: str, sweep: str = "variants") -> Trial:
+    """Of the regular matrices of a kept sweep, the one whose error is largest beside a bound; computed anew.
+
+    Parameters
+    ----------
+    bound : one of those of the sweep, as text.
+
+    Raises
+    ------
+    ValueError : the sweep does not have the bound.
+    """
+    rows = [row for row in frozen(sweep).select(bound=bound) if row["format"] != "all" and row["smallest_regular"]]
+    if not rows:
+        raise ValueError(f"got bound {bound!r}; needed one of {', '.join(SWEEPS[sweep][1])}")
+    row = min(rows, key=lambda row: float(row["smallest_regular"]))
+    (cell,) = (cell for cell in SWEEPS[sweep][0]() if all(row[key] == text for key, text in _where(cell).items()))
+    regular = (one for one in cell.trials((bound,)) if one is not None and one.error and one.regular)
+    return min(regular, key=lambda one: one.ratio(bound))
+
+
+def format_name(fmt: FloatFormat) -> str:
+    """Base, precision and rounding in one word, as in "10:4:chop"."""
+    return f"{fmt.base}:{fmt.precision}:{fmt.rounding.value}"
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """The kept result of a sweep: where it comes from, and its rows."""
+
+    provenance: Mapping[str, str]
+    rows: tuple[Mapping[str, str], ...]
+
+    def select(self, **where: str) -> list[Mapping[str, str]]:
+        """The rows whose fields have these values."""
+        return [row for row in self.rows if all(row[name] == value for name, value in where.items())]
+
+
+@cache
+def frozen(sweep: str) -> Frozen:
+    """Read the kept result of a sweep, "variants" or "random"; ``python -m gpbnb.inversion`` computes it anew.
+
+    Raises
+    ------
+    ValueError : there is no such sweep.
+    """
+    if sweep not in SWEEPS:
+        raise ValueError(f"got sweep {sweep!r}; needed one of {', '.join(SWEEPS)}")
+    text = resources.files(__package__).joinpath(f"{sweep}.csv").read_text(encoding="utf-8")
+    lines = text.splitlines()
+    head = [line[1:].split(":", 1) for line in lines if line.startswith("#")]
+    body = csv.DictReader(line for line in lines if not line.startswith("#"))
+    return Frozen({key.strip(): value.strip() for key, value in head}, tuple(body))

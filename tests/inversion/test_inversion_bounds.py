@@ -1,0 +1,294 @@
+"""gpbnb.inversion.bounds: never below the true error, not far above it where promised, and honest where they fail."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import flint
+import numpy as np
+import pytest
+
+from gpbnb import linalg
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion import bounds
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FORMATS = [
+    FloatFormat(2, 11),
+    FloatFormat(2, 24),
+    FloatFormat(2, 24, CHOP),
+    FloatFormat(3, 12),
+    FloatFormat(10, 6, CHOP),
+    FloatFormat(10, 20),
+    FloatFormat(16, 6),
+]
+each_format = pytest.mark.parametrize("fmt", FORMATS, ids=str)
+
+
+def inverted(fmt, sizes=(1, 2, 3, 5, 8), repeats=4):
+    """Matrices that a format can invert, their factors and inverses, and the true error."""
+    rng = np.random.default_rng([fmt.base, fmt.precision])
+    for n in sizes:
+        for _ in range(repeats):
+            a = fmt.array(rng.integers(-(2**20), 2**20, (n, n)) * 2.0**-20)
+            x = linalg.inv(a, pivot=True)
+            yield a, linalg.lu(a, pivot=True), x, bounds.true_error(x, bounds.true_inverse(a))
+
+
+def fractions_of(matrix):
+    return np.array([[Fraction(int(v.p), int(v.q)) for v in row] for row in matrix.tolist()], dtype=object)
+
+
+def column_sum(a):
+    return max(abs(a).sum(axis=0))
+
+
+def value(bound, *arguments):
+    try:
+        return Fraction(bound(*arguments))
+    except ValueError:
+        return None
+
+
+class TestTruth:
+    def test_inverse_of_hilbert(self):
+        # The inverse of the Hilbert matrix has integer entries, in closed form.
+        n = 6
+        hilbert = [[Fraction(1, i + j + 1) for j in range(n)] for i in range(n)]
+        entries = [
+            [
+                (-1) ** (i + j)
+                * (i + j + 1)
+                * math.comb(n + i, n - j - 1)
+                * math.comb(n + j, n - i - 1)
+                * math.comb(i + j, i) ** 2
+                for j in range(n)
+            ]
+            for i in range(n)
+        ]
+        assert fractions_of(bounds.true_inverse(np.array(hilbert, dtype=object))).tolist() == entries
+
+    @each_format
+    def test_inverse_times_matrix(self, fmt):
+        for a, _, x, error in inverted(fmt, repeats=1):
+            inverse = fractions_of(bounds.true_inverse(a))
+            assert (a.to_fractions() @ inverse == np.eye(len(a), dtype=int)).all()
+            assert error == column_sum(x.to_fractions() - inverse)
+
+    def test_error_is_a_column_sum(self):
+        zero = bounds.rationals(np.zeros((2, 2), dtype=int))
+        assert bounds.true_error(np.array([[1, -3], [2, 5]]), zero) == 8
+
+    def test_singular(self):
+        with pytest.raises(np.linalg.LinAlgError, match="in whatever precision"):
+            bounds.true_inverse(np.array([[1, 2], [2, 4]]))
+
+
+class TestHold:
+    @each_format
+    def test_no_bound_is_below_the_error(self, fmt):
+        held = dict.fromkeys(("wilkinson", "higham", "ball", "preconditioned", "a_posteriori"), 0)
+        for a, factors, x, error in inverted(fmt):
+            found = {
+                "wilkinson": value(bounds.wilkinson, factors, x),
+                "higham": value(bounds.higham, factors, x),
+                "ball": value(bounds.ball, a, x),
+                "preconditioned": value(bounds.ball, a, x, True),
+                "a_posteriori": value(bounds.a_posteriori, a, x),
+            }
+            for name, bound in found.items():
+                if bound is not None:
+                    assert bound >= error, name
+                    held[name] += 1
+            if found["wilkinson"] is not None:
+                # Larger term by term; both carry a slack for the rounding of their own evaluation.
+                assert found["wilkinson"] * (1 + Fraction(1, 2**40)) >= found["higham"]
+        assert held["a_posteriori"] == held["preconditioned"] == 20
+        assert held["higham"] >= (10 if fmt.precision > 11 or fmt.base > 2 else 5)
+        assert min(held.values()) >= 4
+
+    @each_format
+    def test_a_posteriori_is_its_formula_rounded_up(self, fmt):
+        for a, _, x, error in inverted(fmt, repeats=2):
+            exact, guess = a.to_fractions(), x.to_fractions()
+            residual = np.eye(len(a), dtype=int) - exact @ guess
+            size = column_sum(residual)
+            formula = column_sum(guess @ residual) / (1 - size)
+            found = Fraction(bounds.a_posteriori(a, x))
+            # Above by no more than the rounding to float64, as the balls have many more bits.
+            assert formula <= found <= formula * (1 + Fraction(1, 2**51))
+            # ‖XR‖ is at most (1 + ‖R‖) times the error.
+            assert found <= error * (1 + size) / (1 - size) * (1 + Fraction(1, 2**51))
+
+    def test_any_guess_of_the_inverse_will_do(self):
+        fmt = FloatFormat(10, 8)
+        a = fmt.array([[2, 1], [1, 3]])
+        guess = fmt.array([["0.61", "-0.2"], ["-0.2", "0.4"]])  # the first entry is 0.6
+        # R has -0.02 and -0.01 in its first column: 0.01 / (1 - 0.03) times what XR makes of it
+        assert 0.01 <= bounds.a_posteriori(a, guess) <= 0.0102 / 0.97 * (1 + 1e-9)
+        # 27 bits: the balls are not much wider than 2**-27 of the entries
+        assert 0.01 <= bounds.ball(a, guess) <= 0.01 + 8 * 2**-27
+
+    def test_an_exact_inverse_has_a_bound_of_zero(self):
+        fmt = FloatFormat(2, 24)
+        a = fmt.array([[2, 0], [0, -4]])
+        assert bounds.a_posteriori(a, linalg.inv(a)) == 0
+
+    def test_few_bits_cost_tightness_and_never_truth(self):
+        fmt = FloatFormat(2, 24)
+        for a, _, x, error in inverted(fmt, (3,)):
+            wide, narrow = bounds.a_posteriori(a, x), value(bounds.a_posteriori, a, x, 24)
+            assert narrow is None or narrow > wide >= error
+
+
+class TestFormulas:
+    A = FloatFormat(10, 8).array([[2, 1], [1, 3]])
+
+    def parts(self):
+        return linalg.lu(self.A), linalg.inv(self.A)
+
+    def test_higham(self):
+        factors, x = self.parts()
+        gamma = 6 * 5e-8 / (1 - 6 * 5e-8)
+        lower, upper = np.array([[1, 0], [0.5, 1]]), np.array([[2, 1], [0, 2.5]])
+        sizes = np.array([[0.6, 0.2], [0.2, 0.4]])
+        g = gamma * lower @ upper @ sizes
+        expected = (sizes @ g).sum(axis=0).max() / (1 - g.sum(axis=0).max())
+        assert bounds.higham(factors, x) == pytest.approx(expected, rel=1e-12)
+        assert bounds.higham(factors, x) >= expected
+
+    def test_wilkinson(self):
+        factors, x = self.parts()
+        g = 6 * 5e-8 / (1 - 6 * 5e-8) * 4 * 2.5 * 0.8
+        assert bounds.wilkinson(factors, x) == pytest.approx(0.8 * g / (1 - g), rel=1e-12)
+
+    def test_probabilistic(self):
+        factors, x = self.parts()
+        u = 5e-8
+        one = math.expm1(math.sqrt(2 * math.log(2 * 24 / 0.01)) / (1 - u) * math.sqrt(2) * u + 2 * u * u / (1 - u))
+        weight = 3 * one + one * one
+        ratio = bounds.higham_probabilistic(factors, x) / bounds.higham(factors, x)
+        assert ratio == pytest.approx(weight / (6 * u), rel=1e-5)  # to first order in G
+        assert bounds.higham_probabilistic(factors, x, 0.5) < bounds.higham_probabilistic(factors, x)
+
+    def test_rule_of_thumb(self):
+        factors, x = self.parts()
+        assert bounds.rule_of_thumb(factors, x) / bounds.higham(factors, x) == pytest.approx(1 / math.sqrt(6), rel=1e-5)
+
+    def test_rows_in_the_order_of_the_matrix(self):
+        # With rows interchanged, the rows of |L||U| must go back: A has rows of very different size.
+        fmt = FloatFormat(2, 24)
+        a = fmt.array([[1, 2], [1000, 3000]])
+        factors, x = linalg.lu(a, pivot=True), linalg.inv(a, pivot=True)
+        assert factors.permutation.tolist() == [1, 0]
+        product = abs(factors.lower.to_float()) @ abs(factors.upper.to_float())
+        sizes = abs(x.to_float())
+        g = product[[1, 0]] @ sizes
+        weight = bounds.gamma(6, fmt.unit_roundoff)
+        assert bounds.higham(factors, x) == pytest.approx(float(weight) * (sizes @ g).sum(axis=0).max(), rel=1e-2)
+
+
+class TestNothingProved:
+    def test_ill_conditioned(self):
+        fmt = FloatFormat(10, 3)
+        a = fmt.array([["1", "1"], ["1", "1.01"]])
+        x = linalg.inv(a, pivot=True)
+        wrong = fmt.array([[1, 2], [3, 4]])
+        with pytest.raises(ValueError, match="needed less than 1, or nothing is proved; use more digits"):
+            bounds.higham(linalg.lu(a), x)
+        with pytest.raises(ValueError, match=r"got ‖I - AX‖ up to 11; needed less than 1, or nothing is proved"):
+            bounds.a_posteriori(a, wrong)
+
+    def test_too_many_roundings(self):
+        fmt = FloatFormat(10, 1)
+        with pytest.raises(ValueError, match="roundings with unit roundoff"):
+            bounds.wilkinson(linalg.lu(fmt.array([[1]])), fmt.array([[1]]))
+
+    def test_chopping_has_no_mean_zero(self):
+        fmt = FloatFormat(10, 8, CHOP)
+        a = fmt.array([[2, 1], [1, 3]])
+        with pytest.raises(ValueError, match="needed rounding to nearest"):
+            bounds.higham_probabilistic(linalg.lu(a), linalg.inv(a))
+
+    @pytest.mark.parametrize("preconditioned", [False, True])
+    def test_balls_that_hold_a_singular_matrix(self, preconditioned):
+        fmt = FloatFormat(10, 8)
+        a = fmt.array([[1, 2], [2, 4]])
+        with pytest.raises(ValueError, match="cannot tell from a singular one; needed another; use more bits"):
+            bounds.ball(a, a, preconditioned)
+
+
+def test_the_working_precision_is_given_back():
+    before = flint.ctx.prec
+    a = FloatFormat(10, 4).array([[1, 2], [2, 4]])
+    with pytest.raises(ValueError, match="singular"):
+        bounds.ball(a, a)
+    with pytest.raises(ValueError, match="nothing is proved"):
+        bounds.a_posteriori(a, a)
+    assert flint.ctx.prec == before
+
+
+@pytest.mark.parametrize("text", ["0.1", "1e-300", "3", "1e20", "0.3333333333333333333333"])
+def test_rounded_up_to_float64(text):
+    flint.ctx.prec = 100
+    number = flint.arb(text)
+    found = bounds._upper(number)
+    flint.ctx.prec = 53
+    assert Fraction(found) >= Fraction(text)
+    assert Fraction(math.nextafter(found, -math.inf)) < Fraction(text) or found == 3
+
+
+class TestSmallestPrecision:
+    HILBERT = np.array([[Fraction(1, i + j + 1) for j in range(5)] for i in range(5)], dtype=object)
+
+    @pytest.mark.parametrize("goal", [0.5, 1e-3, 1e-9])
+    @pytest.mark.parametrize(("base", "rounding"), [(10, NEAREST), (2, CHOP)])
+    def test_it_is_proved_true_and_no_smaller_one_is_proved(self, goal, base, rounding):
+        found = bounds.smallest_precision(self.HILBERT, goal, base, rounding)
+        inverse = bounds.true_inverse(self.HILBERT)
+        zero = np.zeros((5, 5), dtype=int)
+        size = bounds.true_error(zero, inverse)
+        assert bounds.true_error(found.inverse, inverse) / size <= Fraction(found.bound) <= Fraction(goal)
+        assert found.fmt.base == base
+        assert found.fmt.rounding is rounding
+        again = linalg.inv(found.fmt.array(self.HILBERT), pivot=True)
+        assert np.array_equal(again, found.inverse)
+        for precision in range(1, found.fmt.precision):
+            fmt = FloatFormat(base, precision, rounding)
+            try:
+                x = linalg.inv(fmt.array(self.HILBERT), pivot=True)
+                bound = Fraction(bounds.a_posteriori(self.HILBERT, x))
+            except (ValueError, np.linalg.LinAlgError):
+                continue
+            # the largest that ‖A⁻¹‖ could be: proved relative to it would need less
+            assert bound > Fraction(goal) * (column_sum(x.to_fractions()) - bound)
+
+    def test_goals_that_are_harder_need_more_digits(self):
+        needed = [bounds.smallest_precision(self.HILBERT, 10.0**-k).fmt.precision for k in (1, 4, 8, 12)]
+        assert needed == sorted(needed)
+        assert needed[-1] - needed[0] >= 10
+
+    def test_strings_count_as_written_and_floats_as_they_are(self):
+        # 0.1 as a float is not 1/10: in 16 digits and more the two matrices differ.
+        text = bounds.smallest_precision([["0.1", "0.3"], ["0.2", "0.7"]], 1e-25)
+        floats = bounds.smallest_precision([[0.1, 0.3], [0.2, 0.7]], 1e-25)
+        assert text.inverse.to_fractions().tolist() == [[70, -30], [-20, 10]]
+        assert text.fmt.precision < 16 < floats.fmt.precision
+
+    def test_refused(self):
+        with pytest.raises(np.linalg.LinAlgError, match="in whatever precision"):
+            bounds.smallest_precision([[1, 2], [2, 4]], 1e-3)
+        for goal in (0, -1, math.nan, math.inf, "small"):
+            with pytest.raises(ValueError, match="needed a relative error above 0"):
+                bounds.smallest_precision([[1]], goal)
+        with pytest.raises(ValueError, match="needed a square matrix"):
+            bounds.smallest_precision([[1, 2]], 0.1)
+        with pytest.raises(ValueError, match="needed a precision of at least 1"):
+            bounds.smallest_precision([[1]], 0.1, largest=0)
+
+    def test_none_is_enough(self):
+        with pytest.raises(ValueError, match=r"got the goal 1e-12; .* at most 8 base-10 digits .* the best bound was"):
+            bounds.smallest_precision(self.HILBERT, 1e-12, largest=8)
+        with pytest.raises(ValueError, match="none had a bound at all"):
+            bounds.smallest_precision(self.HILBERT, 1e-12, largest=2)

@@ -1,0 +1,192 @@
+"""gpbnb.inversion.derivation: every step holds, for every n, and means what the matrices do."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+import sympy as sp
+
+from gpbnb.derivation import Derivation, first_order
+from gpbnb.inversion import derivation, theory
+
+DERIVATIONS = {
+    function.__name__: function()
+    for function in (
+        derivation.first_approach,
+        derivation.first_approach_norms,
+        derivation.one_step,
+        derivation.reductions,
+        derivation.perturbed_system,
+        derivation.two_systems,
+        derivation.transfer_cost,
+        derivation.inverse_norms,
+        derivation.back_substitution,
+        derivation.back_substitution_weights,
+    )
+}
+STEPS = [(name, i) for name, steps in DERIVATIONS.items() for i in range(len(steps.steps))]
+each_step = pytest.mark.parametrize(("name", "i"), STEPS)
+EPS = derivation.EPSILON
+
+
+@each_step
+def test_the_step_holds(name, i):
+    step = DERIVATIONS[name].steps[i]
+    assert step.holds
+    assert step.name
+
+
+def test_the_derivations_hold():
+    assert all(steps.holds for steps in DERIVATIONS.values())
+    assert len(STEPS) == 39
+
+
+@each_step
+def test_a_wrong_step_would_be_found_out(name, i):
+    steps = DERIVATIONS[name].steps
+    for wrong in (
+        replace(steps[i], right=steps[i].right + derivation.K),
+        replace(steps[i], right=2 * steps[i].right),
+        replace(steps[i], rest=steps[i].rest + 1),
+        replace(steps[i], right=steps[i].right + derivation.K, rest=steps[i].rest - derivation.K),
+    ):
+        assert not wrong.holds
+        assert not Derivation((*steps[:i], wrong, *steps[i + 1 :])).holds
+
+
+@each_step
+def test_the_step_is_typeset(name, i):
+    latex = DERIVATIONS[name].steps[i].latex()
+    assert r"\;=\;" in latex
+    assert not re.search(r"[-+]\s*[-+]|\bnan\b|None|\?", latex)
+    assert latex.count("{") == latex.count("}")
+    assert latex.count("(") == latex.count(")")
+    assert "$" not in latex
+
+
+@each_step
+def test_the_sides_are_not_the_same_to_look_at(name, i):
+    left, right = DERIVATIONS[name].steps[i].latex().split(r"\;=\;")
+    assert left.strip() != right.strip()
+    assert right.strip() != "0"
+
+
+# -- what the printed lines say, and what they leave out ------------------------------------------
+
+
+def test_47_is_the_error_only_where_all_roundings_agree():
+    found = derivation.entry()
+    one = dict.fromkeys(found.errors, EPS)
+    assert sp.expand(derivation.entry_error().subs(one) - derivation.printed_entry_error()) == 0
+    two = dict(zip(found.errors, (EPS, EPS, -EPS), strict=True))
+    assert sp.expand(derivation.entry_error().subs(two) - derivation.printed_entry_error()) != 0
+
+
+def test_where_47_is_zero_the_error_can_be_four_units_of_half_the_entry():
+    """a(0) = 3, a(1) = 2: the error is 2 ε₃ - ε₁ - ε₂, at most 4β; (61) allows 12β."""
+    old, new, _, errors, _ = derivation.entry()
+    e1, e2, e3 = errors
+    at = {old: 3, new: 2}
+    assert derivation.printed_entry_error().subs(at) == 0
+    assert derivation.entry_error().subs({**at, e1: -1, e2: -1, e3: 1}) == 4
+    assert (3 * new + 2 * old).subs(at) == 12
+
+
+@pytest.mark.parametrize("n", range(1, 5))
+def test_the_errors_of_all_steps_are_a_change_of_the_given_matrix(n):
+    found = derivation.stages(n)
+    difference = found.lower * found.upper - found.given - found.change
+    assert difference.applyfunc(sp.simplify) == sp.zeros(n, n)
+    # And not of another: neither without L nor with the errors counted in the triangle.
+    if n > 1:
+        assert (found.upper - found.given - found.change).applyfunc(sp.simplify) != sp.zeros(n, n)
+        assert found.change[0, :] == sp.zeros(1, n)
+        assert found.change[:, 0] == sp.zeros(n, 1)
+        assert found.lower.is_lower
+        assert found.upper.is_upper
+        assert all(found.lower[i, i] == 1 for i in range(n))
+
+
+def test_l_carries_the_back_substitution_of_rows_above_into_rows_below():
+    """For 3 × 3, (91) lacks 4 l_21 a_12 β in entry (2, 2), and so on."""
+    lower = derivation.stages(3).lower
+    a12, a13, a23 = sp.symbols("a12 a13 a23")
+    change = sp.Matrix([[0, 4 * a12, 3 * a13], [0, 0, 3 * a23], [0, 0, 0]])
+    missing = ((lower - sp.eye(3)) * change).applyfunc(sp.expand)
+    assert missing[0, :] == sp.zeros(1, 3)
+    assert missing[1, 1] == sp.expand(4 * a12 * lower[1, 0])
+    assert sp.expand(missing[2, 2] - 3 * a13 * lower[2, 0] - 3 * a23 * lower[2, 1]) == 0
+
+
+def test_the_line_before_68_needs_its_brackets():
+    assert derivation.line_before_68() == 0
+    assert derivation.line_before_68(brackets=False) != 0
+
+
+@pytest.mark.parametrize("terms", range(5))
+def test_a_row_of_back_substitution_has_the_weights_of_theory(terms):
+    right, products = derivation.back_row_weights(terms)
+    n = terms + 1
+    assert right == theory.right_side_weights(n)[0]
+    assert list(products) == list(theory.back_substitution_weights(n)[0, 1:])
+
+
+@pytest.mark.parametrize("terms", range(4))
+def test_a_row_is_exact_in_products_of_its_errors(terms):
+    """Each coefficient is a product of factors 1 + ε, so that γ of its weight bounds it, to every order."""
+    value, right, products, errors = derivation.back_row(terms)
+    for e in errors:
+        coefficient = sp.Poly(sp.expand(value), e)
+        assert coefficient.degree() == 1
+    none = dict.fromkeys(errors, 0)
+    assert sp.expand(value.subs(none) - right + sum(products)) == 0
+
+
+@pytest.mark.parametrize("equation", [76, 77, 78, 79])
+def test_printed_lines_leave_nothing_of_first_order(equation):
+    assert derivation.leftover(equation) == 0
+
+
+def test_77_of_1984_lacks_a_hat():
+    a, (_, _, x3), _, _ = derivation.triangle()
+    assert sp.simplify(derivation.leftover(77, hats=False) + a[1, 2] * x3 * EPS) == 0
+
+
+def test_there_is_no_other_leftover():
+    with pytest.raises(ValueError, match=r"got equation \(80\); needed one of \(76\) to \(79\)"):
+        derivation.leftover(80)
+
+
+def test_the_triangle_solves_itself_without_errors():
+    _, x, _, computed = derivation.triangle()
+    assert [sp.simplify(y.subs(EPS, 0) - true) for y, true in zip(computed, x, strict=True)] == [0, 0, 0]
+
+
+def test_the_rows_of_the_triangle_are_those_of_every_n():
+    """With all errors equal, a row of n is second_row and first_row."""
+    a, _, _, _ = derivation.triangle()
+    for terms, row in ((1, derivation.second_row), (2, derivation.first_row)):
+        value, right, _, errors = derivation.back_row(terms)
+        hats = sp.symbols(rf"\hat{{x}}_1:{terms + 1}")
+        names = sp.symbols(f"a_1:{terms + 1}")
+        entries = (a[1, 2],) if terms == 1 else (a[0, 1], a[0, 2])
+        same = value.subs(dict.fromkeys(errors, EPS)).subs(dict(zip(names, entries, strict=True)))
+        assert sp.expand(same - row(a, right, *hats)) == 0
+
+
+@pytest.mark.parametrize("n", range(2, 8))
+def test_1982_has_the_weights_of_three(n):
+    same = (theory.printed_weights_1982(n) == theory.back_substitution_weights(n)).all()
+    assert same == (n == 3)
+
+
+def test_strict_forms_are_the_first_order_forms_when_small():
+    """x c/(1 - c) to first order in c, and a(ρ + a d)/(1 - a d) in ρ and d."""
+    x, c = sp.symbols("x c", positive=True)
+    step = DERIVATIONS["inverse_norms"].steps[1]
+    assert first_order(step.right, (c,)) == x * c
+    a, rho, d = sp.symbols("a rho d", positive=True)
+    step = DERIVATIONS["first_approach_norms"].steps[1]
+    assert sp.expand(first_order(step.right, (rho, d)) - a * rho - a**2 * d) == 0

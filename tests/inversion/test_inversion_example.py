@@ -1,0 +1,301 @@
+"""gpbnb.inversion.example: Table 1 computed again, and the searches, which find what is there to be found."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb import linalg
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion import example, procedure
+from gpbnb.inversion.example import PLACES, PRINTED, Wordlength
+from gpbnb.inversion.procedure import Reading
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+MORE = Wordlength("t = places + 1", NEAREST)
+FIXED = Wordlength("fixed point", NEAREST)
+
+
+def exact_inverse():
+    """By cofactors."""
+    (a, b, c), (d, e, f), (g, h, i) = [[Fraction(x) for x in row] for row in example.MATRIX]
+    adjugate = [
+        [e * i - f * h, c * h - b * i, b * f - c * e],
+        [f * g - d * i, a * i - c * g, c * d - a * f],
+        [d * h - e * g, b * g - a * h, a * e - b * d],
+    ]
+    determinant = a * adjugate[0][0] + b * adjugate[1][0] + c * adjugate[2][0]
+    return np.array(adjugate, dtype=object) / determinant
+
+
+class TestWordlengths:
+    def test_formats(self):
+        assert Wordlength("t = places", CHOP).format(3) == FloatFormat(10, 3, CHOP)
+        assert MORE.format(8) == FloatFormat(10, 9)
+        assert Wordlength("t = places + 2", NEAREST).format(3) == FloatFormat(10, 5)
+        assert FIXED.format(3).unit_roundoff == Fraction(1, 2000)
+        assert len({str(one) for one in example.WORDLENGTHS}) == 6
+
+    @pytest.mark.parametrize(("x", "near", "chopped"), [("0.0125", "0.013", "0.012"), ("-0.0125", "-0.013", "-0.012"),
+                                                        ("7.9999", "8", "7.999"), ("0.0004", "0", "0")])  # fmt: skip
+    def test_fixed_point(self, x, near, chopped):
+        assert FIXED.rounder(3)(Fraction(x)) == Fraction(near)
+        assert Wordlength("fixed point", CHOP).rounder(3)(Fraction(x)) == Fraction(chopped)
+
+    def test_floating_point(self):
+        assert MORE.rounder(3)(Fraction("0.0123450")) == Fraction("0.01235")
+
+    def test_other_kinds_are_refused(self):
+        with pytest.raises(ValueError, match="kind: got 'digits'; needed 't = places'"):
+            Wordlength("digits", NEAREST)
+
+
+class TestInverses:
+    @pytest.mark.parametrize("method", ["eliminate", "gauss_jordan", "round_once"])
+    def test_without_rounding_they_are_exact(self, method):
+        found = getattr(example, method)(example.matrix(), lambda x: x)
+        assert (found == exact_inverse()).all()
+
+    @pytest.mark.parametrize("wordlength", example.WORDLENGTHS[:4], ids=str)
+    def test_elimination_has_the_digits_of_linalg(self, wordlength):
+        for places in PLACES:
+            fmt = wordlength.format(places)
+            a = fmt.array(example.MATRIX)
+            found = example.eliminate(a.to_fractions(), wordlength.rounder(places))
+            assert (found == linalg.inv(a).to_fractions()).all()
+            assert (found == linalg.inv(a, pivot=True).to_fractions()).all()
+
+    def test_nothing_of_the_wordlength_is_nearer_than_rounded_once(self):
+        true = exact_inverse()
+        for wordlength, places in itertools.product((MORE, FIXED), PLACES):
+            best = example.round_once(example.matrix(), wordlength.rounder(places))
+            for method in example.METHODS.values():
+                found = method(example.matrix(), wordlength.rounder(places))
+                assert (abs(best - true) <= abs(found - true)).all()
+
+    def test_gauss_jordan_rounds_each_operation(self):
+        calls = []
+        example.gauss_jordan(example.matrix(), lambda x: calls.append(x) or x)
+        # for each of 3 pivots: 6 divisions, and for 2 rows 6 products and 6 differences
+        assert len(calls) == 3 * (6 + 2 * 12)
+
+
+class TestAgreement:
+    @pytest.mark.parametrize("value", ["3.706e-2", "3.7055e-2", "3.7069e-2"])
+    def test_rounded_or_chopped_to_the_print(self, value):
+        assert example.agree(Fraction(value), "3.706e-2")
+
+    @pytest.mark.parametrize("value", ["3.707e-2", "3.7054e-2", "3.706e-3", "-3.706e-2", "0"])
+    def test_other_numbers(self, value):
+        assert not example.agree(Fraction(value), "3.706e-2")
+
+    def test_chance_is_the_share_of_a_decade(self):
+        # A number from 3.7055 to 3.707 on a logarithmic scale.
+        assert example.chance("3.706e-2") == pytest.approx(math.log10(3.707 / 3.7055), rel=1e-12)
+        rng = np.random.default_rng(1)
+        share = np.mean([example.agree(v, "3.7e-2") for v in 10 ** rng.uniform(-2, -1, 20000)])
+        p = example.chance("3.7e-2")
+        assert share == pytest.approx(p, abs=4 * math.sqrt(p / 20000))
+
+
+class TestReadings:
+    def test_how_many(self):
+        bounds, errors = example.bound_readings(), example.error_readings()
+        assert len(bounds) == 4 * 2 * 50 * 2
+        assert len(errors) == (6 + 2) * 3 * 5 * 2
+        for found in (bounds, errors):
+            assert len({(c.wordlength, c.detail, c.norm, c.relative) for c in found}) == len(found)
+
+    def test_a_bound_is_that_of_the_procedure(self):
+        (column,) = [
+            c
+            for c in example.bound_readings()
+            if (c.wordlength, c.detail, c.norm, c.relative)
+            == (MORE, "sizes, (96), A_T, its own digits", "row sum", False)
+        ]
+        for value, places in zip(column.values, PLACES, strict=True):
+            a = FloatFormat(10, places + 1).array(example.MATRIX)
+            exact = procedure.run(a, reading=Reading(False, "(96)", True, "row sum")).bound
+            assert value == pytest.approx(float(exact), rel=1e-12)
+
+    def test_an_error_is_that_of_the_inverse(self):
+        (column,) = [
+            c
+            for c in example.error_readings()
+            if (c.wordlength, c.detail, c.norm, c.relative)
+            == (MORE, "elimination, against the matrix as given", "column sum", True)
+        ]
+        true = exact_inverse()
+        for value, places in zip(column.values, PLACES, strict=True):
+            x = linalg.inv(FloatFormat(10, places + 1).array(example.MATRIX)).to_fractions()
+            error = abs(x - true).sum(axis=0).max() / abs(true).sum(axis=0).max()
+            assert value == pytest.approx(float(error), rel=1e-12)
+
+    def test_three_digits_cannot_hold_the_matrix(self):
+        given, stored = (
+            next(
+                c
+                for c in example.error_readings()
+                if c.wordlength.kind == "t = places" and c.detail == f"elimination, against the matrix as {which}"
+            )
+            for which in ("given", "stored")
+        )
+        assert given.values[0] != stored.values[0]
+        assert given.values[1:] == stored.values[1:]
+
+    def test_pairs_share_wordlength_and_norm(self):
+        found = example.pairs()
+        assert len(found) == 4 * 10
+        for bound, error in found:
+            assert (bound.wordlength, bound.norm, bound.relative) == (error.wordlength, error.norm, error.relative)
+            assert error.detail.startswith("elimination")
+
+
+class TestSearch:
+    @pytest.mark.parametrize("column", ["bound", "error"])
+    def test_counts(self, column):
+        found = example.search(column)
+        readings = example.bound_readings() if column == "bound" else example.error_readings()
+        assert found.numbers == 3 * found.readings == 3 * len(readings)
+        assert found.agreements == sum(
+            example.agree(v, p) for c in readings for v, p in zip(c.values, PRINTED[column], strict=True)
+        )
+        assert found.expected == pytest.approx(len(readings) * sum(map(example.chance, PRINTED[column])))
+        assert all(found.closest.distance <= c.distance for c in readings)
+        assert found.closest in readings
+
+    @pytest.mark.parametrize("column", ["bound", "error"])
+    def test_a_reading_that_was_printed_is_found(self, column, monkeypatch):
+        readings = example.bound_readings() if column == "bound" else example.error_readings()
+        planted = readings[17]
+        monkeypatch.setitem(PRINTED, column, tuple(f"{v:.3e}" for v in planted.values))
+        found = example.search(column)
+        assert found.columns >= 1
+        assert found.agreements >= 3
+        assert planted.agreements == 3
+        assert found.closest.distance < 1.001
+
+    def test_claims_by_hand(self):
+        decreasing, same, above = example.claims()
+        columns = example.bound_readings()
+        assert decreasing.holds == sum(c.values[0] > c.values[1] > c.values[2] for c in columns)
+        mantissas = [{float(f"{v:.3e}") / 10.0 ** math.floor(math.log10(v)) for v in c.values} for c in columns]
+        assert same.holds == sum(max(m) - min(m) < 1e-9 for m in mantissas)
+        assert above.readings == len(columns)
+        # In more digits than the wordlength, all bounds are multiples of β.
+        assert all(c.same_digits for c in columns if c.detail.endswith("more digits"))
+
+    def test_a_bound_below_the_error_would_be_seen(self, monkeypatch):
+        columns = example.bound_readings()
+        small = example.Column(
+            columns[0].wordlength, columns[0].wordlength, "x", "column sum", False, (1e-9, 1e-9, 1e-9)
+        )
+        monkeypatch.setattr(example, "bound_readings", lambda: (small,))
+        decreasing, same, above = example.claims()
+        assert (decreasing.holds, same.holds, above.holds) == (0, 1, 0)
+        assert above.exception.endswith("x, column sum")
+
+
+def norm_of(error, norm):
+    sizes = abs(error)
+    match norm:
+        case "column sum":
+            return sizes.sum(axis=0).max()
+        case "row sum":
+            return sizes.sum(axis=1).max()
+        case "largest entry":
+            return sizes.max()
+    return Fraction(math.sqrt((sizes * sizes).sum()))
+
+
+class TestPossible:
+    @pytest.mark.parametrize("norm", example.SEARCHED)
+    @pytest.mark.parametrize("kind", example.KINDS)
+    def test_the_error_of_an_inverse_is_found_possible(self, norm, kind):
+        wordlength = Wordlength(kind, NEAREST)
+        for places in PLACES:
+            x = example.gauss_jordan(example.matrix(), wordlength.rounder(places))
+            printed = f"{float(norm_of(x - exact_inverse(), norm)):.3e}"
+            found = example.possible(wordlength, places, norm, printed=printed)
+            assert found.witness is not None
+            for index in np.ndindex(3, 3):  # numbers of the wordlength
+                assert wordlength.rounder(places)(found.witness[index]) == found.witness[index]
+            assert example.agree(norm_of(found.witness - exact_inverse(), norm), printed)
+
+    def test_every_witness_has_the_printed_error(self):
+        found = [one for one in example.all_possible() if one.witness is not None]
+        assert found
+        for one in found:
+            assert one.reference == "given"
+            true = exact_inverse()
+            scale = norm_of(true, one.norm) if one.relative else 1
+            assert example.agree(norm_of(one.witness - true, one.norm) / scale, one.printed)
+            for index in np.ndindex(3, 3):
+                assert one.wordlength.rounder(one.places)(one.witness[index]) == one.witness[index]
+
+    @pytest.mark.parametrize("transposed", [False, True])
+    def test_none_is_missed_in_four_digits(self, transposed):
+        # All sums of three multiples of the units near the true entries, by brute force.
+        true = exact_inverse().T if transposed else exact_inverse()
+        low, high = Fraction("7.7815e-5"), Fraction("7.783e-5")
+        hits = 0
+        for j in range(3):
+            choices = []
+            for x in true[:, j]:
+                unit = Fraction(10) ** (math.floor(math.log10(abs(x))) + 1 - 4)
+                start = math.floor(x / unit)
+                reach = math.ceil(high / unit) + 1
+                choices.append([abs(k * unit - x) for k in range(start - reach, start + reach + 1)])
+            *two, last = sorted(choices, key=len)
+            last = np.sort(np.array(last, dtype=object))
+            for p, q in itertools.product(*two):
+                hits += np.searchsorted(last, high - p - q) - np.searchsorted(last, low - p - q)
+        found = example.possible(MORE, 3, "row sum" if transposed else "column sum")
+        assert (found.witness is not None) == (hits > 0)
+
+    def test_the_smallest_error_there_is_can_exclude_the_print(self):
+        # At five places the best inverse of t = places + 1 digits is already worse than printed, in three norms.
+        best = example.round_once(example.matrix(), MORE.rounder(5)) - exact_inverse()
+        for norm in ("column sum", "row sum", "Frobenius"):
+            assert norm_of(best, norm) > Fraction(PRINTED["error"][1]) * Fraction("1.001")
+            assert example.possible(MORE, 5, norm).witness is None
+
+    @pytest.mark.parametrize("rounding", [NEAREST, CHOP])
+    def test_against_the_matrix_as_stored(self, rounding):
+        # Three digits: the error of the best inverse of the stored matrix is found possible.
+        wordlength = Wordlength("t = places", rounding)
+        fl = wordlength.rounder(3)
+        stored = example._each(example.matrix(), fl)
+        true = example._inverse(stored)
+        assert (true @ stored == np.eye(3, dtype=int)).all()
+        for norm in example.SEARCHED:
+            error = norm_of(example.round_once(stored, fl) - true, norm)
+            found = example.possible(wordlength, 3, norm, printed=f"{float(error):.3e}", reference="stored")
+            assert example.agree(norm_of(found.witness - true, norm), found.printed)
+            assert found.reference == "stored"
+        for norm in example.SEARCHED:  # and the largest error of the best inverse is above the print
+            assert norm_of(example.round_once(stored, fl) - true, norm) > Fraction(PRINTED["error"][0])
+
+    def test_all_of_them(self):
+        found = example.all_possible()
+        assert len(found) == 6 * 4 * 2 * 3
+        assert sum(one.reference == "stored" for one in found) == 2 * 4 * 2 * 3
+        for one in found:
+            within = one.wordlength.kind != "t = places + 2"
+            assert not within or one.witness is None
+
+    def test_other_words_are_refused(self):
+        with pytest.raises(ValueError, match="norm: got 'spectral'; needed one of column sum, row sum"):
+            example.possible(MORE, 3, "spectral")
+        with pytest.raises(ValueError, match="reference: got 'rounded'; needed 'given' or 'stored'"):
+            example.possible(MORE, 3, "row sum", reference="rounded")
+
+    @pytest.mark.parametrize(("y", "up", "down"), [("0.1000", "0.1001", "0.09999"), ("-0.1000", "-0.09999", "-0.1001"),
+                                                   ("0.9999", "1", "0.9998"), ("2", "2.001", "1.999")])  # fmt: skip
+    def test_neighbours(self, y, up, down):
+        assert example._next(Fraction(y), MORE, 3, 1) == Fraction(up)
+        assert example._next(Fraction(y), MORE, 3, -1) == Fraction(down)

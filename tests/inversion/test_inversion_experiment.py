@@ -1,0 +1,324 @@
+"""gpbnb.inversion.experiment: trials are what they say, and the kept sweeps are what the command computes."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import oracles
+import pytest
+
+from gpbnb import linalg
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion import __main__ as command
+from gpbnb.inversion import bounds, experiment, procedure, theory
+from gpbnb.inversion.procedure import Reading
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FMT = FloatFormat(2, 24)
+
+
+def draw(family, n, seed=3):
+    return experiment.FAMILIES[family](n, np.random.default_rng(seed))
+
+
+class TestTrial:
+    @pytest.mark.parametrize("fmt", [FMT, FloatFormat(10, 5), FloatFormat(16, 6, CHOP), FloatFormat(3, 9)], ids=str)
+    @pytest.mark.parametrize("pivot", [False, True])
+    def test_inverse_and_error(self, fmt, pivot):
+        slow = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
+        exact = oracles.Arithmetic(fmt.base, 400, True)
+        for n in (1, 2, 4):
+            one = experiment.trial(fmt.array(draw("random", n)), pivot)
+            a = one.matrix.to_fractions()
+            assert one.computed.to_fractions().tolist() == slow.inv(a.tolist(), pivot)
+            true = np.array(exact.inv(a.tolist(), True), dtype=object)
+            error = max(abs(one.computed.to_fractions() - true).sum(axis=0))
+            assert one.error == pytest.approx(error, rel=1e-12)
+            condition = max(abs(a).sum(axis=0)) * max(abs(true).sum(axis=0))
+            assert one.condition == pytest.approx(float(condition), rel=1e-12)
+            assert one.n == n
+            assert one.pivot is pivot
+
+    def test_bounds_are_those_of_their_modules(self):
+        a = FMT.array(draw("random", 4))
+        one = experiment.trial(a)
+        assert tuple(one.bounds) == experiment.ALL_BOUNDS
+        assert set(experiment.ALL_BOUNDS) == {*map(str, experiment.PRINTED), *experiment.BETTER}
+        reduction, beta = procedure.reduce(a, True), FMT.unit_roundoff
+        for reading in experiment.PRINTED:
+            exact = procedure.evaluate(reduction, beta, reading).bound
+            assert one.bounds[str(reading)] == pytest.approx(float(exact), rel=1e-11)
+        assert one.bounds["corrected"] == pytest.approx(float(theory.bound(reduction, beta)), rel=1e-12)
+        assert one.bounds["strict"] == pytest.approx(float(theory.strict_bound(reduction, beta)), rel=1e-12)
+        factors, x = linalg.lu(a, True), linalg.inv(a, True)
+        assert one.bounds["Wilkinson"] == bounds.wilkinson(factors, x)
+        assert one.bounds["Higham"] == bounds.higham(factors, x)
+        assert one.bounds["probabilistic"] == bounds.higham_probabilistic(factors, x)
+        assert one.bounds["rule of thumb"] == bounds.rule_of_thumb(factors, x)
+        assert one.bounds["ball"] == bounds.ball(a, x)
+        assert one.bounds["preconditioned ball"] == bounds.ball(a, x, True)
+        assert one.bounds["a posteriori"] == bounds.a_posteriori(a, x)
+
+    def test_what_is_asked_for(self):
+        one = experiment.trial(FMT.array(draw("random", 3)), names=("ball", "signed, chart, A"))
+        assert tuple(one.bounds) == ("ball", "signed, chart, A")
+
+    def test_what_proves_nothing_is_absent(self):
+        few = FloatFormat(10, 2, CHOP)
+        one = experiment.trial(few.array([[1, "0.9"], ["0.9", 1]]))
+        assert {"probabilistic", "Higham"}.isdisjoint(one.bounds)
+        assert set(one.bounds) >= {*map(str, experiment.PRINTED), "corrected"}
+
+    def test_violations_and_ratios(self):
+        bound_below = experiment.Trial("", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(1, 3), {"x": 1 / 3})
+        assert bound_below.violates("x")  # 1/3 as a float64 is below 1/3
+        assert bound_below.ratio("x") == pytest.approx(1)
+        exact = experiment.Trial("", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(0), {"x": 0.1, "y": 0.0})
+        assert exact.ratio("x") == np.inf
+        assert exact.ratio("y") == 1
+        assert not exact.violates("y")
+
+    def test_singular(self):
+        with pytest.raises(np.linalg.LinAlgError, match="singular"):
+            experiment.trial(FMT.array([[1, 2], [2, 4]]))
+        with pytest.raises(np.linalg.LinAlgError, match="zero pivot"):
+            experiment.trial(FMT.array([[0, 1], [1, 0]]), pivot=False)
+
+
+class TestFamilies:
+    @pytest.mark.parametrize("family", experiment.FAMILIES)
+    def test_same_seed_same_matrix(self, family):
+        for n in (2, 5, 20):
+            a, b, c = draw(family, n), draw(family, n), draw(family, n, seed=4)
+            assert a.shape == (n, n)
+            assert (a == b).all()
+            assert (a == c).all() == (family in experiment.FIXED)
+            assert bounds.true_inverse(a)
+
+    def test_what_they_are(self):
+        assert draw("Hilbert", 3)[1].tolist() == [Fraction(1, 2), Fraction(1, 3), Fraction(1, 4)]
+        symmetric = draw("symmetric", 6)
+        assert (symmetric == symmetric.T).all()
+        assert draw("Frank", 4).tolist() == [[4, 3, 2, 1], [3, 3, 2, 1], [0, 2, 2, 1], [0, 0, 1, 1]]
+        kahan = draw("Kahan", 3)
+        assert kahan.tolist() == [[1, Fraction(-3, 5), Fraction(-3, 5)], [0, Fraction(4, 5), Fraction(-12, 25)],
+                                  [0, 0, Fraction(16, 25)]]  # fmt: skip
+        graded = abs(draw("graded", 12)).astype(float)
+        assert graded.max() / graded[graded > 0].min() > 1e15
+        assert abs(draw("random", 9)).max() <= 1
+
+    def test_wilkinson_doubles_with_each_step(self):
+        n = 12
+        upper = linalg.lu(FMT.array(draw("Wilkinson", n)), pivot=True).upper.to_float()
+        assert upper[-1, -1] / upper[0, -1] == pytest.approx(2 ** (n - 1), rel=0.02)
+
+    def test_nearly_singular_has_the_condition_it_is_meant_to(self):
+        # median over draws: one part in 10**6 of a row, to a factor of some hundreds
+        conditions = [
+            experiment.trial(
+                FloatFormat(10, 20).array(experiment.conditioned(5, 6, np.random.default_rng(k))), names=()
+            )
+            for k in range(9)
+        ]
+        assert 1e6 < np.median([one.condition for one in conditions]) < 1e9
+
+
+class TestSweeps:
+    def test_cells_have_seeds_of_their_own(self):
+        for cells in (experiment.variant_cells(), experiment.random_cells()):
+            assert len({cell.seed for cell in cells}) == len(cells)
+        cell = experiment.Cell("random", FMT, True, (2, 3), 3, (1, 2))
+        first, again = ([str(one.matrix) for one in cell.trials(()) if one] for _ in range(2))
+        assert first == again
+        other = experiment.Cell("random", FMT, True, (2, 3), 3, (1, 3))
+        assert first != [str(one.matrix) for one in other.trials(()) if one]
+
+    def test_what_the_sweeps_cover(self):
+        variants = experiment.variant_cells()
+        assert {cell.family for cell in variants} == set(experiment.FAMILIES)
+        assert all(cell.sizes == tuple(range(2, 21)) for cell in variants)
+        assert sum(cell.count for cell in experiment.random_cells()) == 100_200
+        assert all(cell.family == "random" and cell.pivot for cell in experiment.random_cells())
+
+    def test_a_cell_by_hand(self):
+        # In four digits some of these are regular and some are not, and the second bound is absent for some.
+        cell = experiment.Cell("graded", FloatFormat(10, 4), True, (2, 3), 20, (29,))
+        names = ("signed, chart, A", "Higham")
+        trials = [one for one in cell.trials(names) if one]
+        rows = experiment.cell_rows(cell, experiment.cell_sample(cell, names))
+        assert [row["bound"] for row in rows] == list(names)
+        for row, name in zip(rows, names, strict=True):
+            assert (row["family"], row["format"], row["pivot"]) == ("graded", "10:4:nearest", "yes")
+            assert (row["n"], row["failed"], row["exact"]) == ("2-3", str(40 - len(trials)), "0")
+            assert int(row["trials"]) == len(trials)
+            having = [one for one in trials if name in one.bounds]
+            regular = [one.condition * 5e-4 <= 0.01 for one in trials]
+            assert int(row["absent"]) == len(trials) - len(having)
+            assert int(row["regular"]) == sum(regular)
+            assert int(row["violations"]) == sum(one.error > Fraction(one.bounds[name]) for one in having)
+            assert int(row["violations_regular"]) == sum(
+                one.violates(name) for one, good in zip(trials, regular, strict=True) if good and name in one.bounds
+            )
+            ratios = [float(one.bounds[name] / one.error) for one in having]
+            assert row["smallest"] == f"{min(ratios):.4g}"
+            assert row["median"] == f"{np.median(ratios):.4g}"
+            assert row["largest"] == f"{max(ratios):.4g}"
+            of_regular = [one.ratio(name) for one in having if one.condition <= 20]
+            assert row["smallest_regular"] == (f"{min(of_regular):.4g}" if of_regular else "")
+            assert int(row["tight"]) == sum(ratio <= 1.1 for ratio in ratios)
+        assert 0 < sum(regular) < len(trials)
+        assert int(rows[1]["absent"]) > 0
+        assert int(rows[0]["violations"]) > 0
+
+    def test_exact_inverses_have_no_ratio(self):
+        sample = experiment.Sample(("a posteriori",))
+        sample.add(experiment.trial(FMT.array([[2, 0], [0, 4]]), names=("a posteriori",)))
+        (row,) = sample.rows("x", "x", "x", "x")
+        assert (row["trials"], row["exact"], row["absent"], row["violations"]) == ("1", "1", "0", "0")
+        assert (row["median"], row["tight"]) == ("", "0")
+
+    def test_singular_ones_are_counted_apart(self):
+        cell = experiment.Cell("Hilbert", FloatFormat(10, 1), True, tuple(range(2, 9)), 1, (0,))
+        sample = experiment.cell_sample(cell, ("ball",))
+        assert sample.failed > 0
+        assert sample.trials + sample.failed == cell.count == 7
+
+    def test_all_together(self):
+        cells = [experiment.Cell(family, FMT, True, (2, 4), 3, (1, k)) for k, family in enumerate(("random", "Kahan"))]
+        names = ("ball",)
+        rows = experiment.sweep_rows(cells, names)
+        assert [(row["family"], row["format"]) for row in rows] == [
+            ("random", "2:24:nearest"),
+            ("Kahan", "2:24:nearest"),
+            ("random", "all"),
+            ("Kahan", "all"),
+            ("all", "all"),
+        ]
+        assert int(rows[-1]["trials"]) == int(rows[0]["trials"]) + int(rows[1]["trials"]) == 8
+        ratios = [one.ratio("ball") for cell in cells for one in cell.trials(names)]
+        assert rows[-1]["median"] == f"{np.median(ratios):.4g}"
+
+
+class TestKept:
+    @pytest.mark.parametrize("sweep", experiment.SWEEPS)
+    def test_provenance_and_sums(self, sweep):
+        kept = experiment.frozen(sweep)
+        assert kept.provenance["seed"] == str(experiment.SEED)
+        assert kept.provenance["command"] == f"python -m gpbnb.inversion {sweep}"
+        assert "python-flint" in kept.provenance["versions"]
+        assert kept.provenance["commit"]
+        cells, names = experiment.SWEEPS[sweep]
+        for name in names:
+            parts = [row for row in kept.select(bound=name) if row["format"] != "all"]
+            (whole,) = kept.select(bound=name, family="all")
+            assert len(parts) == len(cells())
+            for count in ("trials", "failed", "exact", "absent", "violations", "regular", "tight"):
+                assert sum(int(row[count]) for row in parts) == int(whole[count])
+        assert sum(int(row["trials"]) + int(row["failed"]) for row in parts) == sum(cell.count for cell in cells())
+
+    @pytest.mark.parametrize(
+        ("sweep", "which"),
+        [
+            ("variants", lambda c: c.family == "Kahan" and c.pivot and c.fmt == FMT),
+            ("variants", lambda c: c.family == "Hilbert" and not c.pivot and c.fmt == FloatFormat(10, 9)),
+            ("random", lambda c: c.sizes == (11,) and c.fmt == FloatFormat(16, 6, CHOP)),
+            ("random", lambda c: c.sizes == (14,) and c.fmt == FloatFormat(2, 11)),
+        ],
+    )
+    def test_a_slice_comes_out_again(self, sweep, which):
+        cells_of, names = experiment.SWEEPS[sweep]
+        (cell,) = filter(which, cells_of())
+        rows = experiment.cell_rows(cell, experiment.cell_sample(cell, names))
+        kept = experiment.frozen(sweep)
+        for row in rows:
+            where = {key: row[key] for key in ("family", "format", "pivot", "n", "bound")}
+            assert kept.select(**where) == [row]
+
+    def test_what_is_proved_was_never_exceeded(self):
+        proved = ("strict", "Wilkinson", "Higham", "ball", "preconditioned ball", "a posteriori")
+        for sweep in experiment.SWEEPS:
+            for row in experiment.frozen(sweep).rows:
+                if row["bound"] in proved:
+                    assert row["violations"] == "0"
+
+    def test_a_posteriori_reaches_its_goal(self):
+        (whole,) = experiment.frozen("random").select(family="all", bound="a posteriori")
+        assert int(whole["trials"]) >= 100_000
+        assert float(whole["median"]) <= 1.1
+        assert int(whole["tight"]) > int(whole["trials"]) / 2
+
+    @pytest.mark.parametrize("bound", ["signed, (96), A_T", "sizes, chart, A_T"])
+    def test_the_worst_is_the_one_that_was_kept(self, bound):
+        one = experiment.worst(bound)
+        assert one.regular
+        assert one.violates(bound)
+        least = min(
+            float(row["smallest_regular"] or "inf") for row in experiment.frozen("variants").select(bound=bound)
+        )
+        assert f"{one.ratio(bound):.4g}" == f"{least:.4g}"
+        again = experiment.trial(one.matrix, one.pivot, (bound,))
+        assert (again.error, again.bounds) == (one.error, one.bounds)
+
+    def test_no_such_bound(self):
+        with pytest.raises(ValueError, match="got bound 'best'; needed one of signed, chart, A, signed, chart, A_T"):
+            experiment.worst("best")
+
+    def test_no_such_sweep(self):
+        with pytest.raises(ValueError, match="got sweep 'all'; needed one of variants, random"):
+            experiment.frozen("all")
+
+
+class TestCommand:
+    def test_it_writes_what_is_read(self, tmp_path, monkeypatch, capsys):
+        cells = [experiment.Cell("random", FMT, True, (2,), 5, (1, k)) for k in range(3)]
+        monkeypatch.setattr(experiment, "SWEEPS", {"small": (lambda: cells, ("ball", "a posteriori"))})
+        assert command.main(["small", "--folder", str(tmp_path), "--first", "2"]) == 0
+        text = (tmp_path / "small.csv").read_text(encoding="utf-8")
+        assert text.startswith("# command: python -m gpbnb.inversion small\n# seed: 1984\n")
+        assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
+        assert "small.csv: 10 inversions" in capsys.readouterr().out
+
+    def test_unknown_sweeps(self, capsys):
+        with pytest.raises(SystemExit):
+            command.main(["other"])
+        assert "needed one of variants, random" in capsys.readouterr().err
+
+
+class TestFigureData:
+    def test_against_size(self):
+        trials = experiment.against_size(FMT, (2, 5), 3, np.random.default_rng(1))
+        assert [one.n for one in trials] == [2, 2, 2, 5, 5, 5]
+        assert set(trials[0].bounds) == set(experiment.BETTER)
+
+    def test_against_condition(self):
+        trials = experiment.against_condition(FMT, 5, (0, 3, 5), np.random.default_rng(1))
+        assert trials[0].condition < trials[1].condition < trials[2].condition
+        assert len(experiment.against_condition(FloatFormat(10, 2), 5, (12,) * 9, np.random.default_rng(1))) < 9
+
+    def test_worst_small(self):
+        names, fmt = ("signed, chart, A",), FloatFormat(10, 3)
+        worst = experiment.worst_small(names, fmt, 2, 9, 60, np.random.default_rng(5))[names[0]]
+        rng = np.random.default_rng(5)
+        ratios = []
+        for _ in range(60):
+            a = fmt.array(rng.integers(-9, 10, (2, 2)))
+            try:
+                one = experiment.trial(a, names=names)
+            except np.linalg.LinAlgError:
+                continue
+            if one.error:
+                ratios.append(one.ratio(names[0]))
+        assert worst.ratio(names[0]) == min(ratios)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "reading"),
+    [([[-12, -11], [-17, 83]], Reading()), ([[9, -2], [-59, 71]], Reading(triangular=True))],
+)
+def test_the_signed_procedure_is_no_bound(matrix, reading):
+    fmt = FloatFormat(10, 3)
+    one = experiment.trial(fmt.array(matrix), names=(str(reading), str(Reading(False, "(96)"))))
+    assert procedure.run(one.matrix, True, reading).bound < one.error
+    assert one.violates(str(reading))
+    assert not one.violates("sizes, (96), A")

@@ -1,0 +1,120 @@
+"""gpbnb.inversion.figures: what is drawn is the result; axes, legends and colours say what it is."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.patches import FancyArrowPatch
+
+from gpbnb import plotting
+from gpbnb.formats import FloatFormat
+from gpbnb.inversion import example, experiment, figures
+from gpbnb.inversion.experiment import Frozen
+
+FMT = FloatFormat(2, 24)
+
+
+@pytest.fixture
+def ax():
+    _, axes = plotting.figure()
+    yield axes[0]
+    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    plt.close("all")
+
+
+def legend_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def colour(artist):
+    return to_hex(artist.get_color()).upper()
+
+
+class TestFlowChart:
+    def test_boxes_and_arrows(self, ax):
+        artists = figures.flow_chart(ax)
+        texts = [artist.get_text() for artist in artists if hasattr(artist, "get_text")]
+        assert texts == [box.text for box in figures.CHART.values()]
+        arrows = [artist for artist in artists if isinstance(artist, FancyArrowPatch)]
+        assert len(arrows) == sum(len(box.follows) for box in figures.CHART.values())
+        assert not ax.axison
+
+    def test_every_box_leads_to_the_bound(self):
+        reached = {"norm"}
+        for _ in figures.CHART:
+            reached |= {name for name, box in figures.CHART.items() if reached.intersection(box.follows)}
+        assert reached == set(figures.CHART)
+        followed = {name for box in figures.CHART.values() for name in box.follows}
+        assert set(figures.CHART) - followed == {"given"}
+
+    def test_no_box_covers_another(self, ax):
+        artists = figures.flow_chart(ax)
+        ax.figure.canvas.draw()
+        frames = [artist.get_bbox_patch().get_window_extent() for artist in artists if hasattr(artist, "get_text")]
+        assert not any(a.overlaps(b) for i, a in enumerate(frames) for b in frames[:i])
+        inside = ax.figure.bbox
+        assert all(inside.x0 <= f.x0 and f.x1 <= inside.x1 and inside.y0 <= f.y0 and f.y1 <= inside.y1 for f in frames)
+
+
+def test_table1(ax):
+    bounds, errors = example.bound_readings()[::40], example.error_readings()[::20]
+    drawn = figures.table1(bounds, errors, ax)
+    for points, printed, columns, name in zip(
+        drawn[::2], drawn[1::2], (bounds, errors), ("bound", "error"), strict=True
+    ):
+        assert sorted(points.get_ydata()) == sorted(v for c in columns for v in c.values)
+        assert [float(v) for v in example.PRINTED[name]] == list(printed.get_ydata())
+        assert printed.get_markerfacecolor() == "white"
+    assert colour(drawn[0]) == plotting.BOUND
+    assert colour(drawn[2]) == plotting.OBSERVED
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["3", "5", "8"]
+    assert ax.get_yscale() == "log"
+    assert legend_of(ax) == ["bounds, every reading", "bounds as printed", "errors, every reading", "errors as printed"]
+
+
+def test_violations(ax):
+    rows = [
+        {"family": family, "format": "all", "bound": bound, "regular": "40", "violations_regular": str(k + 2 * i)}
+        for i, family in enumerate(("random", "Kahan", "all"))
+        for k, bound in enumerate(("x", "chart, A_T"))
+    ]
+    bars = figures.violations(Frozen({}, tuple(rows)), ("x", "chart, A_T"), ax)
+    assert [bar.get_height() for bar in bars] == [0, 5, 2.5, 7.5]
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["random", "Kahan"]
+    assert legend_of(ax) == ["x", "chart, $A_T^{-1}$"]
+    assert "(%)" in ax.get_ylabel()
+
+
+class TestRatios:
+    NAMES = ("Higham", "ball", "a posteriori")
+
+    def test_against_size(self, ax):
+        trials = experiment.against_size(FMT, (2, 4), 5, np.random.default_rng(1))
+        drawn = figures.ratios(trials, self.NAMES, ax)
+        assert len(drawn) == 2 * 3 + 1
+        for line, name in zip(drawn[1::2], self.NAMES, strict=False):
+            assert list(line.get_xdata()) == [2, 4]
+            expected = [np.median([one.ratio(name) for one in trials if one.n == n]) for n in (2, 4)]
+            assert list(line.get_ydata()) == expected
+        assert list(drawn[-1].get_ydata()) == [1, 1]
+        assert colour(drawn[-1]) == plotting.BOUND
+        assert ax.get_yscale() == "log"
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("rows $n$", "bound / error (no unit)")
+
+    def test_against_condition(self, ax):
+        trials = experiment.against_condition(FMT, 4, np.linspace(0, 7, 8), np.random.default_rng(1))
+        *points, _, limit = figures.ratios(trials, self.NAMES, ax, "condition")
+        for artist, name in zip(points, self.NAMES, strict=True):
+            having = [one for one in trials if name in one.bounds]
+            assert list(artist.get_xdata()) == [one.condition for one in having]
+            assert list(artist.get_ydata()) == [one.ratio(name) for one in having]
+        assert list(limit.get_xdata()) == [2**24, 2**24]
+        assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+        assert "condition number" in ax.get_xlabel()
+
+    def test_no_more_bounds_than_colours(self, ax):
+        trials = experiment.against_size(FMT, (2,), 1, np.random.default_rng(1))
+        with pytest.raises(ValueError, match="got 7 bounds; needed at most 6, or colours repeat; draw two figures"):
+            figures.ratios(trials, experiment.BETTER[:7], ax)

@@ -1,0 +1,118 @@
+"""gpbnb.inversion.tables: each line says what was computed."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from gpbnb.formats import FloatFormat
+from gpbnb.inversion import example, experiment, tables
+from gpbnb.inversion.experiment import Frozen
+
+
+def number(value):
+    exponent = math.floor(math.log10(value))
+    return rf"${float(value) / 10**exponent:.3f}\cdot 10^{{{exponent}}}$"
+
+
+def test_table1():
+    readings = example.pairs()[:3]
+    table = tables.table1(readings)
+    assert table.body[0] == (
+        "as printed",
+        "",
+        r"$3.706\cdot 10^{-2}$",
+        r"$3.706\cdot 10^{-4}$",
+        r"$3.706\cdot 10^{-7}$",
+        r"$7.782\cdot 10^{-5}$",
+        r"$4.530\cdot 10^{-7}$",
+        r"$4.672\cdot 10^{-10}$",
+    )
+    bound, error = readings[2]
+    line = table.body[3]
+    assert line[0] == "t = places, nearest"
+    assert line[1] == "signed, (96), $A^{-1}$, its own digits"
+    assert line[2] == f"{number(bound.values[0])} ({bound.values[0] / 3.706e-2:.3g})"
+    assert line[7] == f"{number(error.values[2])} ({error.values[2] / 4.672e-10:.3g})"
+    assert len(table.header) == len(line) == 8
+
+
+def test_searches():
+    found = [example.search("bound"), example.search("error")]
+    first, second = tables.searches(found).body
+    assert first[:4] == ("By proposed method", "800", "2400", str(found[0].agreements))
+    assert second[:4] == ("Actual value", "240", "720", str(found[1].agreements))
+    assert first[4] == f"{found[0].expected:.2g}"
+    assert first[6] == ", ".join(number(v) for v in found[0].closest.values)
+
+
+def test_claims():
+    found = example.claims()
+    lines = tables.claims(found).body
+    assert [line[1] for line in lines] == [f"{one.holds} of {one.readings}" for one in found]
+    assert [line[2] == "none" for line in lines] == [one.holds == one.readings for one in found]
+
+
+def test_possibilities():
+    found = example.all_possible()
+    table = tables.possibilities(found)
+    assert len(table.body) == 6 * 4 * 2
+    assert table.body[-1][0] == "t = places, chop, matrix stored so"
+    answers = [answer for line in table.body for answer in line[3:]]
+    assert answers == ["no" if one.witness is None else "yes" for one in found]
+    assert table.header[3] == "3 places: 7.782e-5"
+
+
+ROWS = tuple(
+    {
+        "family": family,
+        "format": fmt,
+        "bound": bound,
+        "trials": "40",
+        "failed": "0",
+        "absent": "3",
+        "violations": str(k),
+        "regular": "30",
+        "violations_regular": str(7 + k),
+        "smallest": "0.5",
+        "median": "2",
+        "largest": "1.5e+09",
+    }
+    for fmt in ("2:24:nearest", "all")
+    for family in ("random", "Kahan", "all")
+    for k, bound in enumerate(("signed, chart, A_T", "ball"))
+)
+
+
+def test_violations():
+    table = tables.violations(Frozen({}, ROWS), ("signed, chart, A_T", "ball"))
+    assert table.header == ("matrices", "inversions", "signed, chart, $A_T^{-1}$", "ball")
+    assert table.body == (("random", "40", "0", "1"), ("Kahan", "40", "0", "1"), ("all", "40", "0", "1"))
+    regular = tables.violations(Frozen({}, ROWS), ("signed, chart, A_T", "ball"), regular=True)
+    assert regular.body[0] == ("random", "30", "7", "8")
+
+
+def test_summary():
+    table = tables.summary(Frozen({}, ROWS), ("ball",))
+    assert table.body == (("ball", "40", "3", "1", "0.5", "2", r"$1.500\cdot 10^{9}$"),)
+
+
+def test_worst():
+    one = experiment.trial(FloatFormat(10, 3).array([[-12, -11], [-17, 83]]), True, ("signed, chart, A",), "by hand")
+    (line,) = tables.worst({"signed, chart, A": one}).body
+    assert line[:4] == ("signed, chart, $A^{-1}$", "by hand, 2 rows", "3 decimal digits, nearest", "yes")
+    bound = one.bounds["signed, chart, A"]
+    assert line[4:] == ("8", number(one.error), number(bound), f"{bound / one.error:.3g}")
+    assert one.condition == pytest.approx(7.95, abs=0.01)
+
+
+def test_worked():
+    fmt = FloatFormat(10, 3)
+    one = experiment.trial(fmt.array([[-12, -11], [-17, 83]]), names=("signed, chart, A", "a posteriori"))
+    (line,) = tables.worked({"signed, chart, A": one}, ("signed, chart, A", "ball")).body
+    assert line[0] == "signed, chart, $A^{-1}$"
+    assert line[1] == "-12 -11; -17 83"
+    assert line[2] == "3 decimal digits"
+    assert line[3] == "; ".join(" ".join(str(v) for v in row) for row in one.computed)
+    assert line[4:] == (number(one.error), number(one.bounds["signed, chart, A"]), "none")

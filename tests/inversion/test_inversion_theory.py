@@ -1,0 +1,450 @@
+"""gpbnb.inversion.theory: each bound as printed or derived, and whether it is one."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import oracles
+import pytest
+
+from gpbnb.bounds import column_sum_norm, exact, gamma, row_sum_norm
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion import theory
+from gpbnb.inversion.theory import Perturbation, Reduction
+
+BETA = Fraction(1, 2000)
+
+# Made up, not computed: 3 stages of a 3 × 3 matrix and two right-hand sides, no entry of them 0 or 1 by chance.
+STAGES = [
+    [[2, 3, -5], [4, 7, 9], [-6, 8, 11]],
+    [[2, 3, -5], [0, 13, 17], [0, -26, 19]],
+    [[2, 3, -5], [0, 13, 17], [0, 0, 23]],
+]
+RIGHTS = [[[3, 5], [7, 2], [9, -4]], [[3, 5], [-8, 6], [12, 21]], [[3, 5], [-8, 6], [-25, 31]]]
+SOLUTION = [[2, -3], [5, 7], [-4, 9]]
+MADE_UP = Reduction(STAGES, RIGHTS, SOLUTION)
+
+
+def rows(a):
+    return [list(row) for row in a]
+
+
+# -- as printed, by hand --------------------------------------------------------------------------
+
+
+def test_first_approach_as_printed():
+    inverse, residual, change = [[2, -3], [5, 7]], [[Fraction(1, 100), 0], [0, Fraction(-3, 100)]], [[0, 1], [2, 0]]
+    change = exact(change) / 1000
+    assert theory.printed_first_bound(inverse, residual) == 10 * Fraction(3, 100)
+    assert theory.printed_first_relative_bound(inverse, residual) == Fraction(3, 100)
+    assert theory.printed_first_bound(inverse, residual, change) == 10 * Fraction(3, 100) + 100 * Fraction(2, 1000)
+    assert theory.printed_first_relative_bound(inverse, residual, change) == Fraction(3, 100) + 10 * Fraction(2, 1000)
+    assert theory.strict_first_bound(inverse, residual) == Fraction(3, 10)
+    assert theory.strict_first_bound(inverse, residual, change) == Fraction(1, 2) / (1 - Fraction(2, 100))
+    assert theory.residual_bound(inverse, residual) == Fraction(3, 10) / Fraction(97, 100)
+    assert theory.printed_first_bound(inverse, residual, change, row_sum_norm) == 12 * Fraction(
+        3, 100
+    ) + 144 * Fraction(2, 1000)
+    assert theory.residual(inverse, [[1, 2], [3, 4]]).tolist() == [[-8, -8], [26, 37]]
+
+
+def test_lower_factor_by_hand():
+    assert rows(theory.lower_factor(STAGES)) == [[1, 0, 0], [2, 1, 0], [-3, -2, 1]]
+
+
+def test_trailing_by_hand():
+    assert rows(theory.trailing(STAGES[0], 1)) == [[0, 0, 0], [0, 7, 9], [0, 8, 11]]
+    assert rows(theory.trailing(RIGHTS[0], 2, columns=False)) == [[0, 0], [0, 0], [9, -4]]
+    assert rows(theory.trailing(STAGES[0], 0)) == STAGES[0]
+
+
+def test_triangularization_as_printed():
+    signed = [[0, 0, 0], [0, 3 * 13 - 2 * 7, 3 * 17 - 2 * 9], [0, -3 * 26 - 2 * 8, 3 * 19 - 2 * 11 + 3 * 23 - 2 * 19]]
+    sizes = [[0, 0, 0], [0, 3 * 13 + 2 * 7, 3 * 17 + 2 * 9], [0, 3 * 26 + 2 * 8, 3 * 19 + 2 * 11 + 3 * 23 + 2 * 19]]
+    assert rows(theory.printed_triangularization_error(STAGES, BETA) / BETA) == signed
+    assert rows(theory.triangularization_bounds(STAGES, BETA) / BETA) == sizes
+    # Column sums of A_1(1), A_1(0), A_2(2), A_2(1): 39, 20, 23, 19.
+    assert theory.printed_triangularization_norm(STAGES, BETA) == BETA * (3 * 39 + 2 * 20 + 3 * 23 + 2 * 19)
+    assert theory.printed_triangularization_norm(STAGES, BETA, row_sum_norm) == BETA * (
+        3 * 45 + 2 * 19 + 3 * 23 + 2 * 19
+    )
+
+
+def test_right_sides_as_printed():
+    signed = [
+        [0, 0],
+        [3 * -8 - 2 * 7, 3 * 6 - 2 * 2],
+        [3 * 12 - 2 * 9 + 3 * -25 - 2 * 12, 3 * 21 + 2 * 4 + 3 * 31 - 2 * 21],
+    ]
+    assert rows(theory.printed_right_side_error(RIGHTS, BETA) / BETA) == signed
+    sizes = [
+        [0, 0],
+        [3 * 8 + 2 * 7, 3 * 6 + 2 * 2],
+        [3 * 12 + 2 * 9 + 3 * 25 + 2 * 12, 3 * 21 + 2 * 4 + 3 * 31 + 2 * 21],
+    ]
+    assert rows(theory.right_side_bounds(RIGHTS, BETA) / BETA) == sizes
+    norms = [3 * 12 + 2 * 9 + 3 * 25 + 2 * 12, 3 * 21 + 2 * 4 + 3 * 31 + 2 * 21]
+    assert list(theory.printed_right_side_norms(RIGHTS, BETA) / BETA) == norms
+
+
+def test_back_substitution_as_printed():
+    assert rows(theory.back_substitution_weights(3)) == [[0, 4, 3], [0, 0, 3], [0, 0, 0]]
+    assert rows(theory.back_substitution_weights(4)) == [[0, 5, 4, 3], [0, 0, 4, 3], [0, 0, 0, 3], [0, 0, 0, 0]]
+    assert list(theory.right_side_weights(4)) == [4, 3, 2, 1]
+    assert rows(theory.printed_weights_1982(4))[0] == [0, 6, 5, 4]
+    assert rows(theory.printed_back_substitution_error(STAGES[-1], BETA) / BETA) == [
+        [0, 12, -15],
+        [0, 0, 51],
+        [0, 0, 0],
+    ]
+    assert rows(theory.printed_back_substitution_right_error(RIGHTS[-1], BETA) / BETA) == [
+        [9, 15],
+        [-16, 12],
+        [-25, 31],
+    ]
+
+
+def test_the_total_as_printed_and_corrected():
+    change, right = theory.printed_perturbation(MADE_UP, BETA)
+    delta_a = [[0, 12, -15], [0, 25, 33 + 51], [0, -94, 35 + 31]]
+    assert rows(change / BETA) == delta_a
+    delta_b = [[9, 15], [-38 - 16, 14 + 12], [18 - 99 - 25, 71 + 51 + 31]]
+    assert rows(right / BETA) == delta_b
+    bracket = exact(delta_b) - exact(delta_a) @ exact(SOLUTION)
+    assert rows(theory.printed_bracket(MADE_UP, BETA) / BETA) == rows(bracket)
+    assert theory.printed_bound(MADE_UP, BETA) == BETA * 19 * column_sum_norm(bracket)
+    lower = exact([[1, 0, 0], [2, 1, 0], [3, 2, 1]])
+    whole = theory.perturbation_bounds(MADE_UP, BETA)
+    bare = theory.perturbation_bounds(MADE_UP, BETA, transfer=False)
+    tilde, back = theory.triangularization_bounds(STAGES, BETA), exact([[0, 12, 15], [0, 0, 51], [0, 0, 0]]) * BETA
+    assert rows(whole.matrix) == rows(tilde + lower @ back)
+    assert rows(bare.matrix) == rows(tilde + back)
+    tilde, back = theory.right_side_bounds(RIGHTS, BETA), exact([[9, 15], [16, 12], [25, 31]]) * BETA
+    assert rows(whole.right) == rows(tilde + lower @ back)
+    assert rows(bare.right) == rows(tilde + back)
+    sizes = theory.bracket_bounds(MADE_UP, whole)
+    assert rows(sizes) == rows(whole.right + whole.matrix @ abs(exact(SOLUTION)))
+    assert theory.bound(MADE_UP, BETA) == 19 * column_sum_norm(sizes)
+
+
+def test_strict_forms_by_hand():
+    one, two = gamma(1, BETA), gamma(2, BETA)
+    sizes = theory.strict_triangularization_bounds(STAGES, BETA)
+    assert sizes[1, 1] == one * 13 + two * 2 * 3
+    assert sizes[2, 2] == one * (19 + 23) + two * (3 * 5 + 2 * 17)
+    assert not sizes[0].any()
+    assert not sizes[:, 0].any()
+    right = theory.strict_right_side_bounds(STAGES, RIGHTS, BETA)
+    assert right[2, 1] == one * (21 + 31) + two * (3 * 5 + 2 * 6)
+    assert list(right[0]) == [0, 0]
+    whole = theory.strict_perturbation_bounds(MADE_UP, BETA)
+    assert whole.matrix[1, 1] == sizes[1, 1] + 2 * gamma(4, BETA) * 3
+    assert whole.right[1, 0] == right[1, 0] + 2 * gamma(3, BETA) * 3 + gamma(2, BETA) * 8
+
+
+# -- is it a bound? -------------------------------------------------------------------------------
+
+
+def eliminated(base, precision, nearest, a, pivot):
+    """Elimination and back substitution with every operation rounded, entry by entry: (45)-(90)."""
+
+    def fl(x):
+        return oracles.rounded(x, base, precision, nearest)
+
+    n = len(a)
+    now = [[fl(x) for x in row] for row in a]
+    right = [[Fraction(i == j) for j in range(n)] for i in range(n)]
+    stages, rights = [rows(now)], [rows(right)]
+    for k in range(n - 1):
+        if pivot:
+            p = max(range(k, n), key=lambda i: abs(now[i][k]))  # the first of equals
+            for each in [*stages, *rights, now, right]:
+                each[k], each[p] = each[p], each[k]
+        now, right = rows(now), rows(right)
+        for i in range(k + 1, n):
+            m = fl(now[i][k] / now[k][k])
+            now[i] = [*now[i][:k], Fraction(0), *(fl(now[i][j] - fl(m * now[k][j])) for j in range(k + 1, n))]
+            right[i] = [fl(right[i][j] - fl(m * right[k][j])) for j in range(n)]
+        stages.append(rows(now))
+        rights.append(rows(right))
+    x = rows(right)
+    for c in range(n):
+        for k in reversed(range(n)):
+            rest = right[k][c]
+            for j in range(k + 1, n):
+                rest = fl(rest - fl(now[k][j] * x[j][c]))
+            x[k][c] = fl(rest / now[k][k])
+    return Reduction([exact(s) for s in stages], [exact(r) for r in rights], exact(x))
+
+
+def inverse_of(a):
+    """By Gauss and Jordan, exactly."""
+    n = len(a)
+    work = [[*row, *(Fraction(i == j) for j in range(n))] for i, row in enumerate(rows(a))]
+    for k in range(n):
+        p = next(i for i in range(k, n) if work[i][k])
+        work[k], work[p] = work[p], work[k]
+        work[k] = [x / work[k][k] for x in work[k]]
+        for i in set(range(n)) - {k}:
+            work[i] = [x - work[i][k] * y for x, y in zip(work[i], work[k], strict=True)]
+    return exact([row[n:] for row in work])
+
+
+class Case:
+    """One inversion: its format's β, what was computed, and the true inverse of the matrix as it was eliminated."""
+
+    def __init__(self, base, precision, nearest, a, pivot):
+        self.beta = FloatFormat(base, precision, Rounding.NEAREST if nearest else Rounding.CHOP).unit_roundoff
+        self.reduction = eliminated(base, precision, nearest, a, pivot)
+        self.inverse = inverse_of(self.reduction.stages[0])
+        self.true = self.inverse @ self.reduction.rights[0]
+        self.error = column_sum_norm(self.reduction.solution - self.true)
+
+
+@cache
+def cases():
+    """Random, graded and nearly singular matrices of two to five rows, two bases, rounded and chopped."""
+    rng = np.random.default_rng(84)
+    found = []
+    for base, precision in ((10, 3), (10, 6), (2, 11)):
+        for nearest in (True, False):
+            for n in (2, 3, 5):
+                for kind in range(6):
+                    a = rng.integers(-999, 1000, (n, n)).astype(object)
+                    if kind == 4:
+                        a = a * 10 ** rng.integers(0, 5, (n, 1)).astype(object)
+                    if kind == 5:
+                        a[-1] = a[0]
+                        a[-1, -1] += 1
+                    try:
+                        found.append(Case(base, precision, nearest, exact(a), pivot=kind % 2 == 0))
+                    except ZeroDivisionError:  # a pivot is zero
+                        continue
+    assert len(found) > 95
+    return found
+
+
+def ratios(observed, bound):
+    """Largest observed over bound; a bound of zero allows zero only."""
+    pairs = list(zip(np.ravel(observed), np.ravel(bound), strict=True))
+    assert all(abs(x) <= y for x, y in pairs)
+    return max((abs(x) / y for x, y in pairs if y), default=0)
+
+
+def test_the_errors_of_elimination_are_a_change_of_the_given_matrix_within_their_bounds():
+    closest = dict.fromkeys(("matrix", "strict", "right", "strict right"), 0)
+    for case in cases():
+        stages, rights, _ = case.reduction
+        lower = theory.lower_factor(stages)
+        change, right = lower @ stages[-1] - stages[0], lower @ rights[-1] - rights[0]
+        for name, observed, bound in (
+            ("matrix", change, theory.triangularization_bounds(stages, case.beta)),
+            ("strict", change, theory.strict_triangularization_bounds(stages, case.beta)),
+            ("right", right, theory.right_side_bounds(rights, case.beta)),
+            ("strict right", right, theory.strict_right_side_bounds(stages, rights, case.beta)),
+        ):
+            closest[name] = max(closest[name], ratios(observed, bound))
+        assert column_sum_norm(change) <= theory.printed_triangularization_norm(stages, case.beta)
+        assert (abs(right).max(axis=0) <= theory.printed_right_side_norms(rights, case.beta)).all()
+    assert min(closest.values()) > 0.4  # none of them is vacuous
+
+
+def test_printed_59_and_60_are_no_bounds():
+    """Already an entry with 3 a(1) = 2 a(0): the printed error is zero."""
+    exceeded = [0, 0]
+    for case in cases():
+        stages, rights, _ = case.reduction
+        lower = theory.lower_factor(stages)
+        change, right = lower @ stages[-1] - stages[0], lower @ rights[-1] - rights[0]
+        exceeded[0] += bool((abs(change) > abs(theory.printed_triangularization_error(stages, case.beta))).any())
+        exceeded[1] += bool((abs(right) > abs(theory.printed_right_side_error(rights, case.beta))).any())
+    assert min(exceeded) >= 3
+
+
+def test_back_substitution_solves_a_system_within_the_weights():
+    """(A_T + ΔA) x̂ = b_T + Δb is possible if and only if |b_T - A_T x̂| is at most |ΔA||x̂| + |Δb| (Oettli, Prager)."""
+    closest = 0
+    for case in cases():
+        stages, rights, x = case.reduction
+        n = len(x)
+        residual = rights[-1] - stages[-1] @ x
+        weights = np.array([[gamma(w, case.beta) for w in row] for row in theory.back_substitution_weights(n).tolist()])
+        right = np.array([gamma(w, case.beta) for w in theory.right_side_weights(n).tolist()])
+        allowed = (weights * abs(stages[-1])) @ abs(x) + right[:, np.newaxis] * abs(rights[-1])
+        closest = max(closest, ratios(residual, allowed))
+    assert closest > 0.3
+
+
+def test_strict_bounds_hold_and_corrected_ones_in_these_cases():
+    closest = {"entries": 0, "norm": 0, "corrected": 0}
+    proved = 0
+    for case in cases():
+        closest["entries"] = max(
+            closest["entries"],
+            ratios(
+                case.reduction.solution - case.true,
+                theory.strict_entry_bounds(case.reduction, case.beta, case.inverse),
+            ),
+        )
+        assert case.error <= theory.bound(case.reduction, case.beta)
+        closest["corrected"] = max(closest["corrected"], case.error / theory.bound(case.reduction, case.beta))
+        try:
+            bound = theory.strict_bound(case.reduction, case.beta)
+        except ValueError:
+            continue
+        proved += 1
+        assert case.error <= bound
+        closest["norm"] = max(closest["norm"], case.error / bound)
+    assert proved > 40
+    assert closest["entries"] > 0.2
+    assert closest["norm"] > 0.05
+    assert closest["corrected"] > 0.05
+
+
+def test_the_solution_is_that_of_the_perturbed_system_of_91_with_l():
+    """δb - δA x̂ of some changes within the bounds: again by Oettli and Prager, of the given system."""
+    without = 0
+    for case in cases():
+        stages, rights, x = case.reduction
+        residual = rights[0] - stages[0] @ x
+        ratios(
+            residual,
+            theory.bracket_bounds(case.reduction, theory.strict_perturbation_bounds(case.reduction, case.beta)),
+        )
+        bare = theory.bracket_bounds(
+            case.reduction, theory.perturbation_bounds(case.reduction, case.beta, transfer=False)
+        )
+        without += bool((abs(residual) > bare).any())
+    assert without == 0  # what L adds is never needed here: the bounds are pessimistic elsewhere
+
+
+def test_l_adds_at_most_half_of_n_plus_three():
+    largest = 0
+    for case in cases():
+        n = len(case.reduction.solution)
+        whole, bare = (theory.perturbation_bounds(case.reduction, case.beta, transfer) for transfer in (True, False))
+        # |l a| ≤ |a(k)| + |a(k-1)| to first order only: what was computed differs by its own error, 3β at most of it.
+        room = 1 + 5 * case.beta
+        for more, less in zip(whole, bare, strict=True):
+            assert (more <= Fraction(n + 3, 2) * less * room).all()
+            assert (more >= less).all()
+            largest = max(largest, ratios(less, more))
+        assert whole.matrix.tolist() != bare.matrix.tolist() or n == 2
+    assert largest <= 1
+
+
+def test_first_approach_bounds():
+    closest = 0
+    for case in cases():
+        x = case.reduction.solution @ case.reduction.rights[0].T  # the inverse of stages[0]
+        residual = theory.residual(case.reduction.stages[0], x)
+        error = column_sum_norm(x - case.inverse)
+        assert error <= theory.printed_first_bound(case.inverse, residual)
+        assert error <= theory.printed_first_relative_bound(case.inverse, residual) * column_sum_norm(case.inverse)
+        try:
+            posterior = theory.residual_bound(x, residual)
+        except ValueError:
+            continue
+        assert error <= posterior
+        closest = max(closest, error / posterior)
+    assert closest > 0.5
+
+
+def test_first_approach_of_a_changed_matrix():
+    """E = A⁻¹ - (A + Δ)⁻¹ with R = 0: (43) is of first order, exceeded by a change towards singularity."""
+    a = exact([[4, 1], [2, 3]])
+    inverse = inverse_of(a)
+    exceeded = 0
+    for change in (exact([[-1, 0], [0, -1]]), exact([[1, 0], [0, 1]]), exact([[0, 1], [1, 0]])):
+        for scale in (Fraction(1, 2), Fraction(1, 100)):
+            inexact = inverse_of(a + scale * change)
+            residual = theory.residual(a + scale * change, inexact)
+            assert not residual.any()
+            error = column_sum_norm(inexact - inverse)
+            assert error <= theory.strict_first_bound(inverse, residual, scale * change)
+            exceeded += error > theory.printed_first_bound(inverse, residual, scale * change)
+    diagonal, shrink = exact([[1, 0], [0, 1]]), exact([[-1, 0], [0, -1]]) / 10
+    error = column_sum_norm(inverse_of(diagonal + shrink) - diagonal)
+    assert error == Fraction(1, 9)
+    assert theory.printed_first_bound(diagonal, shrink * 0, shrink) == Fraction(1, 10) < error
+    assert theory.strict_first_bound(diagonal, shrink * 0, shrink) == error
+
+
+# -- exact, float64, and refused ------------------------------------------------------------------
+
+
+def test_what_is_exact_stays_exact_and_what_is_float_stays_float():
+    fmt = FloatFormat(10, 4)
+    arrays = Reduction([fmt.array(s) for s in STAGES], [fmt.array(r) for r in RIGHTS], fmt.array(SOLUTION))
+    floats = Reduction(*(np.asarray(part, dtype=float) for part in MADE_UP))
+    mixed = Reduction(floats.stages, RIGHTS, SOLUTION)
+    for function in (theory.printed_bound, theory.bound, theory.strict_bound):
+        value = function(MADE_UP, BETA / 10)
+        assert isinstance(value, Fraction)
+        assert function(arrays, BETA / 10) == value
+        # 3 × 3 sums of products: a few hundred roundings of 1e-16.
+        for other in (floats, mixed):
+            assert function(other, float(BETA / 10)) == pytest.approx(float(value), rel=1e-13)
+            assert isinstance(function(other, BETA / 10), float)
+    for function in (theory.printed_perturbation, theory.perturbation_bounds, theory.strict_perturbation_bounds):
+        assert isinstance(function(floats, BETA), Perturbation)
+        assert all(part.dtype == np.float64 for part in function(floats, BETA))
+        assert all(part.dtype == object for part in function(arrays, BETA))
+    assert theory.lower_factor(np.asarray(STAGES, dtype=float)).dtype == np.float64
+    assert theory.printed_triangularization_norm(np.asarray(STAGES, dtype=float), BETA) == pytest.approx(
+        0.132, rel=1e-14
+    )
+
+
+def test_input_is_left_alone():
+    before = [np.array(stage, dtype=float) for stage in STAGES]
+    theory.trailing(before[0], 2)
+    theory.strict_triangularization_bounds(before, BETA)
+    assert [stage.tolist() for stage in before] == STAGES
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: theory.residual([[1, 2, 3]], [[1]]), r"a: got shape \(1, 3\); needed a square matrix"),
+        (
+            lambda: theory.residual([[1, 2], [3, 4]], [[1]]),
+            r"got a of shape \(2, 2\), x of shape \(1, 1\); needed equal",
+        ),
+        (lambda: theory.residual([1, 2], [[1]]), r"a: got shape \(2,\); needed a matrix \(m, n\)"),
+        (lambda: theory.residual([[np.nan]], [[1]]), "entry 0, 0: got nan; needed a finite number"),
+        (lambda: theory.trailing(np.array([[np.inf]]), 0), "a: got an entry that is NaN or infinite; needed numbers"),
+        (lambda: theory.lower_factor(STAGES[:2]), r"got 2 stages of sizes \[3, 3\]; needed n matrices \(n, n\)"),
+        (lambda: theory.lower_factor([]), r"got 0 stages of sizes \[\]"),
+        (lambda: theory.lower_factor([[[0, 1], [1, 0]]] * 2), "got a zero pivot in stage 0; .* interchange rows"),
+        (lambda: theory.right_side_bounds(RIGHTS[:2], BETA), r"got 2 right sides of shapes \[\(3, 2\)\]; needed n"),
+        (
+            lambda: theory.strict_right_side_bounds(STAGES, [[[1]]], BETA),
+            "got 3 stages and 1 right sides; needed equally many",
+        ),
+        (
+            lambda: theory.bound(Reduction(STAGES, RIGHTS, [[1]]), BETA),
+            r"got 3 stages, right sides of shape \(3, 2\), a solution of shape \(1, 1\)",
+        ),
+        (lambda: theory.residual_bound([[2]], [[1]]), r"got ‖R‖ = 1; needed less than 1; this takes a better inverse"),
+        (lambda: theory.strict_first_bound([[2]], [[0]], [[3]]), r"got ‖A⁻¹‖‖ΔA‖ = 6; needed less than 1"),
+        (lambda: theory.strict_bound(MADE_UP, Fraction(1, 20)), r"got ‖E‖ = \S+; needed less than 1; .* more digits"),
+        (lambda: theory.strict_bound(MADE_UP, Fraction(1, 4)), "got 4 roundings with unit roundoff 0.25"),
+    ],
+)
+def test_bad_input_is_refused(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
+
+
+def test_one_by_one():
+    """A single number: no elimination, one division."""
+    fmt = FloatFormat(10, 3)
+    third = fmt.round(Fraction(1, 3))
+    reduction = Reduction([[[3]]], [[[1]]], [[third]])
+    beta = fmt.unit_roundoff
+    assert theory.printed_bracket(reduction, beta)[0, 0] == beta
+    assert theory.printed_bound(reduction, beta) == theory.bound(reduction, beta) == third * beta
+    assert abs(third - Fraction(1, 3)) <= theory.strict_bound(reduction, beta)
