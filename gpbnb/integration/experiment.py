@@ -31,8 +31,8 @@ BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # of progre
 class Accuracy(NamedTuple):
     """Errors of an evaluation in float64 against one of many digits, in units of the last place of the result."""
 
-    mu: Floats
-    ulp: Floats
+    mu: NDArray[np.float64]
+    ulp: NDArray[np.float64]
 
 
 def _exact(name: str, mu: float) -> Any:
@@ -143,8 +143,8 @@ class Piece(NamedTuple):
     """
 
     first: int
-    x: Floats
-    d: Floats
+    x: NDArray[np.float64]
+    d: NDArray[np.float64]
 
 
 def pieces(

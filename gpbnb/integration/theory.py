@@ -183,18 +183,20 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
 class Discretization(NamedTuple):
     r"""One cycle of (10) in units of :math:`\sigma_x` and T, exact at the sampling times.
 
+    Parameters
+    ----------
     phi11, phi21 : of (9), phi21 over T.
     q11, q12, q22 : covariances of q, over :math:`\sigma_x^2`, :math:`\sigma_x^2T`, :math:`\sigma_x^2T^2`.
     bridge : variance of the integral over a cycle when the input at both its ends is known,
         :math:`L(\mu/2)\tanh(\mu/2)/(\mu/2)`, over :math:`\sigma_x^2T^2`.
     """
 
-    phi11: Floats
-    phi21: Floats
-    q11: Floats
-    q12: Floats
-    q22: Floats
-    bridge: Floats
+    phi11: NDArray[np.float64]
+    phi21: NDArray[np.float64]
+    q11: NDArray[np.float64]
+    q12: NDArray[np.float64]
+    q22: NDArray[np.float64]
+    bridge: NDArray[np.float64]
 
 
 def discretize(mu: ArrayLike) -> Discretization:
@@ -297,10 +299,10 @@ def takeover(mu: float, share: float, rectangle: bool = False) -> float:
 class SavageRecursion(NamedTuple):
     """Covariances of (13) cycle by cycle, (n + 1,) each, in units of σ_x and T."""
 
-    p31: Floats
-    p32: Floats
-    p33: Floats
-    p22: Floats
+    p31: NDArray[np.float64]
+    p32: NDArray[np.float64]
+    p33: NDArray[np.float64]
+    p22: NDArray[np.float64]
 
     @property
     def pee(self) -> Floats:
@@ -390,8 +392,8 @@ class Step(NamedTuple):
     the units of x times seconds.
     """
 
-    a: Floats
-    b: Floats
+    a: NDArray[np.float64]
+    b: NDArray[np.float64]
 
 
 @lru_cache(maxsize=256)

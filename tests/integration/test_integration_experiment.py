@@ -266,6 +266,16 @@ def test_the_best_rate_is_best_in_emulation(fmt, worse):
     assert min(slow, fast) > worse * at_best
 
 
+def test_samples_and_products_are_rounded_too():
+    """In ten cycles the roundings before the addition are a quarter of the variance; so short, theory is 6 % low.
+
+    The standard error of the ratio is 0.9 %; without those roundings it would be 1.15.
+    """
+    (run,) = experiment.emulate(1.0, 0.5, 20.0, [FloatFormat(2, 24)], rng(24), 20_000)
+    ratio = run.rms.rounding / theory.two_errors(1.0, 1.0, 0.5, 20.0, run.fmt).rounding
+    assert ratio == pytest.approx(1.0, abs=0.1)
+
+
 def test_decimal_digits():
     (run,) = experiment.emulate(8.0, 64.0, 8.0, [FloatFormat(10, 5)], rng(19), 60)
     expected = theory.two_errors(1.0, 8.0, 64.0, 8.0, FloatFormat(10, 5))

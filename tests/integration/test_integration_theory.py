@@ -432,6 +432,16 @@ def test_errors_fall_and_grow_with_the_rate_as_the_closed_forms_say(fmt):
     assert scaled.total == pytest.approx(math.hypot(scaled.discretization, scaled.rounding))
 
 
+def test_the_closed_best_rate_is_the_least_of_both_variances():
+    """d/df of ωt/6f² + κt²f/ω, and of ωt/6f² + 2κ_1²t³f²/3ω, is zero."""
+    omega, t = 30.0, 500.0
+    fmt, chopped = FloatFormat(2, 24), FloatFormat(2, 24, CHOP)
+    f, g = (theory.independent_best_rate(omega, t, each) for each in (fmt, chopped))
+    assert theory.mean_square_rounding(fmt) * t**2 / omega == pytest.approx(omega * t / (3 * f**3), rel=1e-12)
+    slope = 4 * theory.mean_chopping(chopped) ** 2 * t**3 * g / (3 * omega)
+    assert slope == pytest.approx(omega * t / (3 * g**3), rel=1e-12)
+
+
 def test_odd_bases_have_no_ties():
     """Without them the error is proportional to the square root of the rate; with them it has a floor."""
     ratio = {}
