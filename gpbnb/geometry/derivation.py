@@ -235,8 +235,10 @@ def first_order_effects() -> Derivation:
     """Misalignments to first order: (1) and (2) with β and γ, turned back as in (5)-(7)."""
     small = (*ALPHA, *BETA, *GAMMA, *THETA)
     t, r = (vector.applyfunc(lambda e: up_to(1, e, small)) for vector in (star(), spin()))
-    y, z = sp.expand(r[1] - t[1]), sp.expand(r[2] - t[2])
+    drift = {theta: phi + alpha for theta, phi, alpha in zip(THETA, PHI, ALPHA, strict=True)}
+    y, z = (sp.expand((r[k] - t[k]).subs(drift)) for k in (1, 2))
     turned = derolled(-GAMMA[2], GAMMA[1])
+    both = sp.collect(sp.expand(derolled(-BETA[2] - GAMMA[2], BETA[1] + GAMMA[1])[0]), (C, S))
     return Derivation(
         (
             RollStep(
@@ -247,17 +249,17 @@ def first_order_effects() -> Derivation:
             RollStep(
                 "gyro, first row: β and γ",
                 held(C) * held(r[1]) - held(S) * held(r[2]),
-                -THETA[2] + sp.expand(derolled(-BETA[2] - GAMMA[2], BETA[1] + GAMMA[1])[0]),
+                -THETA[2] + both,
             ),
             RollStep(
-                "gyro less telescope, first row: β cancels, γ does not",
+                "gyro less telescope, with $\\varphi=\\theta-\\alpha$, first row: β cancels, γ does not",
                 held(C) * held(y) - held(S) * held(z),
-                -THETA[2] + ALPHA[2] + turned[0],
+                -PHI[2] + turned[0],
             ),
             RollStep(
                 "gyro less telescope, second row",
                 held(S) * held(y) + held(C) * held(z),
-                THETA[1] - ALPHA[1] + turned[1],
+                PHI[1] + turned[1],
             ),
             RollStep("mean over a roll of what γ leaves, first row", mean(turned[0]), sp.S.Zero),
             RollStep("and second row", mean(turned[1]), sp.S.Zero),

@@ -57,14 +57,14 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
     body = tuple(
         (
             _symbols(name),
-            *(number(value) for part in parts.values() for value in (part.mean, part.turning)),
+            *(pair((part.mean, part.turning)) for part in parts.values()),
             fate(parts),
         )
         for name, parts in results.items()
     )
     readings = next(iter(results.values()), {})
-    header = ("angle", *(f"{name}: {what}" for name in readings for what in ("mean", "turning")), "so it")
-    return Table(f"{len(body)} angles, errors in milliarcseconds", header, body)
+    header = ("angle", *readings, "so it")
+    return Table(f"{len(body)} angles, errors in milliarcseconds: mean; turning with the roll", header, body)
 
 
 def fate(parts: Mapping[str, Part]) -> str:
