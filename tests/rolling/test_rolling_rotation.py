@@ -171,5 +171,5 @@ def test_the_bound_of_a_method():
     beta = Fraction(1, 10**12)
     assert theory.rotation_bound("recursion", 600.0, 1000)(beta) == theory.recursion_bound(1000, beta)
     assert theory.rotation_bound("direct", 600.0, 30, 20.0)(beta) == theory.direct_bound(2 * math.pi, beta)
-    with pytest.raises(ValueError, match="got the method 'guess'; needed \"recursion\" or \"direct\""):
+    with pytest.raises(ValueError, match='got the method \'guess\'; needed "recursion" or "direct"'):
         theory.rotation_bound("guess", 600.0, 1)
