@@ -100,7 +100,7 @@ def density_of_noise() -> Finding:
     heaviest = int(np.argmax(found.density)) == 0 == int(np.argmax(year.ramp.density))
     return compare(
         bool(abs(slope.value + 1) < 3 * slope.error and heaviest),
-        f"the generated noise has a slope of ${slope.value:.2f}\\pm{slope.error:.2f}$ over {slope.decades:.1f} "
+        f"the generated noise has a slope of ${slope.value:.3f}\\pm{slope.error:.3f}$ over {slope.decades:.1f} "
         "decades; it and the signal are both heaviest at the lowest frequency",
         note="the $1/f$ law itself is assumed; no document gives its strength",
     )

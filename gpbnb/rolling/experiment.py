@@ -49,7 +49,7 @@ class Spectrum:
 
     @property
     def error(self) -> NDArray[np.float64]:
-        """Standard error of the density, relative: of a mean of so many values that are chi-square of two degrees."""
+        """Relative standard error of the density, a mean of so many values that are chi-square of two degrees."""
         return 1 / np.sqrt(self.averages)
 
 
@@ -82,7 +82,7 @@ def welch(records: NDArray[np.float64], interval: float, segment: int) -> tuple[
 
 
 HANN = 18 / 35
-r"""Independent values in a band of a Hann-windowed periodogram, a frequency: :math:`1/(1 + 2(4/9) + 2/36)`."""
+r"""Independent values in a band of a Hann-windowed periodogram, a frequency, :math:`1/(1 + 2(4/9) + 2/36)`."""
 
 
 @dataclass(frozen=True)
@@ -341,7 +341,7 @@ def drift_rates(
 
 
 SURVEY = Path(__file__).with_name("drift_rates.csv")
-"""Errors of drift rates of :data:`SURVEY_GYROS` gyros, a year each; ``python -m gpbnb.rolling`` writes it again."""
+"""Errors of drift rates of `SURVEY_GYROS` gyros, a year each; ``python -m gpbnb.rolling`` writes it again."""
 
 SURVEY_PERIODS = (None, 6000.0, 600.0, 200.0, 77.5)
 SURVEY_GYROS = 128

@@ -22,7 +22,7 @@ ACCURACY = 1e-6
 """Of the response h_k, relative, up to `LONGEST`."""
 
 LONGEST = 10**10
-"""Samples up to which the response is accurate: three thousand years at one every 10 s."""
+"""Samples up to which the response is accurate, three thousand years at one every 10 s."""
 
 
 def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

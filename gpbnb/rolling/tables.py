@@ -34,7 +34,13 @@ def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
 
 def _cells(error: float) -> tuple[str, ...]:
     across = theory.off_tuned_drift(theory.DRIFTS[0], error)
-    return f"{error:.3e}", f"{error * YEAR:.3e}", f"{theory.off_tuned_loss(error):.3e}", f"{across:.3g}"
+    size = f"{across:,.0f}" if across >= 100 else f"{across:.3g}"
+    return f"{error:.3e}", f"{error * YEAR:.3e}", f"{theory.off_tuned_loss(error):.3e}", size
+
+
+def _small(value: float) -> str:
+    # What is left of a zero by rounding differs from machine to machine.
+    return f"{value:.2g}" if value > 1e-9 else "0"
 
 
 def phase_costs(angles: Mapping[str, float], drift: tuple[float, float] = theory.DRIFTS) -> Table:
@@ -84,9 +90,9 @@ def filters(
                 name,
                 f"{drift / YEAR * theory.filter_lag(weights, interval):.3g}",
                 f"{math.sqrt(density * theory.noise_bandwidth(weights, interval)):.3g}",
-                f"{math.sqrt(theory.pedestal(weights, level, samples, period, interval)):.2g}",
+                _small(math.sqrt(theory.pedestal(weights, level, samples, period, interval))),
                 f"{math.sqrt(total):.3g}",
-                f"{abs(image).max():.2g}",
+                _small(abs(image).max()),
             )
         )
     header = ("filter", "lag", "noise in the band", "slow noise let through", "noise, exact", "image, one dimension")

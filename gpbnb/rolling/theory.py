@@ -26,16 +26,16 @@ YEAR = 365 * 86400.0
 """A year in seconds; at a sample every 10 s, of 3,153,600 samples."""
 
 DRIFTS = (6600.0, 40.0)
-"""The two drifts of general relativity, in mas a year: geodetic, and of the rotating Earth (frame dragging)."""
+"""Geodetic drift and frame dragging, in mas a year, rounded; Everitt et al. 2011."""
 
 PERIOD, PERIOD_FLOWN = 600.0, 77.5
-"""Roll periods in seconds: of hung1984, ch. III, section 4, and as flown."""
+"""Roll periods in seconds, of hung1984, ch. III, section 4, and as flown."""
 
 INTERVAL = 10.0
 """Between two samples, in seconds."""
 
 LEVEL = 200.0**2 / PERIOD_FLOWN
-"""An example of a noise level, in mas²: 200 mas/√Hz at the roll frequency that was flown. No document gives one."""
+"""An example of a noise level, in mas², which is 200 mas/√Hz at the roll frequency flown. No document gives one."""
 
 _POINTS = np.polynomial.legendre.leggauss(400)
 

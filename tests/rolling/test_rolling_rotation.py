@@ -152,3 +152,24 @@ def test_digits_needed_for_an_error(method, base):
 def test_recursions_refuse(fmt, steps, message):
     with pytest.raises(ValueError, match=message):
         experiment.recursion(fmt, 600.0, steps)
+
+
+@pytest.mark.parametrize(("digits", "period", "samples", "locked"), [(10, 600.0, 60, True), (14, 600.0, 60, False)])
+def test_where_samples_come_back_the_recursion_may_lock(digits, period, samples, locked):
+    year = experiment.YEAR_SAMPLES
+    found = experiment.recursion(FloatFormat(10, digits), period, [year - 2 * samples, year - samples, year])
+    assert (len(set(found.size)) == 1) is locked
+    assert (len(set(found.phase)) == 1) is locked
+
+
+def test_without_a_cycle_the_error_is_that_of_the_step_times_their_number():
+    found = experiment.recursion(FloatFormat(10, 10), 77.51, [1, 10**5, experiment.YEAR_SAMPLES])
+    assert found.size[1:] / found.step[1:] == pytest.approx([found.size[0]] * 2, rel=0.1)
+
+
+def test_the_bound_of_a_method():
+    beta = Fraction(1, 10**12)
+    assert theory.rotation_bound("recursion", 600.0, 1000)(beta) == theory.recursion_bound(1000, beta)
+    assert theory.rotation_bound("direct", 600.0, 30, 20.0)(beta) == theory.direct_bound(2 * math.pi, beta)
+    with pytest.raises(ValueError, match='got the method \'guess\'; needed "recursion" or "direct"'):
+        theory.rotation_bound("guess", 600.0, 1)

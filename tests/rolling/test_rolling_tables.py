@@ -23,7 +23,7 @@ def test_registers():
         for j, error in enumerate(
             (float(theory.worst_rate_error(600.0, fmt)), abs(experiment.rounded_rate_error(600.0, fmt)))
         ):
-            cells = [float(cell) for cell in body[2 * i + j][2:]]
+            cells = [float(cell.replace(",", "")) for cell in body[2 * i + j][2:]]
             across = theory.off_tuned_drift(6600.0, error)
             expected = [error, error * theory.YEAR, theory.off_tuned_loss(error), across]
             assert cells == pytest.approx(expected, rel=6e-3)
