@@ -188,6 +188,20 @@ class TestFormulas:
         weight = bounds.gamma(6, fmt.unit_roundoff)
         assert bounds.higham(factors, x) == pytest.approx(float(weight) * (sizes @ g).sum(axis=0).max(), rel=1e-2)
 
+    def test_equations_in_another_order_have_the_same_bound(self):
+        # A cycle of three rows is not its own inverse. The columns of the inverse change places, and their norm does not.
+        rows = [[1, 2, 4], [1000, 3000, 700], [10, 80, 20]]
+        fmt = FloatFormat(2, 24)
+        orders, found = [], []
+        for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
+            a = fmt.array([rows[i] for i in order])
+            factors, x = linalg.lu(a, pivot=True), linalg.inv(a, pivot=True)
+            orders.append([order[i] for i in factors.permutation])
+            found.append((bounds.higham(factors, x), bounds.wilkinson(factors, x)))
+        assert orders == [[1, 2, 0]] * 3
+        assert found[1] == pytest.approx(found[0], rel=1e-12)
+        assert found[2] == pytest.approx(found[0], rel=1e-12)
+
 
 class TestNothingProved:
     def test_ill_conditioned(self):
