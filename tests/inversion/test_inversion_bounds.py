@@ -297,6 +297,12 @@ class TestSmallestPrecision:
         assert text.inverse.to_fractions().tolist() == [[70, -30], [-20, 10]]
         assert text.fmt.precision < 16 < floats.fmt.precision
 
+    def test_the_relative_bound_is_over_the_least_norm_the_inverse_can_have(self):
+        x = FloatFormat(10, 4).array([[2, 0], [0, 1]])
+        assert bounds._relative(0.5, x) == pytest.approx(0.5 / 1.5, rel=1e-15)
+        with pytest.raises(ValueError, match="got a bound above the norm of the inverse"):
+            bounds._relative(2.0, x)
+
     def test_refused(self):
         with pytest.raises(np.linalg.LinAlgError, match="in whatever precision"):
             bounds.smallest_precision([[1, 2], [2, 4]], 1e-3)
