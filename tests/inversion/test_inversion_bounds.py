@@ -135,6 +135,13 @@ class TestHold:
         a = fmt.array([[2, 0], [0, -4]])
         assert bounds.a_posteriori(a, linalg.inv(a)) == 0
 
+    def test_preconditioned_balls_stay_narrow(self):
+        # Elimination multiplies radii with every row; from near the identity it hardly does.
+        fmt = FloatFormat(2, 24)
+        a = fmt.array(np.random.default_rng(5).integers(-99, 100, (16, 16)))
+        x = linalg.inv(a, pivot=True)
+        assert bounds.ball(a, x, preconditioned=True) < bounds.ball(a, x) / 100
+
     def test_few_bits_cost_tightness_and_never_truth(self):
         fmt = FloatFormat(2, 24)
         for a, _, x, error in inverted(fmt, (3,)):
@@ -187,6 +194,20 @@ class TestFormulas:
         g = product[[1, 0]] @ sizes
         weight = bounds.gamma(6, fmt.unit_roundoff)
         assert bounds.higham(factors, x) == pytest.approx(float(weight) * (sizes @ g).sum(axis=0).max(), rel=1e-2)
+
+    def test_equations_in_another_order_have_the_same_bound(self):
+        # A cycle of three rows is not its own inverse. The columns of X change places, and their norm does not.
+        rows = [[1, 2, 4], [1000, 3000, 700], [10, 80, 20]]
+        fmt = FloatFormat(2, 24)
+        orders, found = [], []
+        for order in ([0, 1, 2], [1, 2, 0], [2, 0, 1]):
+            a = fmt.array([rows[i] for i in order])
+            factors, x = linalg.lu(a, pivot=True), linalg.inv(a, pivot=True)
+            orders.append([order[i] for i in factors.permutation])
+            found.append((bounds.higham(factors, x), bounds.wilkinson(factors, x)))
+        assert orders == [[1, 2, 0]] * 3
+        assert found[1] == pytest.approx(found[0], rel=1e-12)
+        assert found[2] == pytest.approx(found[0], rel=1e-12)
 
 
 class TestNothingProved:
@@ -275,6 +296,12 @@ class TestSmallestPrecision:
         floats = bounds.smallest_precision([[0.1, 0.3], [0.2, 0.7]], 1e-25)
         assert text.inverse.to_fractions().tolist() == [[70, -30], [-20, 10]]
         assert text.fmt.precision < 16 < floats.fmt.precision
+
+    def test_the_relative_bound_is_over_the_least_norm_the_inverse_can_have(self):
+        x = FloatFormat(10, 4).array([[2, 0], [0, 1]])
+        assert bounds._relative(0.5, x) == pytest.approx(0.5 / 1.5, rel=1e-15)
+        with pytest.raises(ValueError, match="got a bound above the norm of the inverse"):
+            bounds._relative(2.0, x)
 
     def test_refused(self):
         with pytest.raises(np.linalg.LinAlgError, match="in whatever precision"):
