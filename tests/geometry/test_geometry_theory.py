@@ -141,3 +141,11 @@ def test_cases():
 def test_bad_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_what_stands_is_turned_by_the_phase_that_is_zero_by_default():
+    case = Case(gamma=(0, 1e-4, 2e-4))
+    assert theory.measured(case, False) == pytest.approx([1e-4, 2e-4], rel=1e-6)
+    assert theory.effect(case, False).angle == pytest.approx((1e-4, 2e-4), rel=1e-6)
+    assert theory.measured(case, False, phase=np.pi / 2) == pytest.approx([-2e-4, 1e-4], rel=1e-6)
+    assert theory.effect(case, False, np.pi / 2).angle == pytest.approx((-2e-4, 1e-4), rel=1e-6)
