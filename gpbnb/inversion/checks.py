@@ -1340,8 +1340,7 @@ def _proposed(places: int | None) -> Finding:
         f"{', '.join(f'{v:.3e}' for v in values)}, is off by {search.closest.distance - 1:.1%} "
         f"({search.closest.wordlength}; {search.closest.detail})",
         Verdict.WRONG,
-        otherwise_note="not reproduced; what the procedure printed beside it gives is in the chapter *Matrix "
-        "inversion*",
+        otherwise_note="not reproduced; what the procedure gives in each reading is in Table 1 of this chapter",
     )
 
 
