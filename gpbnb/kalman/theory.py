@@ -364,9 +364,9 @@ def contraction_step(
 def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
     r"""Bound the errors of the evaluation of one step, componentwise.
 
-    It is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`, K from
-    :math:`KS = P_pH^T` by Cholesky or :math:`LDL^T` without pivoting, P by :math:`(I-KH)P_p` or Joseph's form; sums in
-    any order, and symmetric halves may be averaged.
+    It is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`,
+    :math:`K = P_pH^TS^{-1}` by Cholesky or by elimination without exchange of rows, the inverse formed or not, P by
+    :math:`(I-KH)P_p` or Joseph's form, its two halves averaged; sums in any order.
 
     Parameters
     ----------
@@ -389,7 +389,8 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
         for j in range(m):
             pivots[i, j] = math.sqrt(sizes[i, i] * sizes[j, j])
     inverse, dinverse = _inverse_general(S)
-    dK = many * _times(PH + m * _times(aK, pivots), np.abs(inverse) + dinverse)
+    aS = np.abs(inverse) + dinverse
+    dK = many * _times(PH + m * _times(_times(PH, aS), pivots), aS)
     left = np.eye(n) + _times(aK, aH)
     dT = many * (_times(_times(left, predicted), left.T) + _times(_times(aK, np.abs(R)), aK.T))
     dT += 2 * _times(_times(dK, PH.T), left.T) + 2 * _times(left, _times(PH, dK.T))
