@@ -54,9 +54,9 @@ def correlated() -> Case:
 
     The first entry of the gain is (1.001 · 1.001 - 1.002)/S: in four digits, nothing is left of it.
     """
-    I = np.eye(2, dtype=int)
+    one = np.eye(2, dtype=int)
     P = [["1.001", "-1.002"], ["-1.002", "2"]]
-    return Case(exact(I), exact([["1.001", "1"]]), exact(I * 0), exact([[1]]), exact([0, 0]), exact(P), exact([1]))
+    return Case(exact(one), exact([["1.001", "1"]]), exact(one * 0), exact([[1]]), exact([0, 0]), exact(P), exact([1]))
 
 
 def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
