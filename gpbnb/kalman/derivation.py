@@ -6,8 +6,6 @@ all of a matrix. Where the order of factors matters, symbols do not commute.
 
 from __future__ import annotations
 
-from graphlib import CycleError, TopologicalSorter
-
 import sympy as sp
 
 from gpbnb.derivation import Derivation, Step, first_order, held, over, together
@@ -203,24 +201,6 @@ def mended() -> Derivation:
     )
 
 
-def dependencies(second: bool) -> dict[str, set[str]]:
-    """Which of (98)-(101) needs which, with the first or the second form of (99)."""
-    return {
-        "(100)": set(),
-        "(99)": {"(101)"} if second else {"(100)"},
-        "(101)": {"(99)", "(100)"},
-        "(98)": {"(99)"},
-    }
-
-
-def order(second: bool) -> tuple[str, ...] | None:
-    """In which order (98)-(101) can be computed; None if in none."""
-    try:
-        return tuple(TopologicalSorter(dependencies(second)).static_order())
-    except CycleError:
-        return None
-
-
 # -- when the printed steps are bounds --------------------------------------------------------------------------------
 
 
@@ -244,8 +224,8 @@ def scalar_conditions() -> Derivation:
                 6 * kappa - 1,
             ),
             Step(
-                "(108), first form: 4 roundings of $P_pH$ in numerator and, times $\\kappa$, denominator; 1 of $H(P_pH)$ "
-                "there; 1 each of sum, quotient and product",
+                "(108), first form: 4 roundings of $P_pH$, above and, times $\\kappa$, below the line; 1 of $H(P_pH)$; 1 "
+                "each of sum, quotient and product",
                 sp.Integer(9),
                 together(4 * (1 - kappa), kappa, 3),
                 2 + 3 * kappa,
@@ -314,7 +294,7 @@ def contraction() -> Derivation:
                 held(k - o) * h * phi,
             ),
             Step(
-                "two states, $\\Phi\\hat x + K\\hat\\nu$ and $\\Phi(\\hat x - e) + L(\\hat\\nu + H\\Phi e)$, subtracted",
+                "two states, $\\Phi\\hat x + K\\hat\\nu$ and $\\Phi(\\hat x-e) + L(\\hat\\nu + H\\Phi e)$, subtracted",
                 held(k * nu) - held(-phi * e + o * held(nu + h * phi * e)),
                 together(held(one - o * h) * phi * e, held(k - o) * nu),
             ),

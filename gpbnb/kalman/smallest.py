@@ -29,24 +29,24 @@ class Case(NamedTuple):
 
 
 class Ratios(NamedTuple):
-    """Error over bound of the first step, the worst entry; infinite for an error where the bound allows none."""
+    """Error over bound, the worst entry; infinite for an error where the bound allows none."""
 
     covariance: float
     gain: float
     state: float
 
 
-def scalar(fmt: FloatFormat, r: Fraction | None = None) -> Case:
-    """One state and one measurement, every number 1 but z = 0 and R.
+def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
+    """One state and one measurement, every number 1 but R and z, and perhaps H.
 
     Parameters
     ----------
     fmt : for the R by default, a unit of the second digit after the last: b**(-t - 1), that 1 + R does not show.
-    r : another R.
+    r, h, z : others; numbers or strings.
     """
     one = exact([[1]])
     small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else Fraction(r)
-    return Case(one, one, one * 0, exact([[small]]), exact([1]), one, exact([0]))
+    return Case(one, exact([[h]]), one * 0, exact([[small]]), exact([1]), one, exact([z]))
 
 
 def correlated() -> Case:
@@ -101,17 +101,26 @@ def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[ND
     return x[:, 0], K, P
 
 
-def ratios(fmt: FloatFormat, case: Case, second: bool = False) -> Ratios:
-    """Compare the errors of one rounded step with (105), (108) and (125) for k = 1.
+def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -> Ratios:
+    r"""Compare the errors of the last of a few rounded steps with (105), (108) and (125).
 
-    Parameters are those of :func:`rounded_step`. B is the least that (122) allows, :math:`\\|u_1\\|`.
+    Parameters
+    ----------
+    fmt, case, second : as for :func:`rounded_step`; each step brings the same measurement.
+    steps : k. The B of (125) is the least that (122) allows.
     """
-    beta = fmt.unit_roundoff
-    true = theory.exact_step(*case)
-    n, m = true.gain.shape
-    x, K, P = rounded_step(fmt, case, second)
-    B = theory.printed_input_bound([true.transition], [true.gain @ case.z])
-    bound = theory.state_bound(max_norm(true.x), B, beta, theory.coefficients(1, n, m))
+    rounded, exactly = case, case
+    transitions, inputs = [], []
+    for _ in range(steps):
+        x, K, P = rounded_step(fmt, rounded, second)
+        rounded = rounded._replace(x=x, P=P)
+        true = theory.exact_step(*exactly)
+        exactly = exactly._replace(x=true.x, P=true.P)
+        transitions.append(true.transition)
+        inputs.append(true.gain @ case.z)
+    beta, (n, m) = fmt.unit_roundoff, true.gain.shape
+    B = theory.printed_input_bound(transitions, inputs)
+    bound = theory.state_bound(max_norm(true.x), B, beta, theory.coefficients(steps, n, m))
     return Ratios(
         _worst(P - true.P, theory.printed_covariance_bound(true.P, m, beta)),
         _worst(K - true.gain, theory.printed_gain_bound(true.gain, beta)),

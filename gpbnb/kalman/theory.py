@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from graphlib import CycleError, TopologicalSorter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -133,6 +134,15 @@ def coefficients(
     return Coefficients(first, 2 * k * first - loops + inputs if free_signs else loops - inputs)
 
 
+MENDINGS: dict[str, dict[str, bool]] = {
+    "as printed": {},
+    "counted once": {"once": True},
+    "and signs free": {"once": True, "free_signs": True},
+    "and errors carried on": {"once": True, "free_signs": True, "carried": True},
+}
+"""Arguments of :func:`coefficients`, one more fault of (125) mended on each line."""
+
+
 def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fraction:
     r"""Return the least B of (122), :math:`F^i u \le B` for i = 0 … k - 1, in the norms (21) and (22).
 
@@ -184,6 +194,63 @@ def required_precision(
     while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > goal:
         precision += 1
     return precision
+
+
+# -- the closing example ----------------------------------------------------------------------------------------------
+
+EXAMPLE = (3_153_600, 10, 2)
+"""k, n and m of the closing example: a year of steps of 10 s; hung1984, ch. II, section 12."""
+
+PRINTED = {
+    "first coefficient": "2.6490e8",
+    "second coefficient": "1.2949e16",
+    "first beta": ".3775e-8",
+    "first digits": "9",
+    "second beta": ".7723e-16",
+    "second digits": "17",
+}
+"""Numbers of the closing example as hung1982 prints them; hung1984 loses a minus sign."""
+
+
+def prints_as(value: Fraction | int, printed: str) -> bool:
+    """Whether `value`, rounded to as many digits as `printed` has, is `printed`."""
+    figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("0"))
+    return FloatFormat(10, figures).round(value) == Fraction(printed)
+
+
+def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
+    """The second coefficient with its plus sign read as times, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
+
+    Parameters
+    ----------
+    k, n, m : as in :func:`coefficients`. loop : another value of 7n + 3m + 6.
+    """
+    return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
+
+
+def one_figure_slips(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
+    """Every (a, b, c) that differs from (7, 3, 6) in one figure and for which k(an + bm + c) comes out as `printed`."""
+    right = (7, 3, 6)
+    changed = [(*right[:i], figure, *right[i + 1 :]) for i in range(3) for figure in range(10) if figure != right[i]]
+    return [(a, b, c) for a, b, c in changed if prints_as(k * (a * n + b * m + c), printed)]
+
+
+def dependencies(second: bool) -> dict[str, set[str]]:
+    """Which of (98)-(101) needs which, with the first or the second form of (99)."""
+    return {
+        "(100)": set(),
+        "(99)": {"(101)"} if second else {"(100)"},
+        "(101)": {"(99)", "(100)"},
+        "(98)": {"(99)"},
+    }
+
+
+def order(second: bool) -> tuple[str, ...] | None:
+    """In which order (98)-(101) can be computed; None if in none."""
+    try:
+        return tuple(TopologicalSorter(dependencies(second)).static_order())
+    except CycleError:
+        return None
 
 
 # -- one exact step ---------------------------------------------------------------------------------------------------
