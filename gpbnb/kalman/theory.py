@@ -496,6 +496,19 @@ def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
     return (np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(rows, bound.gain)) * up
 
 
+def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
+    r"""Bound the errors of a run by those of a companion, of more digits say, that has a small bound of its own.
+
+    .. math:: |\hat x - x| \le |\hat x - \hat x_c| + |\hat x_c - x|
+
+    Parameters
+    ----------
+    difference : the run minus its companion, entry by entry, subtracted before it became float64.
+    bound : of each entry of the companion's errors, as from :func:`state_error_bound`.
+    """
+    return (np.abs(difference) + np.asarray(bound)) * (1 + 4 * _U)
+
+
 @njit(cache=True)
 def _many(n: int, m: int) -> float:
     """Bounds the relative error, by magnitudes, of what a step computes in float64."""
@@ -538,7 +551,7 @@ def _norm2(X: Any) -> float:
     if not trace < np.inf:
         return np.inf
     low, high = trace / n * 0.999, trace
-    while high > low * (1 + 1e-12) + 1e-300:
+    while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # what matters is how far it is from 1
         middle = low + (high - low) / 2
         if not low < middle < high:
             break
