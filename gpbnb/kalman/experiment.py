@@ -16,8 +16,10 @@ from typing import Any, cast
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
 from numpy.typing import NDArray
 
+from gpbnb._kernels import doubledouble
 from gpbnb._kernels.carriers import Compiled, double_doubles
 from gpbnb._kernels.matrices import (
     copy,
@@ -43,10 +45,18 @@ from gpbnb._kernels.scalar import (
     subtract,
     zero,
 )
-from gpbnb._kernels.tags import DoubleDouble, Tag
+from gpbnb._kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat
 from gpbnb.kalman.model import LinearModel, factor
+from gpbnb.kalman.theory import (
+    contraction_start,
+    contraction_step,
+    covariance_error_bound,
+    evaluation_errors,
+    gain_error_bound,
+    state_error_bound,
+)
 
 
 class Form(IntEnum):
@@ -84,7 +94,7 @@ _NAMES = {
     Form.JOSEPH: "Joseph",
     Form.UD: "UD",
 }
-_REPORT, _SECOND, _JOSEPH, _UD = (int(each) for each in (Form.REPORT, Form.SECOND, Form.JOSEPH, Form.UD))
+_REPORT, _SECOND, _USUAL, _JOSEPH, _UD = (int(each) for each in Form)
 
 # Places in the notes that a compiled run leaves: steps done, the next mark, the first step at which a variance or pivot
 # was not positive, and the step at which a division by zero ended the run.
@@ -222,89 +232,116 @@ def prepare(fmt: Any, form: int, Q: Any, R: Any, P: Any, RI: Any, UQ: Any, UR: A
     return fine
 
 
+@njit(nogil=True)
+def _workspace(x: Any, P: Any, K: Any, KT: Any, R: Any, y: Any) -> Any:
+    """Matrices for what a step computes on its way."""
+    square = np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P)
+    tall = np.empty_like(K), np.empty_like(K), np.empty_like(K)
+    small = np.empty_like(R), np.empty_like(R), np.empty_like(R)
+    stacked = np.concatenate((P, P), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
+    columns = np.empty_like(y), np.empty_like(y), np.empty_like(x), np.empty_like(x)
+    return square, tall, (np.empty_like(KT), np.empty_like(KT)), small, columns, stacked
+
+
+@njit(nogil=True)
+def _step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
+    """Take step k + 1, from x and P to x and P, with the measurement z; the gain is left in the workspace.
+
+    Returns 1 if all variances and pivots are positive, -1 if one is not, 0 if one is zero: x is then void.
+    """
+    Phi, PhiT, H, HT, Q, R, RI, UQ, UR, identity = model
+    (V, T, W, F, WT), (K, PHt, B), (KT, HD), (S, SI, pivots), (y, g, u, v), stacked = work
+    phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
+    phiT, hT = PhiT[k % Phi.shape[0]], HT[k % H.shape[0]]
+    answer = 1
+    if form == _UD:
+        if not _predict_ud(fmt, phi, UQ[k % Q.shape[0]], P, stacked[0], stacked[1], stacked[2], T):
+            answer = -1
+        product(fmt, phi, x, u)
+        copy(fmt, u, x)
+        ur = UR[k % R.shape[0]]
+        _decorrelated(fmt, ur, h, HD)
+        _decorrelated(fmt, ur, z, y)
+        for i in range(z.shape[0]):
+            found = _observe_ud(fmt, i, HD[i], load(fmt, y, (i, 0)), load(fmt, ur, (i, i)), x, P, K, u, v)
+            if found == 0:
+                return 0
+            answer = min(answer, found)
+        return answer
+    product(fmt, phi, P, T)
+    product_by_sparse(fmt, T, phiT, V)
+    total(fmt, V, Q[k % Q.shape[0]], V)
+    product_by_sparse(fmt, V, hT, PHt)
+    product(fmt, h, PHt, S)
+    total(fmt, S, r, S)
+    copy(fmt, S, pivots)
+    answer = inverse(fmt, pivots, SI)
+    if answer == 0:
+        return 0
+    product(fmt, PHt, SI, K)
+    product_by_sparse(fmt, K, h, T)
+    difference(fmt, identity, T, W)
+    if form == _JOSEPH:
+        transpose(fmt, W, WT)
+        product(fmt, W, V, T)
+        product(fmt, T, WT, F)
+        transpose(fmt, K, KT)
+        product_by_sparse(fmt, K, r, B)
+        product(fmt, B, KT, T)
+        total(fmt, F, T, P)
+    else:
+        product(fmt, W, V, P)
+    if form == _SECOND:
+        product_by_sparse(fmt, P, hT, B)
+        product(fmt, B, RI[k % R.shape[0]], K)
+        product_by_sparse(fmt, K, h, T)
+        difference(fmt, identity, T, W)
+    if form in (_REPORT, _SECOND):
+        product_by_sparse(fmt, W, phi, F)
+        product(fmt, F, x, u)
+        product(fmt, K, z, v)
+    else:
+        product(fmt, phi, x, u)
+        product(fmt, h, u, y)
+        difference(fmt, z, y, g)
+        product(fmt, K, g, v)
+    total(fmt, u, v, x)
+    for i in range(x.shape[0]):
+        if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
+            answer = -1
+    return answer
+
+
+@njit(nogil=True)
+def _note(fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, marks: Any, X: Any, G: Any, C: Any, notes: Any) -> Any:
+    """Keep what step k + 1 gave, if it is marked; returns whether the run goes on."""
+    if answer == 0:
+        notes[_STOPPED] = k + 1
+        return False
+    if answer < 0 and notes[_INDEFINITE] == 0:
+        notes[_INDEFINITE] = k + 1
+    notes[_DONE] = k + 1
+    at = notes[_MARK]
+    if at < marks.shape[0] and marks[at] == k + 1:
+        copy(fmt, x, X[at])
+        copy(fmt, K, G[at])
+        copy(fmt, P, C[at])
+        notes[_MARK] += 1
+    return True
+
+
 @njit(cache=True, nogil=True)
 def advance(
     fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, marks: Any, X: Any, G: Any, C: Any, notes: Any
 ) -> None:
     """Go on from the step `first` by as many as z has; at the marked steps, keep x, the gain and P in X, G and C."""
-    Phi, PhiT, H, HT, Q, R, RI, UQ, UR, identity = model
-    n, m = x.shape[0], z.shape[1]
-    V, T, W, F, WT = np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P)
-    PHt, K, B = np.empty_like(HT[0]), np.empty_like(HT[0]), np.empty_like(HT[0])
-    KT, HD = np.empty_like(H[0]), np.empty_like(H[0])
-    S, SI = np.empty_like(R[0]), np.empty_like(R[0])
-    y, g, u, v = np.empty_like(z[0]), np.empty_like(z[0]), np.empty_like(x), np.empty_like(x)
-    W2, D2, C2 = np.concatenate((P, P), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
+    if z.shape[0] == 0:
+        return
+    work = _workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
     for step in range(z.shape[0]):
-        k = first + step
-        phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
-        phiT, hT = PhiT[k % Phi.shape[0]], HT[k % H.shape[0]]
-        answer = 1
-        if form == _UD:
-            if not _predict_ud(fmt, phi, UQ[k % Q.shape[0]], P, W2, D2, C2, T):
-                answer = -1
-            product(fmt, phi, x, u)
-            copy(fmt, u, x)
-            ur = UR[k % R.shape[0]]
-            _decorrelated(fmt, ur, h, HD)
-            _decorrelated(fmt, ur, z[step], y)
-            for i in range(m):
-                found = _observe_ud(fmt, i, HD[i], load(fmt, y, (i, 0)), load(fmt, ur, (i, i)), x, P, K, u, v)
-                if found == 0:
-                    notes[_STOPPED] = k + 1
-                    return
-                answer = min(answer, found)
-        else:
-            product(fmt, phi, P, T)
-            product_by_sparse(fmt, T, phiT, V)
-            total(fmt, V, Q[k % Q.shape[0]], V)
-            product_by_sparse(fmt, V, hT, PHt)
-            product(fmt, h, PHt, S)
-            total(fmt, S, r, S)
-            answer = inverse(fmt, S, SI)
-            if answer == 0:
-                notes[_STOPPED] = k + 1
-                return
-            product(fmt, PHt, SI, K)
-            product_by_sparse(fmt, K, h, T)
-            difference(fmt, identity, T, W)
-            if form == _JOSEPH:
-                transpose(fmt, W, WT)
-                product(fmt, W, V, T)
-                product(fmt, T, WT, F)
-                transpose(fmt, K, KT)
-                product_by_sparse(fmt, K, r, B)
-                product(fmt, B, KT, T)
-                total(fmt, F, T, P)
-            else:
-                product(fmt, W, V, P)
-            if form == _SECOND:
-                product_by_sparse(fmt, P, hT, B)
-                product(fmt, B, RI[k % R.shape[0]], K)
-                product_by_sparse(fmt, K, h, T)
-                difference(fmt, identity, T, W)
-            if form in (_REPORT, _SECOND):
-                product_by_sparse(fmt, W, phi, F)
-                product(fmt, F, x, u)
-                product(fmt, K, z[step], v)
-                total(fmt, u, v, x)
-            else:
-                product(fmt, phi, x, u)
-                product(fmt, h, u, y)
-                difference(fmt, z[step], y, g)
-                product(fmt, K, g, v)
-                total(fmt, u, v, x)
-            for i in range(n):
-                if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
-                    answer = -1
-        if answer < 0 and notes[_INDEFINITE] == 0:
-            notes[_INDEFINITE] = k + 1
-        notes[_DONE] = k + 1
-        if notes[_MARK] < marks.shape[0] and marks[notes[_MARK]] == k + 1:
-            copy(fmt, x, X[notes[_MARK]])
-            copy(fmt, K, G[notes[_MARK]])
-            copy(fmt, P, C[notes[_MARK]])
-            notes[_MARK] += 1
+        answer = _step(fmt, form, model, first + step, z[step], x, P, work)
+        if not _note(fmt, first + step, answer, x, work[1][0], P, marks, X, G, C, notes):
+            return
 
 
 @njit(cache=True, nogil=True)
@@ -679,6 +716,257 @@ def emulate(
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)
     return compare_runs(run, true)
+
+
+# -- a run beside its contraction bound ---------------------------------------------------------------
+
+_POWERS = np.array([10.0**k for k in range(23)])  # exact
+
+
+def _widened(fmt: Any, a: Any) -> Any:
+    """A number of a format as a double-double: exact in base 2 and 16; within four roundings in base 10."""
+    raise TypeError("got a call of _widened from Python; needed one from a function compiled by numba")
+
+
+@overload(_widened, strict=False, jit_options={"forceinline": True})
+def _overloaded_widened(fmt: Any, a: Any) -> Any:
+    tag = getattr(fmt, "instance_class", None)
+
+    def of_float(fmt: Any, a: Any) -> Any:
+        return a, 0.0
+
+    def of_pair(fmt: Any, a: Any) -> Any:
+        high = np.float64(a[0])
+        x, e = (high, np.float64(a[0] - np.int64(high))), a[1]
+        while e > 0:
+            x = doubledouble.multiply(DoubleDouble(), x, (_POWERS[min(e, 22)], 0.0))
+            e -= min(e, 22)
+        while e < 0:
+            x = doubledouble.divide(DoubleDouble(), x, (_POWERS[min(-e, 22)], 0.0))
+            e += min(-e, 22)
+        return x
+
+    if tag is DoubleDouble:
+        return lambda fmt, a: a
+    return of_pair if tag is Decimal else of_float
+
+
+@njit(nogil=True)
+def _widen(fmt: Any, form: int, a: Any, c: Any, U: Any, UD: Any) -> None:
+    """c = the symmetric part, in double-double, of a covariance, or what its factors in a stand for."""
+    exactly, n = DoubleDouble(), a.shape[0]
+    half = (0.5, 0.0)
+    if form == _UD:
+        for i in range(n):
+            for j in range(n):
+                d = _widened(fmt, load(fmt, a, (j, j)))
+                u = _widened(fmt, load(fmt, a, (i, j))) if i < j else one(exactly) if i == j else zero(exactly)
+                _put(exactly, U, (j, i), u)
+                _put(exactly, UD, (i, j), multiply(exactly, u, d))
+        product(exactly, UD, U, c)
+        return
+    for i in range(n):
+        for j in range(i + 1):
+            x = add(exactly, _widened(fmt, load(fmt, a, (i, j))), _widened(fmt, load(fmt, a, (j, i))))
+            x = multiply(exactly, x, half)
+            _put(exactly, c, (i, j), x)
+            _put(exactly, c, (j, i), x)
+
+
+@njit(nogil=True)
+def _symmetrize(a: Any) -> None:
+    exactly = DoubleDouble()
+    for i in range(a.shape[0]):
+        for j in range(i):
+            x = multiply(exactly, add(exactly, load(exactly, a, (i, j)), load(exactly, a, (j, i))), (0.5, 0.0))
+            _put(exactly, a, (i, j), x)
+            _put(exactly, a, (j, i), x)
+
+
+@njit(nogil=True)
+def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U: Any) -> None:
+    """c = the gain of a step, in double-double; of UD, from those of one measurement after the other."""
+    n, m = K.shape[0], K.shape[1]
+    exactly = DoubleDouble()
+    for i in range(n):
+        for j in range(m):
+            _put(exactly, c, (i, j), _widened(fmt, load(fmt, K, (i, j))))
+    if form != _UD:
+        return
+    for i in range(m):
+        for j in range(m):
+            _put(exactly, U, (i, j), _widened(fmt, load(fmt, UR, (i, j))))
+    _decorrelated(exactly, U, H, HD)
+    for i in range(m):
+        for j in range(i):
+            s = zero(exactly)
+            for k in range(n):
+                s = add(exactly, s, multiply(exactly, load(exactly, HD, (i, k)), load(exactly, c, (k, j))))
+            for k in range(n):
+                x = multiply(exactly, _widened(fmt, load(fmt, K, (k, i))), s)
+                _put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
+    for j in range(1, m):
+        for i in range(j):
+            u = load(exactly, U, (i, j))
+            for k in range(n):
+                x = multiply(exactly, load(exactly, c, (k, i)), u)
+                _put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
+
+
+@njit(cache=True, nogil=True)
+def follow(
+    fmt: Any,
+    form: int,
+    model: Any,
+    exact_model: Any,
+    plain: Any,
+    z: Any,
+    exact_z: Any,
+    first: int,
+    x: Any,
+    P: Any,
+    bound: Any,
+    marks: Any,
+    kept: Any,
+    bounds: Any,
+    notes: Any,
+) -> Any:
+    """Go on as :func:`advance` does, and take the contraction bound along; returns it.
+
+    Each step is repeated in double-double from where the run stood: its residuals enter the bound.
+    """
+    exactly, unit = DoubleDouble(), 2.0**-100
+    (X, G, C), (states, gains, covariances) = kept, bounds
+    n, m = x.shape[0], z.shape[1]
+    work = _workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
+    xe, Pe, xn = np.empty((n, 1, 2)), np.empty((n, n, 2)), np.empty((n, n, 2))
+    exact_work = _workspace(xe, Pe, exact_model[3][0], exact_model[2][0], exact_model[5][0], exact_z[0])
+    U, UD, y, hx = np.empty((n, n, 2)), np.empty((n, n, 2)), np.empty((m, 1, 2)), np.empty((n, 1, 2))
+    K, S, innovation, used = np.empty((n, m)), np.empty((m, m)), np.empty(m), np.empty((n, m, 2))
+    q, T, size = np.empty(n), np.empty((n, n)), np.empty((n, n))
+    HD, UR = np.empty((m, n, 2)), np.empty((m, m, 2))
+    Phi, H, Q, R = plain
+    for step in range(z.shape[0]):
+        k = first + step
+        for i in range(n):
+            _put(exactly, xe, (i, 0), _widened(fmt, load(fmt, x, (i, 0))))
+        _widen(fmt, form, P, Pe, U, UD)
+        before = xe[:, 0, 0].copy()
+        for i in range(n):
+            for j in range(n):
+                size[i, j] = math.sqrt(abs(Pe[i, i, 0] * Pe[j, j, 0])) * (1 + 2.0**-50) if form == _UD else Pe[i, j, 0]
+        product(exactly, exact_model[0][k % Phi.shape[0]], xe, hx)
+        product(exactly, exact_model[2][k % H.shape[0]], hx, y)
+        difference(exactly, exact_z[step], y, y)
+        found = _step(exactly, _USUAL, exact_model, k, exact_z[step], xe, Pe, exact_work)
+        _symmetrize(Pe)
+        answer = _step(fmt, form, model, k, z[step], x, P, work)
+        at, marked = notes[_MARK], notes[_MARK] < marks.shape[0] and marks[notes[_MARK]] == k + 1
+        if not _note(fmt, k, answer, x, work[1][0], P, marks, X, G, C, notes):
+            return bound
+        _widen(fmt, form, P, xn, U, UD)
+        for i in range(n):
+            q[i] = subtract(exactly, _widened(fmt, load(fmt, x, (i, 0))), load(exactly, xe, (i, 0)))[0]
+            for j in range(n):
+                T[i, j] = subtract(exactly, load(exactly, xn, (i, j)), load(exactly, Pe, (i, j)))[0]
+            for j in range(m):
+                K[i, j] = exact_work[1][0][i, j, 0]
+        for i in range(m):
+            innovation[i] = y[i, 0, 0]
+            for j in range(m):
+                S[i, j] = exact_work[3][0][i, j, 0]
+        phi, h = Phi[k % Phi.shape[0]], H[k % H.shape[0]]
+        qk, rk = Q[k % Q.shape[0]], R[k % R.shape[0]]
+        dq, dT, dK, dinnovation = evaluation_errors(phi, h, qk, rk, before, size, exact_z[step, :, 0, 0], K, S, unit)
+        bound = contraction_step(bound, phi, h, qk, rk, K, S, innovation, q, T, dq, dT, dK, dinnovation)
+        if found == 0:
+            bound = contraction_start(np.full((n, n), np.inf), np.zeros(n), np.zeros((n, n)))
+        if marked:
+            hk, ur = exact_model[2][k % H.shape[0]], model[8][k % R.shape[0]]
+            _whole_gain(fmt, form, work[1][0], hk, ur, used, HD, UR)
+            states[at] = state_error_bound(bound)
+            covariances[at] = covariance_error_bound(bound)
+            gains[at] = gain_error_bound(bound, K, used[:, :, 0], dK)
+    return bound
+
+
+@dataclass(frozen=True, eq=False)
+class Bounded:
+    """A history, and the contraction bound of each entry of its errors, infinite where there is none.
+
+    Parameters
+    ----------
+    state, gain, covariance : (c, n), (c, n, m) and (c, n, n), in the units of the errors; of the covariance's
+        symmetric part.
+    """
+
+    history: History
+    state: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    def ratios(self) -> NDArray[np.float64]:
+        """Largest error over bound of state, gain and covariance, after each step, (c, 3); above 1 if violated."""
+        error = self.history.covariance
+        symmetric = (error + np.swapaxes(error, 1, 2)) / 2
+        pairs = ((self.history.state, self.state), (self.history.gain, self.gain), (symmetric, self.covariance))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            each = [np.where(e == 0, 0.0, np.abs(e) / b).reshape(len(e), -1).max(axis=1) for e, b in pairs]
+        return np.stack(each, axis=1)
+
+
+class Followed(Run):
+    """A run that takes the contraction bound of :mod:`gpbnb.kalman.theory` along; see :class:`Run`."""
+
+    def __init__(self, model: LinearModel, fmt: FloatFormat, form: Form, marks: Sequence[int]) -> None:
+        super().__init__(model, fmt, form, marks)
+        self.stored = model.rounded(fmt)
+        given = self.stored.to_float()
+        self._plain = given["Phi"], given["H"], given["Q"], given["R"]
+        self._exact = Run(self.stored, None, Form.USUAL, ())._parts
+        n, m, count = model.n, model.m, len(self.marks)
+        self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
+        zero_n, size = np.zeros(n), np.zeros((n, n))
+        if self.form is Form.UD:  # the first factors may be off
+            size = np.abs((self._covariance() - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
+        self.bound = contraction_start(given["P0"], zero_n, size)
+
+    def _covariance(self) -> NDArray[Any]:
+        U = self.exactly(self.P)
+        triangle = np.triu(U, 1) + np.array(
+            [[Fraction(int(i == j)) for j in range(len(U))] for i in range(len(U))], dtype=object
+        )
+        return np.asarray((triangle * U.diagonal()) @ triangle.T)
+
+    def take(self, z: Any) -> None:
+        """Go on by as many steps as there are measurements, (steps, m)."""
+        if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
+        if self.stopped or not len(z):
+            return
+        packed = self._packed(z)
+        values = double_doubles(self.exactly(packed))
+        packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
+        kept = (self.marks, (self.X, self.G, self.C), self.bounds, self.notes)
+        told = (self.tag, int(self.form), self._parts, self._exact, self._plain)
+        try:
+            self.bound = follow(*told, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *kept)
+        except (OverflowError, ZeroDivisionError):
+            self.notes[_STOPPED] = self.steps + 1
+
+
+def bounded(
+    model: LinearModel, z: Any, fmt: FloatFormat, form: Form = Form.REPORT, marks: Sequence[int] | None = None
+) -> Bounded:
+    """Run the filter rounded, in double-double, and with its contraction bound; arguments as of :func:`emulate`."""
+    measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
+    chosen = log_spaced(len(measured)) if marks is None else tuple(marks)
+    run = Followed(model, fmt, form, chosen)
+    run.take(measured)
+    history = compare_runs(run, reference(run.stored, measured.to_fractions(), chosen))
+    c = len(history.steps)
+    state, gain, covariance = run.bounds
+    return Bounded(history, state[:c], gain[:c], covariance[:c])
 
 
 # -- Gravity Probe B ----------------------------------------------------------------------------------

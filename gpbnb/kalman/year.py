@@ -82,16 +82,22 @@ class Case(NamedTuple):
 def _cases() -> tuple[Case, ...]:
     usual, flown, still = MODELS
     nearest, chop = Rounding
-    cases = [Case(usual, 2, t, nearest, Form.REPORT) for t in (24, 53, 14, 18, 20, 22, 26, 28, 32, 40, 16)]
-    cases += [Case(usual, 2, t, chop, Form.REPORT) for t in (14, 18, 22, 24, 28, 32, 53)]
-    cases += [Case(usual, 10, t, nearest, Form.REPORT) for t in (8, 6, 10, 4)]
-    cases += [Case(usual, 2, t, nearest, form) for t in (20, 24, 14, 53) for form in tuple(Form)[2:]]
-    cases += [Case(model, 2, t, nearest, Form.REPORT) for model in (flown, still) for t in (24, 18, 32)]
-    cases += [Case(usual, 2, 24, chop, form) for form in tuple(Form)[2:]]
-    cases += [Case(usual, 10, t, chop, Form.REPORT) for t in (8, 6)]
-    cases += [Case(usual, 2, t, nearest, Form.SECOND) for t in (24, 18)]
-    cases += [Case(usual, 10, 8, nearest, form) for form in tuple(Form)[2:]]
-    cases += [Case(usual, 10, 16, nearest, Form.REPORT)]
+    others = (Form.USUAL, Form.JOSEPH, Form.UD)
+    cases = [Case(usual, 2, t, nearest, Form.REPORT) for t in (24, 18, 32, 14, 20, 53)]
+    cases += [Case(usual, 2, t, chop, Form.REPORT) for t in (24, 18, 32)]
+    cases += [Case(usual, 2, 24, nearest, form) for form in others]
+    cases += [Case(usual, 10, 8, nearest, Form.REPORT), Case(usual, 10, 6, nearest, Form.REPORT)]
+    cases += [Case(flown, 2, 24, nearest, Form.REPORT), Case(still, 2, 24, nearest, Form.REPORT)]
+    cases += [Case(usual, 2, t, nearest, Form.REPORT) for t in (22, 28)]
+    cases += [Case(usual, 2, 18, nearest, form) for form in others]
+    cases += [Case(usual, 2, 24, nearest, Form.SECOND), Case(usual, 10, 8, chop, Form.REPORT)]
+    cases += [Case(usual, 10, 8, nearest, Form.UD), Case(usual, 10, 10, nearest, Form.REPORT)]
+    cases += [Case(usual, 2, 24, chop, form) for form in others]
+    cases += [Case(usual, 10, 8, nearest, form) for form in others[:2]]
+    cases += [Case(usual, 10, 4, nearest, Form.REPORT), Case(usual, 10, 16, nearest, Form.REPORT)]
+    cases += [Case(usual, 2, t, nearest, Form.REPORT) for t in (16, 26, 40)]
+    cases += [Case(usual, 2, t, chop, Form.REPORT) for t in (14, 20, 28, 53)]
+    cases += [Case(usual, 2, 53, nearest, form) for form in others]
     return tuple(cases)
 
 
@@ -182,7 +188,7 @@ def _told(name: str, base: int) -> tuple[Any, ...]:
 def _code(file: Path) -> bytes:
     """The compiled part of a file, so that other changes do not make a year begin again."""
     text = file.read_text(encoding="utf-8")
-    return text.partition("# -- measurements ---")[0].encode()
+    return text.partition("# -- compiled ---")[2].partition("# -- measurements ---")[0].encode() or text.encode()
 
 
 def travel(
