@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from gpbnb.bounds import column_sum_norm, exact, max_norm
 from gpbnb.findings import Check, Checks, Finding, Verdict, answer, compare, unverifiable
-from gpbnb.formats import FloatFormat
-from gpbnb.kalman import derivation, smallest, theory
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import derivation, experiment, smallest, theory, year
 from gpbnb.kalman.tables import scientific
 
 CHECKS = Checks()
@@ -735,3 +735,64 @@ def remark_1() -> Finding:
 @CHECKS.add("hung1984.II.s13.several-approaches")
 def several_approaches() -> Finding:
     return unverifiable("", "the other approaches are not in the documents")
+
+
+@cache
+def year_again() -> bool:
+    """Whether ten steps of a stored year, emulated again, come out as stored."""
+    stored = year.load()[0]
+    case = stored.case
+    if case.fmt is None:
+        raise ValueError(f"got {case.name} first in year.csv; needed a run in a format")
+    steps = tuple(int(step) for step in stored.steps if step <= 10)
+    z = year.simulation(case.model).measurements(max(steps))
+    found = experiment.emulate(year.model(case.model, case.base), z, case.fmt, case.form, steps)
+    again = np.array([[float(f"{number:.6g}") for number in line] for line in found.state[:, 2:4]])
+    return bool(np.array_equal(again, stored.rate[: len(steps)]))
+
+
+@cache
+def needed_precision(base: int) -> int | None:
+    """Fewest digits, of those stored, from which on the drift rates stay within the goal for a year."""
+    needed = None
+    for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
+        usual = found.case._replace(precision=0) == year.Case(
+            year.MODELS[0], base, 0, Rounding.NEAREST, experiment.Form.REPORT
+        )
+        if usual:
+            if found.steps[-1] != theory.EXAMPLE[0] or np.abs(found.rate[-1]).max() > GOAL:
+                break
+            needed = found.case.precision
+    return needed
+
+
+@CHECKS.add(*both("s13.remark-2"))
+def remark_2() -> Finding:
+    again, decimal, binary = year_again(), needed_precision(10), needed_precision(2)
+    asked = theory.required_precision(theory.coefficients(*theory.EXAMPLE).second, Fraction(GOAL, SIGNAL))
+    return answer(
+        again and decimal is not None and binary is not None,
+        f"a filter of our own with {theory.EXAMPLE[1]} states and {theory.EXAMPLE[2]} measurements, run for a year: "
+        f"{decimal} decimal digits or {binary} bits keep the drift rates within {GOAL} mas a year, of those tried; "
+        f"the second term of (125) asks for {asked} digits",
+        note=f"{CHAPTER}; the reports print no matrices, noise and time constants are our choice",
+    )
+
+
+def left_open(note: str) -> Finding:
+    return Finding("", None, Verdict.OPEN, note)
+
+
+@CHECKS.add("hung1982.III.s13.remark-3")
+def remark_3() -> Finding:
+    return left_open("which computations the data reduction has besides is not in the documents; the book treats some")
+
+
+@CHECKS.add("hung1982.III.s13.remark-4")
+def remark_4() -> Finding:
+    return left_open("the method of integration that was chosen is not in the documents")
+
+
+@CHECKS.add("hung1982.III.s13.remark-5")
+def remark_5() -> Finding:
+    return left_open("the compensation data are not in the documents")

@@ -90,7 +90,8 @@ def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, floa
     if kind not in KINDS:
         raise ValueError(f"got kind {kind!r}; needed one of {', '.join(KINDS)}")
     n, m = int(rng.integers(1, 5)), int(rng.integers(1, 3))
-    Phi, H = rng.standard_normal((n, n)), rng.standard_normal((m, n))
+    Phi: Any = rng.standard_normal((n, n))
+    H: Any = rng.standard_normal((m, n))
     if kind == "one sign":
         Phi, H = np.abs(Phi), np.abs(H)
     radius = float(np.abs(np.linalg.eigvals(Phi)).max())

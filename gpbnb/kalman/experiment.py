@@ -916,11 +916,14 @@ class Bounded:
 
 
 class Followed(Run):
-    """A run that takes the contraction bound of :mod:`gpbnb.kalman.theory` along; see :class:`Run`."""
+    """A run that takes the contraction bound of :mod:`gpbnb.kalman.theory` along; see :class:`Run`.
 
-    def __init__(self, model: LinearModel, fmt: FloatFormat, form: Form, marks: Sequence[int]) -> None:
+    Of the reference itself, in double-double, the bound says how far it may be from what is exact.
+    """
+
+    def __init__(self, model: LinearModel, fmt: FloatFormat | None, form: Form, marks: Sequence[int]) -> None:
         super().__init__(model, fmt, form, marks)
-        self.stored = model.rounded(fmt)
+        self.stored = model if fmt is None else model.rounded(fmt)
         given = self.stored.to_float()
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
         self._exact = Run(self.stored, None, Form.USUAL, ())._parts

@@ -32,6 +32,7 @@ from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman.experiment import (
     BLOCK,
     TRUTH,
+    Followed,
     Form,
     History,
     Kept,
@@ -42,6 +43,7 @@ from gpbnb.kalman.experiment import (
     log_spaced,
 )
 from gpbnb.kalman.model import YEAR, LinearModel, gravity_probe_b
+from gpbnb.kalman.theory import Contraction
 
 #: In which format the model is stored, by base: a part of every other format of the base in :data:`CASES`.
 STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
@@ -104,6 +106,9 @@ def _cases() -> tuple[Case, ...]:
 #: All runs, the most telling first.
 CASES = _cases()
 
+#: Runs with the contraction bound at their side: the reference, and 24 bits.
+FOLLOWED = (CASES[0].reference, CASES[0])
+
 
 @cache
 def model(name: str, base: int) -> LinearModel:
@@ -127,21 +132,28 @@ def marks(steps: int = YEAR) -> tuple[int, ...]:
 
 
 class Journey:
-    """A run of a case, kept in a file."""
+    """A run of a case, kept in a file; with the contraction bound at its side, if it is to be `followed`."""
 
-    def __init__(self, case: Case, directory: Path, steps: int) -> None:
+    def __init__(self, case: Case, directory: Path, steps: int, followed: bool = False) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0
-        self.run = Run(model(case.model, case.base), case.fmt, case.form, marks(steps))
+        self.run = (Followed if followed else Run)(model(case.model, case.base), case.fmt, case.form, marks(steps))
         self.truth: NDArray[np.float64] = np.array(TRUTH)
-        self.file = directory / f"{case.name}.npz"
-        self._kept = ("x", "P", "X", "G", "C", "notes")
+        self.file = directory / f"{case.name}{'-followed' if followed else ''}.npz"
         self.told = fingerprint(case, steps)
         if self.file.exists():
             with np.load(self.file) as saved:
                 if str(saved["told"]) == self.told:
-                    for name in self._kept:
-                        getattr(self.run, name)[...] = saved[name]
+                    for name, array in self._kept().items():
+                        array[...] = saved[name]
+                    if isinstance(self.run, Followed):
+                        self.run.bound = Contraction(*(saved[f"bound_{name}"][()] for name in Contraction._fields))
                     self.truth, self.seconds = saved["truth"], float(saved["seconds"])
+
+    def _kept(self) -> dict[str, NDArray[Any]]:
+        arrays = {name: getattr(self.run, name) for name in ("x", "P", "X", "G", "C", "notes")}
+        if isinstance(self.run, Followed):
+            arrays |= dict(zip(("states", "gains", "covariances"), self.run.bounds, strict=True))
+        return arrays
 
     @property
     def finished(self) -> bool:
@@ -164,8 +176,11 @@ class Journey:
     def save(self) -> None:
         """Write all of it, or nothing."""
         draft = self.file.with_suffix(".draft.npz")
-        arrays = {name: getattr(self.run, name) for name in self._kept}
-        np.savez(draft, truth=self.truth, seconds=self.seconds, told=self.told, **arrays)
+        arrays = self._kept()
+        if isinstance(self.run, Followed):
+            arrays |= {f"bound_{name}": np.asarray(each) for name, each in self.run.bound._asdict().items()}
+        arrays |= {"truth": self.truth, "seconds": np.array(self.seconds), "told": np.array(self.told)}
+        np.savez(draft, allow_pickle=False, **arrays)
         os.replace(draft, self.file)
 
 
@@ -192,30 +207,37 @@ def _code(file: Path) -> bytes:
 
 
 def travel(
-    cases: Sequence[Case], directory: Path, steps: int = YEAR, progress: bool = True, each: int = _SAVED_EACH
+    cases: Sequence[Case],
+    directory: Path,
+    steps: int = YEAR,
+    progress: bool = True,
+    each: int = _SAVED_EACH,
+    followed: Sequence[Case] = (),
 ) -> None:
     """Run the cases and their references, one after another, each from where it was saved.
 
     Parameters
     ----------
     directory : where runs are saved, each 64 blocks of 4096 steps.
+    followed : cases to run with the contraction bound at their side.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    todo = list(dict.fromkeys(part for case in cases for part in (case.reference, case)))
+    todo = [(part, False) for part in dict.fromkeys(part for case in cases for part in (case.reference, case))]
+    todo += [(case, True) for case in followed]
     with tqdm(total=len(todo) * steps, desc="year", unit="step", unit_scale=True, disable=not progress) as bar:
-        for case in todo:
+        for case, bounded in todo:
             bar.set_postfix_str(case.name)
-            if _is_finished(case, directory, steps):
+            if _is_finished(case, directory, steps, bounded):
                 bar.update(steps)
                 continue
-            journey = Journey(case, directory, steps)
+            journey = Journey(case, directory, steps, bounded)
             bar.update(journey.run.steps)
             while not journey.finished:
                 journey.go_on(each, bar)
 
 
-def _is_finished(case: Case, directory: Path, steps: int) -> bool:
-    file = directory / f"{case.name}.npz"
+def _is_finished(case: Case, directory: Path, steps: int, followed: bool) -> bool:
+    file = directory / f"{case.name}{'-followed' if followed else ''}.npz"
     if not file.exists():
         return False
     with np.load(file) as saved:
@@ -375,7 +397,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=_HERE, help="where year.csv and year.json go")
     given = parser.parse_args(arguments)
     try:
-        travel(CASES[: given.cases], given.directory, given.steps)
+        travel(CASES[: given.cases], given.directory, given.steps, followed=FOLLOWED)
     except KeyboardInterrupt:
         print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
         return 130

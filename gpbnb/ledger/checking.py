@@ -10,7 +10,7 @@ from typing import NamedTuple
 from gpbnb.findings import Check, Checks, Finding, Verdict
 from gpbnb.ledger.inventory import Entry, load_inventory, select
 
-TOPICS = ("gpbnb.rounding.checks",)
+TOPICS = ("gpbnb.rounding.checks", "gpbnb.kalman.checks")
 """The modules that hold checks, each as ``CHECKS``; imported when checks are run."""
 
 MISSING = "missing"
