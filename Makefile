@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test test-pages notebooks lint format exactness bench environment screenshots serve clean
+.PHONY: help book test test-pages notebooks lint format exactness bench environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -91,6 +91,11 @@ environment: .venv/made-for ## compile both environment.txt from pyproject.toml;
 screenshots: .venv/made-for ## pictures of every page: light, dark, phone
 	@test -f $(HTML)/index.html || $(MAKE) book
 	$(PY) -m tests.pages.screenshots
+
+pdf: .venv/made-for ## the whole book as one PDF, printed by Chromium
+	@rm -rf _build/singlehtml _build/.doctrees
+	.venv/bin/jupyter-book build . -W -n --keep-going --builder custom --custom-builder singlehtml
+	$(PY) -m tests.pages.pdf
 
 serve: .venv/made-for ## serve the built book on loopback, port 8000
 	@test -f $(HTML)/index.html || $(MAKE) book

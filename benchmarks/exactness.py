@@ -5,7 +5,7 @@ rounding of ties away from zero, but it follows from two of its roundings: chopp
 the exact result lies at or beyond the midpoint, then away from zero.
 
 Half of the operands are random. The others are hard: ties, near-ties, cancellation, far exponents, powers of the base,
-carries to a new digit.
+carries to a new digit. The whole comparison, a share of 1, leaves its counts in ``benchmarks/results``.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import gmpy2
@@ -27,12 +28,14 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gpbnb._kernels import carriers
+from gpbnb.tables import Table
 
 PRECISIONS = {2: range(1, 54), 10: range(1, 19), 16: range(1, 14)}
 OPERATIONS = ("add", "subtract", "multiply", "divide", "sqrt", "round")
 PER_BASE_AND_ROUNDING = {2: 10_000_000, 10: 10_000_000, 16: 1_000_000}
 BATCH = 25_000
 SHOWN = 20  # mismatches
+RESULTS = Path(__file__).parent / "results"
 
 Integers = NDArray[Any]
 
@@ -380,22 +383,30 @@ def main() -> int:
     for job, compared, mismatches in outcomes:
         counts[job.base, job.nearest, job.operation] += compared
         wrong[job.base, job.nearest, job.operation] += len(mismatches)
-    print(
+    about = (
         f"Python {platform.python_version()}, numpy {np.__version__}, numba {numba.__version__}, "
         f"decimal {decimal.__version__} (libmpdec {getattr(decimal, '__libmpdec_version__', 'unknown')}), "
         f"gmpy2 {gmpy2.version()} ({gmpy2.mpfr_version()})"
     )
-    print(f"{'base':>4} {'rounding':<8}" + "".join(f"{name:>12}" for name in (*OPERATIONS, "all", "different")))
+    header = ("base", "rounding", *OPERATIONS, "all", "different")
+    body = []
     for base in PRECISIONS:
         for nearest in (True, False):
             row = [counts[base, nearest, name] for name in OPERATIONS]
             different = sum(wrong[base, nearest, name] for name in OPERATIONS)
             rounding = "nearest" if nearest else "chop"
-            print(f"{base:>4} {rounding:<8}" + "".join(f"{n:>12,}" for n in (*row, sum(row), different)))
+            body.append((str(base), rounding, *(f"{n:,}" for n in (*row, sum(row), different))))
+    print(about)
+    for cells in (header, *body):
+        print(f"{cells[0]:>4} {cells[1]:<8}" + "".join(f"{cell:>12}" for cell in cells[2:]))
     for text in [text for outcome in outcomes for text in outcome.mismatches][:SHOWN]:
         print(text)
     total, different = sum(counts.values()), sum(wrong.values())
     print(f"{total:,} operations compared, {different or 'none'} different")
+    if options.share == 1:
+        RESULTS.mkdir(exist_ok=True)
+        table = Table("operations compared", header, tuple(body)).markdown()
+        (RESULTS / "exactness.md").write_text(f"{table}\n\nCompared with: {about}.\n", encoding="utf-8")
     return 1 if different else 0
 
 

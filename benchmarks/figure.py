@@ -9,32 +9,47 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 
 from benchmarks.timing import Row
+from gpbnb.plotting import BOUND, OBSERVED, STRICT, figure, label, legend
 
 
 def draw(table: Sequence[Row], path: Path) -> None:
-    """One bar a library, one group a task, on a logarithmic axis; the line is gpbnb."""
-    tasks = list(dict.fromkeys(row.task for row in table))
-    shown = [row for row in table if row.library != "gpbnb"]
-    with mpl.rc_context({"svg.hashsalt": "gpbnb", "svg.fonttype": "none"}):
-        figure, ax = plt.subplots(figsize=(7.0, 0.32 * len(shown) + 0.45 * len(tasks) + 0.8), layout="constrained")
-        place, ticks, labels = 0.0, [], []
-        for task in tasks:
-            ax.text(
-                0.0, place, f" {task}", transform=ax.get_yaxis_transform(), fontweight="bold", fontsize=9, va="center"
-            )
-            place += 0.9
-            for row in (row for row in shown if row.task == task):
-                ax.barh(place, row.ratio, left=0, height=0.7, color="C0" if row.ratio >= 1 else "C1")
-                ax.text(row.ratio * 1.08, place, f"{row.ratio:.3g}×", va="center", fontsize=8)
-                ticks.append(place)
-                labels.append(row.library)
-                place += 0.8
-            place += 0.2
-        ax.axvline(1.0, color="black", linewidth=1)
+    """One line a library, one group a task, on a logarithmic axis; what is to be reached is drawn as a bar."""
+    places: list[float] = []
+    names: list[str] = []
+    tasks: list[tuple[float, str]] = []
+    place = 0.0
+    peers = [row for row in table if row.library != "gpbnb"]
+    for row, before in zip(peers, [None, *peers], strict=False):
+        if before is None or row.task != before.task:
+            place += 1.4
+            tasks.append((place - 0.85, row.task))
+        places.append(place)
+        names.append(row.library)
+        place += 0.85
+    ratios = [row.ratio for row in peers]
+    reaches = [(row.least, place) for row, place in zip(peers, places, strict=True) if row.least is not None]
+    with mpl.rc_context({"svg.hashsalt": "gpbnb"}):
+        fig, (ax,) = figure(height=0.27 * place + 0.9)
+        ax.plot(ratios, places, "o", color=OBSERVED, label="measured")
+        ax.plot(*zip(*reaches, strict=True), "|", color=BOUND, ms=12, mew=1.6, label="to be reached")
+        ax.axvline(1.0, color=STRICT, lw=1, label="gpbnb")
+        for ratio, place in zip(ratios, places, strict=True):
+            ax.annotate(amount(ratio), (ratio, place), (8, 0), textcoords="offset points", va="center", fontsize=8.5)
+        for place, task in tasks:
+            note = ax.annotate(task, (0, place), (6, 0), ax.get_yaxis_transform(), "offset points", va="center")
+            note.set(weight="bold", backgroundcolor="white")
         ax.set_xscale("log")
-        ax.set_xlim(min(0.3, min(row.ratio for row in shown) / 2), max(row.ratio for row in shown) * 3)
-        ax.set_yticks(ticks, labels)
-        ax.invert_yaxis()
-        ax.set_xlabel("time / time of gpbnb")
-        figure.savefig(path, metadata={"Date": None})
-        plt.close(figure)
+        ax.set_xlim(min(0.3, min(ratios) / 2), max(ratios) * 3)
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.set_ylim(places[-1] + 0.8, 0)
+        ax.set_yticks(places, names)
+        ax.grid(axis="y", visible=False)
+        legend(ax, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        label(ax, "time / time of gpbnb (no unit)", "")
+        fig.savefig(path, metadata={"Date": None})
+        plt.close(fig)
+
+
+def amount(ratio: float) -> str:
+    """Three digits, without a power of ten."""
+    return f"{ratio:,.0f}×" if ratio >= 100 else f"{ratio:.3g}×"

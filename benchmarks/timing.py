@@ -20,8 +20,12 @@ class Row(NamedTuple):
     library: str
     seconds: float
     ratio: float  # to the time of gpbnb
-    reach: str  # what gpbnb is to reach beside it
-    reached: str  # "yes", "no" or nothing
+    least: float | None  # the ratio to be reached, if one is
+
+    @property
+    def reached(self) -> str:
+        """``yes``, ``no`` or nothing."""
+        return "" if self.least is None else "yes" if self.ratio >= self.least else "no"
 
 
 def medians(works: dict[str, Callable[[], object]], turns: int, once: frozenset[str] = frozenset()) -> dict[str, float]:
@@ -42,12 +46,7 @@ def medians(works: dict[str, Callable[[], object]], turns: int, once: frozenset[
 
 def rows(task: str, times: dict[str, float], own: str, faster: dict[str, float]) -> list[Row]:
     """A row for each library; `faster`: the least ratio to reach, below 1 for an allowed slowdown."""
-    table = []
-    for name, seconds in times.items():
-        ratio, least = seconds / times[own], faster.get(name)
-        reach = "" if least is None else f"≥ {least:g}×"
-        table.append(Row(task, name, seconds, ratio, reach, "" if least is None else "yes" if ratio >= least else "no"))
-    return table
+    return [Row(task, name, seconds, seconds / times[own], faster.get(name)) for name, seconds in times.items()]
 
 
 def machine() -> dict[str, str]:

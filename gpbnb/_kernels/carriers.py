@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb._kernels.exact import kernel
-from gpbnb._kernels.tags import Binary, Decimal, Hexadecimal, Tag
+from gpbnb._kernels.tags import LARGEST_SHORT, Binary, Decimal, Hexadecimal, ShortDecimal, Tag
 
 Array = NDArray[Any]
 Parts = tuple[Array, ...]
@@ -208,7 +208,7 @@ class Pairs(Compiled):
 
     def __init__(self, base: int, precision: int, nearest: bool) -> None:
         super().__init__(base, precision, nearest)
-        self.tag = Decimal(precision, nearest)
+        self.tag = (ShortDecimal if precision <= LARGEST_SHORT else Decimal)(precision, nearest)
         self.exact = Exact(base, precision, nearest)
 
     def from_exact(self, m: Array, e: Array) -> Parts | None:

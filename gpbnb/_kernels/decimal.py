@@ -1,7 +1,8 @@
 """Base 10 with 1 to 18 digits, on pairs of int64.
 
 A number is ``(m, e)`` and means ``m * 10**e``; zero is ``(0, 0)``, any other has ``10**(t-1) <= abs(m) < 10**t``.
-Magnitudes are uint64, in which 10**19 fits; only the product and the dividend of 10 to 18 digits need 128 bits.
+Magnitudes are uint64, in which 10**19 fits; only products, and dividends of 10 to 18 digits, need 128 bits. Up to 8
+digits :mod:`gpbnb._kernels.shortdecimal` does the same faster.
 """
 
 from __future__ import annotations
@@ -14,22 +15,23 @@ from numba import njit
 
 from gpbnb._kernels.bits import high_product, leading_zeros
 
-NARROW = 9  # digits up to which the product of two significands fits into 64 bits with bits to spare
+NARROW = 9  # digits up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
 
-_U0, _U1, _U2 = np.uint64(0), np.uint64(1), np.uint64(2)
+_U0, _U1 = np.uint64(0), np.uint64(1)
 _U5, _U10, _U50, _U100 = np.uint64(5), np.uint64(10), np.uint64(50), np.uint64(100)
 _LOW = np.uint64(2**32 - 1)
 _TWO_64 = 2.0**64
 
-_POWER = np.array([10**k for k in range(20)], np.uint64)
+POWER = np.array([10**k for k in range(20)], np.uint64)
+HALF = POWER // np.uint64(2)
 
-# n // 10**k for n < 2**60 is the high half of 2n * _INVERSE[k], shifted right by _LENGTH[k]: with
-# l = floor(log2 d) and c = ceil(2**(63 + l) / d), c * d exceeds 2**(63 + l) by less than 2**(l + 1), and
-# that times n is less than 2**(63 + l).
+# n // d for n < 2**61 and d = 10**k, k > 0, is the high half of n * INVERSE[k], shifted right by LENGTH[k]: with
+# l = floor(log2 d) and c = ceil(2**(63 + l) / d), c * d exceeds 2**(63 + l) by less than d < 2**(l + 1), and that times
+# n is less than 2**(63 + l); INVERSE[k] = 2c is less than 2**64.
 _LENGTHS = [(10**k).bit_length() - 1 for k in range(19)]
-_LENGTH = np.array(_LENGTHS, np.int64)
-_INVERSE = np.array([-((-1 << (63 + n)) // 10**k) for k, n in enumerate(_LENGTHS)], np.uint64)
+LENGTH = np.array(_LENGTHS, np.uint64)
+INVERSE = np.array([0] + [-2 * ((-1 << (63 + n)) // 10**k) for k, n in enumerate(_LENGTHS) if k > 0], np.uint64)
 
 # Divisors with their first bit set, and their reciprocals, for quotients of 128 by 64 bits.
 _SHIFT = np.array([63 - n for n in _LENGTHS], np.int64)
@@ -40,13 +42,13 @@ _RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in 
 @njit(forceinline=True)
 def _power(k: Any) -> Any:
     """10**k; an unsigned index spares the question whether it counts from the end."""
-    return _POWER[np.uint64(k)]
+    return POWER[np.uint64(k)]
 
 
 @njit(forceinline=True)
 def _quotient(n: Any, k: Any) -> Any:
-    """``n // 10**k`` for n < 2**60."""
-    return high_product(n << _U1, _INVERSE[np.uint64(k)]) >> _LENGTH[np.uint64(k)]
+    """``n // 10**k`` for n < 2**61, k > 0."""
+    return high_product(n, INVERSE[np.uint64(k)]) >> LENGTH[np.uint64(k)]
 
 
 @njit(forceinline=True)
@@ -107,15 +109,21 @@ def _digits(n: Any) -> Any:
 
 
 @njit(forceinline=True)
+def check(e: Any) -> None:
+    """OverflowError for an exponent that the next operations could not compute with."""
+    if e > LARGEST_EXPONENT or e < -LARGEST_EXPONENT:
+        raise OverflowError(
+            "got a result with an exponent beyond 2**60; needed one that int64 holds; scale the numbers"
+        )
+
+
+@njit(forceinline=True)
 def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
     """The pair of a magnitude of t digits, or one that rounding carried to t + 1."""
     carried = m == _power(fmt.precision)
     m = _power(fmt.precision - 1) if carried else m
     e += np.int64(carried)
-    if e > LARGEST_EXPONENT or e < -LARGEST_EXPONENT:
-        raise OverflowError(
-            "got a result with an exponent beyond 2**60; needed one that int64 holds; scale the numbers"
-        )
+    check(e)
     return (-np.int64(m) if negative else np.int64(m)), e
 
 
@@ -202,21 +210,14 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
         return np.int64(0), np.int64(0)
     t = fmt.precision
     k = t - 1
-    if t <= NARROW:
-        n = np.uint64(abs(m1 * m2))
-        k += np.int64(n >= _power(t + k))
-        m = _quotient(n, k)
-        rest = n - m * _power(k)
-        up = rest + rest >= _power(k)
-    else:
-        x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
-        m, rest = _wide_by_power(high_product(x, y), x * y, k)
-        up = rest + rest >= _power(k)
-        if m >= _power(t):
-            n = m
-            m = n // _U10
-            up = n - m * _U10 >= _U5
-            k = t
+    x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
+    m, rest = _wide_by_power(high_product(x, y), x * y, k)
+    up = rest + rest >= _power(k)
+    if m >= _power(t):
+        n = m
+        m = n // _U10
+        up = n - m * _U10 >= _U5
+        k = t
     m += np.uint64(up & fmt.nearest)
     return _number(fmt, m, e1 + e2 + k, (m1 < 0) != (m2 < 0))
 

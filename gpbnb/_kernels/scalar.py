@@ -27,11 +27,13 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload
 
-from gpbnb._kernels import binary, decimal, doubledouble
-from gpbnb._kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal
+from gpbnb._kernels import binary, decimal, doubledouble, shortdecimal
+from gpbnb._kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal, ShortDecimal
 
 _INLINE = {"forceinline": True}
 _OF_FLOATS = (Binary, Hexadecimal, Double)
+_OF_PAIRS = (Decimal, ShortDecimal)
+_MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, DoubleDouble: doubledouble}
 
 _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
@@ -133,6 +135,11 @@ def lost(fmt: Any, x: Any) -> Any:
     raise _only_compiled("lost")
 
 
+def _multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """fl(c + fl(a * b)); a product that the carrier could not hold is told by the sum, if it matters there."""
+    raise _only_compiled("_multiply_add")
+
+
 # -- plain float64 -----------------------------------------------------------------------------------
 
 
@@ -180,7 +187,7 @@ def _implementation(fmt: Any, name: str) -> Any:
     tag = _tag(fmt)
     if tag in binary.OPERATIONS:
         return binary.OPERATIONS[tag][name]
-    return {Decimal: vars(decimal), DoubleDouble: vars(doubledouble), Double: _DOUBLE}.get(tag, {}).get(name)
+    return _DOUBLE[name] if tag is Double else getattr(_MODULES.get(tag), name, None)
 
 
 def _overload_two(stub: Callable[..., Any]) -> None:
@@ -214,7 +221,7 @@ _overload_one(round_, "x")
 
 @overload(negative, strict=False, jit_options=_INLINE)
 def _negative(fmt: Any, a: Any) -> Any:
-    if _tag(fmt) is Decimal:
+    if _tag(fmt) in _OF_PAIRS:
         return lambda fmt, a: (-a[0], a[1])
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, a: (0.0 - a[0], 0.0 - a[1])
@@ -225,7 +232,7 @@ def _negative(fmt: Any, a: Any) -> Any:
 
 @overload(absolute, strict=False, jit_options=_INLINE)
 def _absolute(fmt: Any, a: Any) -> Any:
-    if _tag(fmt) is Decimal:
+    if _tag(fmt) in _OF_PAIRS:
         return lambda fmt, a: (abs(a[0]), a[1])
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, a: a if a[0] >= 0.0 else (-a[0], -a[1])
@@ -253,7 +260,7 @@ def _less(fmt: Any, a: Any, b: Any) -> Any:
 
 @overload(integer, strict=False, jit_options=_INLINE)
 def _integer(fmt: Any, n: Any) -> Any:
-    if _tag(fmt) is Decimal:
+    if _tag(fmt) in _OF_PAIRS:
         return lambda fmt, n: round_(fmt, (np.int64(n), np.int64(0)))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, n: (np.float64(n), 0.0)
@@ -262,7 +269,7 @@ def _integer(fmt: Any, n: Any) -> Any:
 
 @overload(zero, strict=False, jit_options=_INLINE)
 def _zero(fmt: Any) -> Any:
-    if _tag(fmt) is Decimal:
+    if _tag(fmt) in _OF_PAIRS:
         return lambda fmt: (np.int64(0), np.int64(0))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt: (0.0, 0.0)
@@ -272,6 +279,13 @@ def _zero(fmt: Any) -> Any:
 @overload(one, strict=False, jit_options=_INLINE)
 def _one(fmt: Any) -> Any:
     return lambda fmt: integer(fmt, 1)
+
+
+@overload(_multiply_add, strict=False, jit_options=_INLINE)
+def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    if _tag(fmt) is ShortDecimal:
+        return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
+    return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
 
 
 # -- arrays ------------------------------------------------------------------------------------------
@@ -315,7 +329,7 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
 
 @overload(lost, strict=False, jit_options=_INLINE)
 def _lost(fmt: Any, x: Any) -> Any:
-    if _tag(fmt) is Decimal:
+    if _tag(fmt) in _OF_PAIRS:
         return lambda fmt, x: False
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, x: x[0] != x[0]
@@ -345,7 +359,7 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
         return zero(fmt)
     s = multiply(fmt, load(fmt, x, 0), load(fmt, y, 0))
     for k in range(1, n):
-        s = add(fmt, s, multiply(fmt, load(fmt, x, k), load(fmt, y, k)))
+        s = _multiply_add(fmt, load(fmt, x, k), load(fmt, y, k), s)
     return s
 
 
@@ -367,7 +381,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
         for k in range(1, a.shape[1]):
             factor = load(fmt, a, (i, k))
             for j in range(b.shape[1]):
-                _put(fmt, c, (i, j), add(fmt, load(fmt, c, (i, j)), multiply(fmt, factor, load(fmt, b, (k, j)))))
+                _put(fmt, c, (i, j), _multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
     check(fmt, c)
 
 

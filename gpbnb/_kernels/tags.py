@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+LARGEST_SHORT = 8  # precision of ShortDecimal
+
 
 class Binary(NamedTuple):
     """Base 2, precision 1 to 53; a number is a float64, an array float64 (...)."""
@@ -29,6 +31,13 @@ class Decimal(NamedTuple):
     nearest: bool
 
 
+class ShortDecimal(NamedTuple):
+    """Base 10, precision 1 to 8; the same numbers as those of ``Decimal``, computed faster."""
+
+    precision: int
+    nearest: bool
+
+
 class Double(NamedTuple):
     """Plain float64, as the machine rounds it; an array is float64 (...)."""
 
@@ -37,4 +46,4 @@ class DoubleDouble(NamedTuple):
     """The reference: ``(high, low)`` of float64, relative error of one operation below 2**-102; float64 (..., 2)."""
 
 
-Tag = Binary | Hexadecimal | Decimal | Double | DoubleDouble
+Tag = Binary | Hexadecimal | Decimal | ShortDecimal | Double | DoubleDouble
