@@ -45,7 +45,7 @@ from gpbnb._kernels.scalar import (
     subtract,
     zero,
 )
-from gpbnb._kernels.tags import Decimal, DoubleDouble, Tag
+from gpbnb._kernels.tags import Decimal, DoubleDouble, ShortDecimal, Tag
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat
 from gpbnb.kalman.model import LinearModel, factor
@@ -623,12 +623,12 @@ class History:
     @property
     def gain_norm(self) -> NDArray[np.float64]:
         """Largest column sum of the error of the gain over that of the gain, (c,); the norm (22)."""
-        return _relative(self.gain, self.reference.K)
+        return relative(self.gain, self.reference.K)
 
     @property
     def covariance_norm(self) -> NDArray[np.float64]:
         """Largest column sum of the error of the covariance over that of the covariance, (c,); the norm (22)."""
-        return _relative(self.covariance, self.reference.P)
+        return relative(self.covariance, self.reference.P)
 
     @property
     def least_eigenvalue(self) -> NDArray[np.float64]:
@@ -640,7 +640,8 @@ class History:
         return np.asarray(np.linalg.eigvalsh((scaled + np.swapaxes(scaled, 1, 2)) / 2)[:, 0], dtype=np.float64)
 
 
-def _relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float64]:
+def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float64]:
+    """Norms (22), largest column sums, of errors over those of what is true, (c,)."""
     size = np.abs(true[: len(error)].astype(np.float64)).sum(axis=1).max(axis=1)
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
@@ -748,7 +749,7 @@ def _overloaded_widened(fmt: Any, a: Any) -> Any:
 
     if tag is DoubleDouble:
         return lambda fmt, a: a
-    return of_pair if tag is Decimal else of_float
+    return of_pair if tag in (Decimal, ShortDecimal) else of_float
 
 
 @njit(nogil=True)

@@ -1,7 +1,7 @@
 """A year of Gravity Probe B, 3,153,600 steps, in many formats and forms: ``python -m gpbnb.kalman.year``.
 
-The command goes on where it was interrupted. What it found is kept beside this file, in ``year.csv``, and how, in
-``year.json``; :func:`load` reads it.
+The command goes on where it was interrupted. What it found is kept beside this file, in ``year.csv`` and ``bounds.csv``,
+and how, in ``year.json``; :func:`load` and :func:`bounds` read it.
 
 In one base all formats hold the same numbers: the model is stored once, in 14 bits or 4 decimal digits, and what is
 measured are whole milliarcseconds. So one reference serves them all, and errors are those of the arithmetic alone.
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ from gpbnb.kalman.experiment import (
     compare_runs,
     gravity_probe_b_year,
     log_spaced,
+    relative,
 )
 from gpbnb.kalman.model import YEAR, LinearModel, gravity_probe_b
 from gpbnb.kalman.theory import Contraction
@@ -54,6 +55,7 @@ MODELS = ("roll 600 s", "roll 77.5 s", "no process noise")
 _HERE = Path(__file__).parent
 _COLUMNS = ("drift_2", "drift_3", "rate_2", "rate_3", "state", "gain", "covariance", "least_eigenvalue")
 _SAVED_EACH = 64  # blocks
+_TRIED = 200  # steps by which a change of the code is told
 
 
 class Case(NamedTuple):
@@ -106,8 +108,10 @@ def _cases() -> tuple[Case, ...]:
 #: All runs, the most telling first.
 CASES = _cases()
 
-#: Runs with the contraction bound at their side: the reference, and 24 bits.
-FOLLOWED = (CASES[0].reference, CASES[0])
+#: Runs with the contraction bound at their side: the references, on which the bounds of all others rest, and 53 bits.
+FOLLOWED = frozenset(
+    (*(case.reference for case in CASES), Case(MODELS[0], 2, 53, Rounding.NEAREST, Form.REPORT))
+)
 
 
 @cache
@@ -132,13 +136,13 @@ def marks(steps: int = YEAR) -> tuple[int, ...]:
 
 
 class Journey:
-    """A run of a case, kept in a file; with the contraction bound at its side, if it is to be `followed`."""
+    """A run of a case, kept in a file; with the contraction bound at its side, if it is among :data:`FOLLOWED`."""
 
-    def __init__(self, case: Case, directory: Path, steps: int, followed: bool = False) -> None:
+    def __init__(self, case: Case, directory: Path, steps: int) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0
-        self.run = (Followed if followed else Run)(model(case.model, case.base), case.fmt, case.form, marks(steps))
+        self.run = _run(case, steps)
         self.truth: NDArray[np.float64] = np.array(TRUTH)
-        self.file = directory / f"{case.name}{'-followed' if followed else ''}.npz"
+        self.file = directory / f"{case.name}.npz"
         self.told = fingerprint(case, steps)
         if self.file.exists():
             with np.load(self.file) as saved:
@@ -184,26 +188,26 @@ class Journey:
         os.replace(draft, self.file)
 
 
-def fingerprint(case: Case, steps: int) -> str:
-    """A digest of all that a run is told: model, case, steps, and the code of its recursion."""
-    return hashlib.sha256(repr((case.name, steps, marks(steps), *_told(case.model, case.base))).encode()).hexdigest()
+def _run(case: Case, steps: int) -> Run:
+    kind = Followed if case in FOLLOWED else Run
+    return kind(model(case.model, case.base), case.fmt, case.form, marks(steps))
 
 
 @cache
-def _told(name: str, base: int) -> tuple[Any, ...]:
-    told, digest = model(name, base), hashlib.sha256()
+def fingerprint(case: Case, steps: int) -> str:
+    """A digest of all that a run is told, and of what it makes of the first measurements, to the last digit.
+
+    Code that computes otherwise makes runs begin again; code that is only written otherwise does not.
+    """
+    told, run = model(case.model, case.base), _run(case, steps)
+    digest = hashlib.sha256(repr((case.name, steps, marks(steps), TRUTH, BLOCK, case in FOLLOWED)).encode())
     for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
         digest.update(" ".join(map(str, getattr(told, letter).flat)).encode())
-    kernels = ("binary", "bits", "decimal", "doubledouble", "matrices", "scalar")
-    for file in (_HERE / "experiment.py", *(_HERE.parent / "_kernels" / f"{name}.py" for name in kernels)):
-        digest.update(_code(file))
-    return TRUTH, BLOCK, digest.hexdigest()
-
-
-def _code(file: Path) -> bytes:
-    """The compiled part of a file, so that other changes do not make a year begin again."""
-    text = file.read_text(encoding="utf-8")
-    return text.partition("# -- compiled ---")[2].partition("# -- measurements ---")[0].encode() or text.encode()
+    run.take(simulation(case.model).measurements(_TRIED))
+    bound = run.bound if isinstance(run, Followed) else ()
+    for each in (run.x, run.P, run.notes, *bound):
+        digest.update(np.ascontiguousarray(each).tobytes())
+    return digest.hexdigest()
 
 
 def travel(
@@ -212,32 +216,29 @@ def travel(
     steps: int = YEAR,
     progress: bool = True,
     each: int = _SAVED_EACH,
-    followed: Sequence[Case] = (),
 ) -> None:
     """Run the cases and their references, one after another, each from where it was saved.
 
     Parameters
     ----------
     directory : where runs are saved, each 64 blocks of 4096 steps.
-    followed : cases to run with the contraction bound at their side.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    todo = [(part, False) for part in dict.fromkeys(part for case in cases for part in (case.reference, case))]
-    todo += [(case, True) for case in followed]
+    todo = list(dict.fromkeys(part for case in cases for part in (case.reference, case)))
     with tqdm(total=len(todo) * steps, desc="year", unit="step", unit_scale=True, disable=not progress) as bar:
-        for case, bounded in todo:
+        for case in todo:
             bar.set_postfix_str(case.name)
-            if _is_finished(case, directory, steps, bounded):
+            if _is_finished(case, directory, steps):
                 bar.update(steps)
                 continue
-            journey = Journey(case, directory, steps, bounded)
+            journey = Journey(case, directory, steps)
             bar.update(journey.run.steps)
             while not journey.finished:
                 journey.go_on(each, bar)
 
 
-def _is_finished(case: Case, directory: Path, steps: int, followed: bool) -> bool:
-    file = directory / f"{case.name}{'-followed' if followed else ''}.npz"
+def _is_finished(case: Case, directory: Path, steps: int) -> bool:
+    file = directory / f"{case.name}.npz"
     if not file.exists():
         return False
     with np.load(file) as saved:
@@ -251,8 +252,13 @@ def history(case: Case, directory: Path, steps: int = YEAR) -> History:
 
 
 @cache
+def _followed(case: Case, directory: Path, steps: int) -> Followed:
+    return cast(Followed, Journey(case, directory, steps).run)
+
+
+@cache
 def _true(case: Case, directory: Path, steps: int) -> Kept:
-    return Journey(case, directory, steps).run.kept()
+    return _followed(case, directory, steps).kept()
 
 
 # -- what was found -----------------------------------------------------------------------------------
@@ -288,19 +294,51 @@ def rows(case: Case, found: History) -> list[tuple[str, ...]]:
     numbers = np.column_stack(
         [found.state[:, :4], found.state_norm, found.gain_norm, found.covariance_norm, found.least_eigenvalue]
     )
-    first = (case.model, str(case.base), str(case.precision), case.rounding.value, case.form.name.lower())
     return [
-        (*first, str(step), *(f"{number:.6g}" for number in line))
+        (*_name(case), str(step), *(f"{number:.6g}" for number in line))
         for step, line in zip(found.steps.tolist(), numbers.tolist(), strict=True)
     ]
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """The contraction bound beside a run; as the errors of :class:`Year`, in the same units and norms.
+
+    The errors of a run that has none of its own are at most those against its reference, and the reference's bound:
+    :func:`gpbnb.kalman.theory.companion_bound`.
+    """
+
+    case: Case
+    steps: NDArray[np.int64]
+    drift: NDArray[np.float64]
+    rate: NDArray[np.float64]
+    state: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+
+def bound_rows(case: Case, run: Followed, true: Kept) -> list[tuple[str, ...]]:
+    """Lines of ``bounds.csv``: six significant digits, rounded upwards."""
+    states, gains, covariances = (each[: len(true.steps)] for each in run.bounds)
+    norms = [relative(gains, true.K), relative(covariances, true.P)]
+    numbers = np.column_stack([states[:, :4], states.max(axis=1), *norms])
+    return [
+        (*_name(case), str(step), *(f"{number * (1 + 1e-5):.6g}" for number in line))
+        for step, line in zip(true.steps, numbers.tolist(), strict=True)
+    ]
+
+
+def _name(case: Case) -> tuple[str, ...]:
+    return case.model, str(case.base), str(case.precision), case.rounding.value, case.form.name.lower()
 
 
 HEADER = ("model", "base", "precision", "rounding", "form", "step", *_COLUMNS)
 
 
 def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = _HERE) -> None:
-    """Collect the finished runs in ``year.csv`` and ``year.json``."""
+    """Collect the finished runs in ``year.csv``, ``bounds.csv`` and ``year.json``."""
     lines: list[tuple[str, ...]] = []
+    bounded: list[tuple[str, ...]] = []
     about: dict[str, Any] = {}
     references: dict[str, Any] = {}
     for case in cases:
@@ -315,12 +353,15 @@ def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = 
             "seconds": round(journey.seconds, 1),
             "told": journey.told,
         }
+        true = _true(case.reference, directory, steps)
         if case.reference.name not in references:
             references[case.reference.name] = _of_reference(case.reference, directory, steps)
-    with (to / "year.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER)
-        writer.writerows(lines)
+            bounded += bound_rows(case.reference, _followed(case.reference, directory, steps), true)
+        if case in FOLLOWED:
+            bounded += bound_rows(case, cast(Followed, journey.run), true)
+    for name, header, body in (("year", HEADER, lines), ("bounds", HEADER[:-1], bounded)):
+        with (to / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([header, *body])
     made = {
         "command": "python -m gpbnb.kalman.year",
         "steps": steps,
@@ -349,20 +390,9 @@ def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
 @cache
 def load(directory: Path = _HERE) -> tuple[Year, ...]:
     """The years that the package brings, in the order of :data:`CASES`."""
-    with (directory / "year.csv").open(encoding="utf-8", newline="") as file:
-        header, *lines = list(csv.reader(file))
-    if tuple(header) != HEADER:
-        raise ValueError(
-            f"got year.csv with the columns {header}; needed {list(HEADER)}; make it anew with this version"
-        )
     about = provenance(directory)["cases"]
-    groups: dict[Case, list[list[str]]] = {}
-    for line in lines:
-        case = Case(line[0], int(line[1]), int(line[2]), Rounding(line[3]), Form[line[4].upper()])
-        groups.setdefault(case, []).append(line[5:])
     result = []
-    for case, group in groups.items():
-        numbers = np.array(group, dtype=np.float64)
+    for case, numbers in _read(directory / "year.csv", HEADER).items():
         result.append(
             Year(
                 case,
@@ -381,6 +411,31 @@ def load(directory: Path = _HERE) -> tuple[Year, ...]:
     return tuple(result)
 
 
+@cache
+def bounds(directory: Path = _HERE) -> dict[Case, Bounds]:
+    """The contraction bounds of :data:`FOLLOWED` that the package brings."""
+    return {
+        case: Bounds(
+            case, numbers[:, 0].astype(np.int64), numbers[:, 1:3], numbers[:, 3:5], *(numbers[:, i] for i in (5, 6, 7))
+        )
+        for case, numbers in _read(directory / "bounds.csv", HEADER[:-1]).items()
+    }
+
+
+def _read(file: Path, columns: tuple[str, ...]) -> dict[Case, NDArray[np.float64]]:
+    with file.open(encoding="utf-8", newline="") as lines:
+        header, *body = list(csv.reader(lines))
+    if tuple(header) != columns:
+        raise ValueError(
+            f"got {file.name} with the columns {header}; needed {list(columns)}; make it anew with this version"
+        )
+    groups: dict[Case, list[list[str]]] = {}
+    for line in body:
+        case = Case(line[0], int(line[1]), int(line[2]), Rounding(line[3]), Form[line[4].upper()])
+        groups.setdefault(case, []).append(line[5:])
+    return {case: np.array(group, dtype=np.float64) for case, group in groups.items()}
+
+
 def provenance(directory: Path = _HERE) -> dict[str, Any]:
     """How the years were made."""
     found: dict[str, Any] = json.loads((directory / "year.json").read_text(encoding="utf-8"))
@@ -397,7 +452,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=_HERE, help="where year.csv and year.json go")
     given = parser.parse_args(arguments)
     try:
-        travel(CASES[: given.cases], given.directory, given.steps, followed=FOLLOWED)
+        travel(CASES[: given.cases], given.directory, given.steps)
     except KeyboardInterrupt:
         print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
         return 130
