@@ -217,7 +217,11 @@ def scalar_conditions() -> Derivation:
     may = over((n + 1) + (n + m + 1) * kappa, 1 - kappa)
     return Derivation(
         (
-            Step("allowed equals possible where $\\kappa$ is", may.subs(kappa, sp.Rational(1, 6)), sp.Integer(allowed)),
+            Step(
+                "where $\\kappa=\\frac16$, possible and allowed are equal",
+                may.subs(kappa, sp.Rational(1, 6)),
+                sp.Integer(allowed),
+            ),
             Step(
                 "and not beyond: possible minus allowed, times $1-\\kappa$",
                 sp.expand((may.doit() - allowed) * (1 - kappa)).simplify(),
@@ -280,13 +284,13 @@ def contraction() -> Derivation:
             Step("and $HB-TL'$ where $H(B-BH'L')-RL'$ is", h * b - held(h * b * ht + r) * lt, zero_l),
             Step(
                 "two updates, subtracted; the last two terms are zero",
-                held(after_a) - held(after_b),
+                after_a - after_b,  # sympy sets a held difference without its brackets
                 together(held(one - k * h) * held(a - b) * held(one - ht * lt), zero_k * lt, -k * zero_l),
             ),
             Step(
                 "two gains, subtracted; the last two terms are zero",
                 held(one - o * h) * held(a - b) * ht,
-                together(held(k - o) * held(s), held(a * ht - k * s), -held((b - o * h * b) * ht - o * r)),
+                together(held(k - o) * held(s), held(a * ht - k * s), held(o * r - (b - o * h * b) * ht)),
             ),
             Step(
                 "two closed loops, subtracted: $F_k - A_k = (K-L)H\\Phi = F_kE_{k-1}G_k$",
@@ -295,7 +299,7 @@ def contraction() -> Derivation:
             ),
             Step(
                 "two states, $\\Phi\\hat x + K\\hat\\nu$ and $\\Phi(\\hat x-e) + L(\\hat\\nu + H\\Phi e)$, subtracted",
-                held(k * nu) - held(-phi * e + o * held(nu + h * phi * e)),
+                together(k * nu, phi * e, -o * held(nu + h * phi * e)),
                 together(held(one - o * h) * phi * e, held(k - o) * nu),
             ),
         )

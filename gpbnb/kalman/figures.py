@@ -67,6 +67,21 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = No
     return artists
 
 
+def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Axes) -> list[Artist]:
+    """Bounds against the step: name, steps and values of each; the last one is black, the others are printed ones."""
+    artists: list[Artist] = []
+    for number, (name, steps, values) in enumerate(curves):
+        last = number == len(curves) - 1
+        style = "-" if last else ("-", "--", "-.")[number % 3]
+        artists += ax.plot(steps, values, color=STRICT if last else BOUND, ls=style, label=name)
+    return artists
+
+
+def level(name: str, value: float, ax: Axes) -> Artist:
+    """A bound that is the same at each step."""
+    return ax.axhline(value, color=BOUND, label=name)
+
+
 def _name(run: Year) -> str:
     fmt = run.case.fmt
     if fmt is None:

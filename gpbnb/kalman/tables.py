@@ -6,8 +6,14 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-from gpbnb.formats import FloatFormat
-from gpbnb.kalman import smallest, theory
+import numpy as np
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import smallest, theory, year
+from gpbnb.kalman.ensembles import Summary
+from gpbnb.kalman.model import STATES, LinearModel
+from gpbnb.kalman.precision import Requirement
+from gpbnb.kalman.printed import Terms
 from gpbnb.tables import Table, digits
 
 DOUBLE = FloatFormat(2, 53)
@@ -100,8 +106,7 @@ def violations(fmts: Sequence[FloatFormat]) -> Table:
     for fmt in fmts:
         for name, second in (("first", False), ("second", True)):
             found = smallest.ratios(fmt, smallest.scalar(fmt), second)
-            chopped = ", chopped" if fmt.rounding.value == "chop" else ""
-            body.append((f"{digits(fmt)}{chopped}", name, *(f"{ratio:.3g}" for ratio in found)))
+            body.append((arithmetic(fmt), name, *(short(ratio, 3) for ratio in found)))
     return Table(
         f"{len(body)} runs of the smallest filter",
         ("arithmetic", "form of (99)", "error / (105)", "error / (108)", "error / (125)"),
@@ -118,10 +123,131 @@ def order() -> Table:
     return Table("the order of (98)-(101)", ("form of (99)", "order"), tuple(body))
 
 
+def mildest(fmts: Sequence[FloatFormat]) -> Table:
+    """How large R may be, beside a variance of 1, for the scalar filter still to break each bound."""
+    body = []
+    for fmt in fmts:
+        for name, second in (("first", False), ("second", True)):
+            found = smallest.mildest(fmt, second)
+            cells = (f"{float(found[each]):.3g}" if each in found else "none" for each in smallest.Ratios._fields)
+            body.append((arithmetic(fmt), name, *cells))
+    header = ("arithmetic", "form of (99)", "$R$ for (105)", "$R$ for (108)", "$R$ for (125)")
+    return Table(f"the largest noise that breaks a bound, {len(body)} ways", header, tuple(body))
+
+
+def arithmetic(fmt: FloatFormat) -> str:
+    """Digits and rounding of a format."""
+    return digits(fmt) + (", chopped" if fmt.rounding is Rounding.CHOP else "")
+
+
+def states(model: LinearModel) -> Table:
+    """What :func:`gpbnb.kalman.model.gravity_probe_b` takes for its states: what is kept, known and added."""
+    given = model.to_float()
+    body = tuple(
+        (name, unit, f"{given['Phi'][0, i, i]:g}", _root(given["P0"][i, i]), _root(given["Q"][0, i, i]))
+        for i, (name, unit) in enumerate(STATES)
+    )
+    header = ("state", "unit", "kept in a step", "first standard deviation", "wander in a step")
+    return Table(f"{len(body)} states", header, body)
+
+
+def _root(variance: float) -> str:
+    return short(math.sqrt(variance), 3)
+
+
+def year_ends(runs: Sequence[year.Year]) -> Table:
+    """Errors at the last step of each run, and where it lost a positive variance; the model, if there are several."""
+    several = len({run.case.model for run in runs}) > 1
+    body = []
+    for run in runs:
+        if run.case.fmt is None:
+            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+        found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
+        cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
+        lost = f"step {run.indefinite}" if run.indefinite else "never"
+        body.append((*([run.case.model] if several else []), *cells, short(float(run.least_eigenvalue[-1])), lost))
+    header = (
+        *(["model"] if several else []),
+        "arithmetic",
+        "form",
+        "drift (mas)",
+        "rate (mas/yr)",
+        "gain, relative",
+        "covariance, relative",
+        "least eigenvalue",
+        "variance lost",
+    )
+    return Table(f"{len(body)} years", header, tuple(body))
+
+
+def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms) -> Table:
+    """Bound over error of the drift rate at the end of a year: (125) at its kindest, and the companion bound.
+
+    Parameters
+    ----------
+    runs, bounds : rounded runs, and of each the bound of its reference.
+    terms : of the model; the same for all.
+    """
+    body = []
+    for run, reference in zip(runs, bounds, strict=True):
+        fmt, k = run.case.fmt, int(run.steps[-1])
+        if fmt is None or reference.steps[-1] != k:
+            raise ValueError(f"got {run.case.name} with a bound to step {reference.steps[-1]}; needed one to step {k}")
+        at = int(np.abs(run.rate[-1]).argmax())
+        error = abs(float(run.rate[-1, at]))
+        companion = float(theory.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
+        cells = [terms.kindest(fmt, k, **faults) / error for faults in theory.MENDINGS.values()]
+        body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.4f}"))
+    header = ("arithmetic", "rate, error (mas/yr)", *(f"(125), {name}" for name in theory.MENDINGS), "companion bound")
+    return Table(f"bound over error, {len(body)} years", header, tuple(body))
+
+
+def trials(found: Sequence[Summary]) -> Table:
+    """Random filters: how many violate each bound, and the largest error over it, a line a kind and one for all."""
+    body = []
+    kinds = list(dict.fromkeys(each.kind for each in found))
+    for name, group in [(kind, [each for each in found if each.kind == kind]) for kind in kinds] + [
+        ("all", list(found))
+    ]:
+        count = sum(each.trials for each in group)
+        cells = []
+        for bound in ("105", "108", "125"):
+            violated = sum(getattr(each, f"violations_{bound}") for each in group)
+            largest = max(getattr(each, f"worst_{bound}") for each in group)
+            cells.append(f"{100 * violated / count:.1f} %, {short(largest)}")
+        largest = max(max(each.state, each.gain, each.covariance) for each in group)
+        violated = sum(each.contraction_violations for each in group)
+        body.append((name, str(count), *cells, f"{violated}, {largest:.3f}"))
+    header = ("models", "runs", "violate (105), worst", "(108)", "(125)", "contraction bound")
+    return Table(f"{sum(each.trials for each in found)} random filters", header, tuple(body))
+
+
+def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
+    """What :func:`gpbnb.kalman.precision.required_precision` answered."""
+    body = []
+    for name, answer in answers:
+        ratio = f"{dict(answer.tried)[answer.fmt.precision]:.2g}" if answer.fmt else ""
+        smallest_format = arithmetic(answer.fmt) if answer.fmt else "none"
+        body.append((name, answer.basis, str(answer.steps), smallest_format, ratio))
+    header = ("filter", "rests on", "steps", "smallest precision", "error or bound / goal")
+    return Table(f"{len(body)} answers", header, tuple(body))
+
+
 def scientific(value: Fraction | int, figures: int) -> str:
     r"""A number as ``$2.5860\\times10^{8}$``."""
     mantissa, _, power = f"{float(value):.{figures - 1}e}".partition("e")
     return f"${mantissa}\\times10^{{{int(power)}}}$" if int(power) else f"${mantissa}$"
+
+
+def short(value: float, figures: int = 2) -> str:
+    """A number in a cell: plain, or with a power of ten where it is large or small."""
+    rounded = float(f"{value:.{figures - 1}e}")
+    if rounded == 0 or not math.isfinite(value):
+        return f"{rounded:g}"
+    if 1e-4 <= abs(rounded) < 1e6:
+        return np.format_float_positional(rounded, trim="-")
+    mantissa, _, power = f"{rounded:.{figures - 1}e}".partition("e")
+    return f"${mantissa}\\times10^{{{int(power)}}}$"
 
 
 def _typeset(printed: str) -> str:

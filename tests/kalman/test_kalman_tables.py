@@ -61,7 +61,7 @@ def test_what_one_grants():
 def test_violations():
     rows = cells(tables.violations([FloatFormat(10, 4), FloatFormat(10, 4, Rounding.CHOP)]))
     assert rows[0] == ["4 decimal digits", "first", "333", "0.00222", "125"]
-    assert rows[1] == ["4 decimal digits", "second", "333", "222", "1.25e+07"]
+    assert rows[1] == ["4 decimal digits", "second", "333", "222", r"$1.25\times10^{7}$"]
     assert rows[2][0] == "4 decimal digits, chopped"
 
 
