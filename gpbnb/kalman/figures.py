@@ -96,16 +96,16 @@ def year_end(
     ax: Axes,
     goal: float,
     counts: Sequence[tuple[str, theory.Coefficients]],
-    printed: Sequence[int],
+    answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
-    """Error of drift or rate at the end of a year against the digits, beside (125) and the printed answers.
+    """Error of drift or rate at the end of a year against the digits, beside (125) and the answers to how many.
 
     Parameters
     ----------
     goal : in mas and mas/yr.
     counts : name and coefficients of bounds like (125), which are drawn for a norm of the state and a B of 1, as in the
         report's example.
-    printed : numbers of digits that were printed, open markers on the goal.
+    answers : name and numbers of digits, open markers on the goal; the last is drawn upright, through it.
     """
     artists: list[Artist] = []
     looks = [(form, rounding) for rounding in Rounding for form in Form]
@@ -116,14 +116,16 @@ def year_end(
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
             name = f"{form}, {rounding.value}"
             artists += ax.plot(*zip(*sorted(points), strict=True), _MARKERS[form], color=colour, label=name, alpha=0.7)
-    t = np.linspace(3.5, 19, 50)
+    t = np.linspace(3.5, 23, 50)
     beta = 0.5 * 10.0 ** (1 - t)
     for (name, each), style in zip(counts, ("-", "--", "-."), strict=False):
         artists += ax.plot(t, beta * (each.first + each.second), color=BOUND, ls=style, label=name)
     artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
-    artists += ax.plot(
-        list(printed), [goal] * len(printed), "o", mfc="none", mec=BOUND, ms=9, ls="none", label="printed answers"
-    )
+    for (name, places), marker in zip(answers[:-1], "os^", strict=False):
+        colour = BOUND if marker == "o" else STRICT
+        artists += ax.plot(list(places), [goal] * len(places), marker, mfc="none", mec=colour, ms=9, label=name)
+    for name, places in answers[-1:]:
+        artists += ax.plot(list(places), [goal] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name)
     ax.set_yscale("log")
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "error after a year (mas, mas/yr)")

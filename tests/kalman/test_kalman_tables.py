@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.kalman import tables, theory
+from gpbnb.kalman import ensembles, printed, smallest, tables, theory, year
+from gpbnb.kalman.experiment import Form
+from gpbnb.kalman.model import gravity_probe_b
+from gpbnb.kalman.precision import Requirement
 
 
 def cells(table):
@@ -78,3 +82,119 @@ def test_the_order():
 )
 def test_numbers(value, figures, text):
     assert tables.scientific(value, figures) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "figures", "text"),
+    [
+        (0.0, 2, "0"),
+        (131.2, 2, "130"),
+        (0.00021, 2, "0.00021"),
+        (-0.831, 2, "-0.83"),
+        (999999.0, 2, r"$1.0\times10^{6}$"),
+        (12500000.0, 3, r"$1.25\times10^{7}$"),
+        (-1.13e-8, 2, r"$-1.1\times10^{-8}$"),
+        (float("inf"), 2, "inf"),
+    ],
+)
+def test_short_numbers(value, figures, text):
+    assert tables.short(value, figures) == text
+
+
+def test_the_mildest_noise():
+    fmt = FloatFormat(2, 5)
+    rows = cells(tables.mildest([fmt]))
+    first, second = (smallest.mildest(fmt, form) for form in (False, True))
+    assert [row[:2] for row in rows] == [["5 bits", "first"], ["5 bits", "second"]]
+    assert rows[0][2] == f"{float(first['covariance']):.3g}"
+    assert rows[0][3] == "none"
+    assert rows[1][2:] == [f"{float(second[name]):.3g}" for name in ("covariance", "gain", "state")]
+
+
+def test_the_states():
+    rows = cells(tables.states(gravity_probe_b()))
+    assert rows[2] == ["drift rate 2", "mas/yr", "1", "10000", "0.0001"]
+    assert rows[4] == ["pointing α2", "mas", "0.9", "20", "8.72"]
+    assert len(rows) == 10
+
+
+USUAL = year.MODELS[0]
+
+
+def run(**changes):
+    values = {
+        "case": year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT),
+        "steps": np.array([1, 3]),
+        "drift": np.array([[9.0, 9.0], [-2.0, 1.0]]),
+        "rate": np.array([[9.0, 9.0], [0.25, -0.5]]),
+        "state": np.array([9.0, 2.0]),
+        "gain": np.array([9.0, 0.125]),
+        "covariance": np.array([9.0, 1e-6]),
+        "least_eigenvalue": np.array([9.0, -0.5]),
+        "indefinite": None,
+        "stopped": None,
+        "seconds": 1.0,
+    }
+    return year.Year(**{**values, **changes})
+
+
+def test_year_ends():
+    table = tables.year_ends([run(), run(indefinite=2)])
+    assert table.header[:4] == ("arithmetic", "form", "drift (mas)", "rate (mas/yr)")
+    rows = cells(table)
+    assert rows[0] == ["24 bits", "report", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5", "never"]
+    assert rows[1][-1] == "step 2"
+    other = run(case=run().case._replace(model=year.MODELS[1]))
+    table = tables.year_ends([run(), other])
+    assert table.header[0] == "model"
+    assert [row[0] for row in cells(table)] == list(year.MODELS[:2])
+    with pytest.raises(ValueError, match="got the reference"):
+        tables.year_ends([run(case=run().case.reference)])
+
+
+def test_slack():
+    k, beta = 3, float(FloatFormat(2, 24).unit_roundoff)
+    terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
+    zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
+    bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
+    row = cells(tables.slack([run()], [bounds], terms))[0]
+    first, second = theory.coefficients(k, 10, 2)
+    assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
+    assert row[-1] == "1.2500"
+    with pytest.raises(ValueError, match="needed one to step 3"):
+        tables.slack(
+            [run(steps=np.array([1, 3]))],
+            [year.Bounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],
+            terms,
+        )
+
+
+def summary(**numbers):
+    types = ensembles.Summary.__annotations__
+    filled = {name: "" if str(types[name]) == "str" else 0 for name in ensembles.Summary._fields}
+    return ensembles.Summary(**{**filled, **numbers})
+
+
+def test_trials():
+    found = [
+        summary(kind="a", trials=10, violations_105=10, worst_105=3.0, worst_125=0.5, state=0.25, gain=0.5),
+        summary(kind="b", trials=30, violations_105=1, worst_105=7.0, worst_125=0.1, covariance=0.75),
+        summary(kind="a", trials=10, violations_125=1, worst_125=2.0, contraction_violations=1),
+    ]
+    rows = cells(tables.trials(found))
+    assert rows == [
+        ["a", "20", "50.0 %, 3", "0.0 %, 0", "5.0 %, 2", "1, 0.500"],
+        ["b", "30", "3.3 %, 7", "0.0 %, 0", "0.0 %, 0.1", "0, 0.750"],
+        ["all", "50", "22.0 %, 7", "0.0 %, 0", "2.0 %, 2", "1, 0.750"],
+    ]
+
+
+def test_requirements():
+    answers = [
+        ("one", Requirement(FloatFormat(2, 9), "bound", 5, ((8, 2.0), (9, 0.5)))),
+        ("two", Requirement(None, "emulation", 5, ((8, 2.0),))),
+    ]
+    assert cells(tables.requirements(answers)) == [
+        ["one", "bound", "5", "9 bits", "0.5"],
+        ["two", "emulation", "5", "none", ""],
+    ]
