@@ -1,1 +1,1 @@
-"""A Kalman filter with every operation rounded: what (98)-(125) promise, what happens, and a bound (hung1984, ch. II)."""
+"""A Kalman filter with every operation rounded: what (98)-(125) of hung1984, ch. II, promise, and what happens."""

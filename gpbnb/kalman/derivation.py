@@ -228,8 +228,8 @@ def scalar_conditions() -> Derivation:
                 6 * kappa - 1,
             ),
             Step(
-                "(108), first form: 4 roundings of $P_pH$, above and, times $\\kappa$, below the line; 1 of $H(P_pH)$; 1 "
-                "each of sum, quotient and product",
+                "(108), first form: 4 roundings of $P_pH$, above and, times $\\kappa$, below the line; 1 of $H(P_pH)$; "
+                "1 each of sum, quotient and product",
                 sp.Integer(9),
                 together(4 * (1 - kappa), kappa, 3),
                 2 + 3 * kappa,

@@ -1,16 +1,18 @@
 """Many filters at once: models x formats x forms x seeds, on any executor; ``python -m gpbnb.kalman.ensembles``.
 
 Each trial is told by a few numbers, so that it may run anywhere, and gives the same there. What the command found is
-kept beside this file, in ``ensembles.csv``.
+kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +28,7 @@ from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman import theory
 from gpbnb.kalman.experiment import Bounded, Form, bounded
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.year import machine
 
 #: The kinds of random models, see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
@@ -36,6 +39,9 @@ FORMATS = tuple(
     for base, precision in ((2, 11), (2, 24), (2, 53), (10, 4), (10, 8), (16, 6))
     for rounding in Rounding
 )
+
+#: How often the command repeats each: 34 x 5 x 12 x 5 = 10,200 trials.
+REPEATS = 34
 
 _HERE = Path(__file__).parent
 
@@ -57,6 +63,7 @@ class Outcome:
     Parameters
     ----------
     state, gain, covariance : over the contraction bound; 0 where that is infinite.
+    last : of the state after the last step, over the contraction bound; 0 where that is infinite.
     bounded : share of the steps at which the contraction bound of the state is finite.
     printed_covariance, printed_gain, printed_state : over (105), (108) and (125) of hung1984, ch. II.
     indefinite : whether a variance or pivot was not positive at some step.
@@ -66,6 +73,7 @@ class Outcome:
     state: float
     gain: float
     covariance: float
+    last: float
     bounded: float
     printed_covariance: float
     printed_gain: float
@@ -103,7 +111,7 @@ def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, floa
     q = 10.0 ** rng.uniform(-4, 0, n)
     r: Any = 10.0 ** rng.uniform(-2, 1, m)
     P0 = 10.0 ** rng.uniform(-1, 2, n)
-    scale = np.ones(n)
+    scale: Any = np.ones(n)
     if kind == "far scales":
         scale, r = 10.0 ** rng.integers(-4, 5, n), r * np.array([1e-4, 1.0])[:m]
     model = LinearModel(
@@ -136,7 +144,8 @@ def trial(task: Task) -> Outcome:
     state, gain, covariance = (float(each) for each in largest)
     lost = history.indefinite is not None or history.stopped is not None
     share = float(finite.sum() / task.steps)
-    return Outcome(task, state, gain, covariance, share, *printed_ratios(found, task), lost)
+    last = float(ratios[-1, 0]) if len(ratios) == task.steps else 0.0
+    return Outcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
 
 
 def printed_ratios(found: Bounded, task: Task) -> tuple[float, float, float]:
@@ -257,7 +266,12 @@ def _some(batch: Sequence[Task]) -> tuple[Outcome, ...]:
 
 
 class Summary(NamedTuple):
-    """Trials of one kind and form: how many, and the largest error over each bound."""
+    """Trials of one kind and form, and the largest error over each bound.
+
+    Violations count trials with an error above the bound at any step; an infinite bound is not violated, and
+    `steps_bounded` the mean share of steps at which the contraction bound is finite. `typical` is the geometric mean of
+    error over contraction bound of the state after the last step, of the `compared` trials in which neither is zero.
+    """
 
     kind: str
     form: str
@@ -267,6 +281,8 @@ class Summary(NamedTuple):
     state: float
     gain: float
     covariance: float
+    compared: int
+    typical: float
     violations_105: int
     worst_105: float
     violations_108: int
@@ -276,64 +292,112 @@ class Summary(NamedTuple):
     indefinite: int
 
 
-def summaries(outcomes: Sequence[Outcome]) -> tuple[Summary, ...]:
-    """A line for each kind and form, in the order of their appearance."""
-    groups: dict[tuple[str, Form], list[Outcome]] = {}
-    for outcome in outcomes:
-        groups.setdefault((outcome.task.kind, outcome.task.form), []).append(outcome)
-
-    def worst(group: list[Outcome], name: str) -> tuple[int, float]:
-        ratios = [getattr(each, name) for each in group]
-        return sum(ratio > 1 for ratio in ratios), max(ratios)
-
-    return tuple(
-        Summary(
-            kind,
-            form.name.lower(),
-            len(group),
-            math.fsum(each.bounded for each in group) / len(group),
-            sum(max(each.state, each.gain, each.covariance) > 1 for each in group),
-            max(each.state for each in group),
-            max(each.gain for each in group),
-            max(each.covariance for each in group),
-            *worst(group, "printed_covariance"),
-            *worst(group, "printed_gain"),
-            *worst(group, "printed_state"),
-            sum(each.indefinite for each in group),
-        )
-        for (kind, form), group in groups.items()
+def _alone(outcome: Outcome) -> Summary:
+    task, ratios = outcome.task, (outcome.state, outcome.gain, outcome.covariance)
+    compared = outcome.last > 0
+    return Summary(
+        kind=task.kind,
+        form=task.form.name.lower(),
+        trials=1,
+        steps_bounded=outcome.bounded,
+        contraction_violations=int(not all(ratio <= 1 for ratio in ratios)),
+        state=outcome.state,
+        gain=outcome.gain,
+        covariance=outcome.covariance,
+        compared=int(compared),
+        typical=outcome.last if compared else 1.0,
+        violations_105=int(outcome.printed_covariance > 1),
+        worst_105=outcome.printed_covariance,
+        violations_108=int(outcome.printed_gain > 1),
+        worst_108=outcome.printed_gain,
+        violations_125=int(outcome.printed_state > 1),
+        worst_125=outcome.printed_state,
+        indefinite=int(outcome.indefinite),
     )
 
 
-def lines(found: Sequence[Summary]) -> Iterator[tuple[str, ...]]:
-    """Lines of ``ensembles.csv``: six significant digits."""
-    yield Summary._fields
-    for summary in found:
-        yield tuple(f"{each:.6g}" if isinstance(each, float) else str(each) for each in summary)
+def merged(parts: Sequence[Summary]) -> tuple[Summary, ...]:
+    """A line for each kind and form, in the order of their appearance."""
+    groups: dict[tuple[str, str], list[Summary]] = {}
+    for part in parts:
+        groups.setdefault((part.kind, part.form), []).append(part)
+    return tuple(_merged(group) for group in groups.values())
+
+
+def _merged(group: Sequence[Summary]) -> Summary:
+    trials, compared = sum(each.trials for each in group), sum(each.compared for each in group)
+    share = math.fsum(each.trials * each.steps_bounded for each in group) / trials
+    logarithm = math.fsum(each.compared * math.log(each.typical) for each in group) / max(compared, 1)
+    largest = {name: max(getattr(each, name) for each in group) for name in _LARGEST}
+    counts = {name: sum(getattr(each, name) for each in group) for name in _COUNTED}
+    return group[0]._replace(steps_bounded=share, typical=math.exp(logarithm), **largest, **counts)
+
+
+_LARGEST = ("state", "gain", "covariance", "worst_105", "worst_108", "worst_125")
+_COUNTED = (
+    "trials", "contraction_violations", "compared", "violations_105", "violations_108", "violations_125", "indefinite"
+)  # fmt: skip
+
+
+def summaries(outcomes: Sequence[Outcome]) -> tuple[Summary, ...]:
+    """A line for each kind and form, in the order of their appearance."""
+    return merged([_alone(outcome) for outcome in outcomes])
+
+
+def lines(seed: int, outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+    """Lines of ``ensembles.csv`` for the trials of one seed: six significant digits."""
+    return [
+        (str(seed), *(f"{each:.6g}" if isinstance(each, float) else str(each) for each in summary))
+        for summary in summaries([outcome for outcome in outcomes if outcome.task.seed == seed])
+    ]
+
+
+HEADER = ("seed", *Summary._fields)
 
 
 @cache
 def load(directory: Path = _HERE) -> tuple[Summary, ...]:
-    """The sweep that the package brings: 34 trials of each kind, format and form."""
+    """The sweep that the package brings, of all seeds together."""
     with (directory / "ensembles.csv").open(encoding="utf-8", newline="") as file:
         header, *body = list(csv.reader(file))
-    if tuple(header) != Summary._fields:
+    if tuple(header) != HEADER:
         raise ValueError(f"got ensembles.csv with the columns {header}; make it anew with this version")
-    types = (Summary.__annotations__[name] for name in Summary._fields)
-    kinds = [{"str": str, "int": int, "float": float}[str(each)] for each in types]
-    return tuple(Summary(*(kind(cell) for kind, cell in zip(kinds, line, strict=True))) for line in body)
+    types = [{"str": str, "int": int, "float": float}[str(each)] for each in Summary.__annotations__.values()]
+    return merged([Summary(*(kind(cell) for kind, cell in zip(types, line[1:], strict=True))) for line in body])
+
+
+def provenance(directory: Path = _HERE) -> dict[str, Any]:
+    """How the sweep was made."""
+    found: dict[str, Any] = json.loads((directory / "ensembles.json").read_text(encoding="utf-8"))
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb.kalman.ensembles", description="Random filters by thousands."
     )
-    parser.add_argument("--repeats", type=int, default=34, help="trials of each kind, format and form")
-    parser.add_argument("--output", type=Path, default=_HERE, help="where ensembles.csv goes")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
+    parser.add_argument("--output", type=Path, default=_HERE, help="where ensembles.csv and ensembles.json go")
     given = parser.parse_args(arguments)
-    outcomes = sweep(tasks(given.repeats), progress=True)
+    todo, start = tasks(given.repeats), time.perf_counter()
+    outcomes = sweep(todo, progress=True)
+    given.output.mkdir(parents=True, exist_ok=True)
     with (given.output / "ensembles.csv").open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(lines(summaries(outcomes)))
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(HEADER)
+        for seed in range(given.repeats):
+            writer.writerows(lines(seed, outcomes))
+    made = {
+        "command": "python -m gpbnb.kalman.ensembles",
+        "trials": len(todo),
+        "steps": todo[0].steps,
+        "formats": [str(fmt) for fmt in FORMATS],
+        "seconds": round(time.perf_counter() - start),
+        **machine(),
+    }
+    (given.output / "ensembles.json").write_text(
+        json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+    )
     return 0
 
 

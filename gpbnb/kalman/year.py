@@ -1,7 +1,7 @@
 """A year of Gravity Probe B, 3,153,600 steps, in many formats and forms: ``python -m gpbnb.kalman.year``.
 
-The command goes on where it was interrupted. What it found is kept beside this file, in ``year.csv`` and ``bounds.csv``,
-and how, in ``year.json``; :func:`load` and :func:`bounds` read it.
+The command goes on where it was interrupted. What it found is kept beside this file, in ``year.csv`` and
+``bounds.csv``, and how, in ``year.json``; :func:`load` and :func:`bounds` read it.
 
 In one base all formats hold the same numbers: the model is stored once, in 14 bits or 4 decimal digits, and what is
 measured are whole milliarcseconds. So one reference serves them all, and errors are those of the arithmetic alone.
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,10 +108,8 @@ def _cases() -> tuple[Case, ...]:
 #: All runs, the most telling first.
 CASES = _cases()
 
-#: Runs with the contraction bound at their side: the references, on which the bounds of all others rest, and 53 bits.
-FOLLOWED = frozenset(
-    (*(case.reference for case in CASES), Case(MODELS[0], 2, 53, Rounding.NEAREST, Form.REPORT))
-)
+#: Runs with the contraction bound at their side: the references of the first model, on which the others' bounds rest.
+FOLLOWED = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.USUAL) for base in STORED)
 
 
 @cache
@@ -179,7 +177,7 @@ class Journey:
 
     def save(self) -> None:
         """Write all of it, or nothing."""
-        draft = self.file.with_suffix(".draft.npz")
+        draft = self.file.with_suffix(f".{os.getpid()}.npz")
         arrays = self._kept()
         if isinstance(self.run, Followed):
             arrays |= {f"bound_{name}": np.asarray(each) for name, each in self.run.bound._asdict().items()}
@@ -252,13 +250,8 @@ def history(case: Case, directory: Path, steps: int = YEAR) -> History:
 
 
 @cache
-def _followed(case: Case, directory: Path, steps: int) -> Followed:
-    return cast(Followed, Journey(case, directory, steps).run)
-
-
-@cache
 def _true(case: Case, directory: Path, steps: int) -> Kept:
-    return _followed(case, directory, steps).kept()
+    return Journey(case, directory, steps).run.kept()
 
 
 # -- what was found -----------------------------------------------------------------------------------
@@ -317,8 +310,11 @@ class Bounds:
     covariance: NDArray[np.float64]
 
 
-def bound_rows(case: Case, run: Followed, true: Kept) -> list[tuple[str, ...]]:
-    """Lines of ``bounds.csv``: six significant digits, rounded upwards."""
+def bound_rows(case: Case, directory: Path, steps: int) -> list[tuple[str, ...]]:
+    """Lines of ``bounds.csv``, if the reference is followed: six significant digits, rounded upwards."""
+    run, true = Journey(case, directory, steps).run, _true(case, directory, steps)
+    if not isinstance(run, Followed):
+        return []
     states, gains, covariances = (each[: len(true.steps)] for each in run.bounds)
     norms = [relative(gains, true.K), relative(covariances, true.P)]
     numbers = np.column_stack([states[:, :4], states.max(axis=1), *norms])
@@ -353,24 +349,28 @@ def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = 
             "seconds": round(journey.seconds, 1),
             "told": journey.told,
         }
-        true = _true(case.reference, directory, steps)
         if case.reference.name not in references:
             references[case.reference.name] = _of_reference(case.reference, directory, steps)
-            bounded += bound_rows(case.reference, _followed(case.reference, directory, steps), true)
-        if case in FOLLOWED:
-            bounded += bound_rows(case, cast(Followed, journey.run), true)
+            bounded += bound_rows(case.reference, directory, steps)
     for name, header, body in (("year", HEADER, lines), ("bounds", HEADER[:-1], bounded)):
         with (to / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows([header, *body])
     made = {
         "command": "python -m gpbnb.kalman.year",
         "steps": steps,
-        "machine": f"{platform.system()} {platform.machine()}, python {platform.python_version()}",
-        "versions": {name: version(name) for name in ("numpy", "numba", "llvmlite")},
+        **machine(),
         "references": references,
         "cases": about,
     }
     (to / "year.json").write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def machine() -> dict[str, Any]:
+    """Where results are made, and with which versions."""
+    return {
+        "machine": f"{platform.system()} {platform.machine()}, python {platform.python_version()}",
+        "versions": {name: version(name) for name in ("numpy", "numba", "llvmlite")},
+    }
 
 
 def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
