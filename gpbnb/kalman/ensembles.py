@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cache
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -362,7 +362,7 @@ def load(directory: Path = _HERE) -> tuple[Summary, ...]:
         header, *body = list(csv.reader(file))
     if tuple(header) != HEADER:
         raise ValueError(f"got ensembles.csv with the columns {header}; make it anew with this version")
-    types = [{"str": str, "int": int, "float": float}[str(each)] for each in Summary.__annotations__.values()]
+    types = get_type_hints(Summary).values()
     return merged([Summary(*(kind(cell) for kind, cell in zip(types, line[1:], strict=True))) for line in body])
 
 
