@@ -197,7 +197,7 @@ def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms
         error = abs(float(run.rate[-1, at]))
         companion = float(theory.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
         cells = [terms.kindest(fmt, k, **faults) / error for faults in theory.MENDINGS.values()]
-        body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.4f}"))
+        body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.5f}"))
     header = ("arithmetic", "rate, error (mas/yr)", *(f"(125), {name}" for name in theory.MENDINGS), "companion bound")
     return Table(f"bound over error, {len(body)} years", header, tuple(body))
 
@@ -217,8 +217,11 @@ def trials(found: Sequence[Summary]) -> Table:
             cells.append(f"{100 * violated / count:.1f} %, {short(largest)}")
         largest = max(max(each.state, each.gain, each.covariance) for each in group)
         violated = sum(each.contraction_violations for each in group)
-        body.append((name, str(count), *cells, f"{violated}, {largest:.3f}"))
-    header = ("models", "runs", "violate (105), worst", "(108)", "(125)", "contraction bound")
+        compared = sum(each.compared for each in group)
+        logarithm = sum(each.compared * math.log(each.typical) for each in group if each.compared)
+        typical = short(math.exp(-logarithm / compared)) if compared else ""
+        body.append((name, str(count), *cells, f"{violated}, {largest:.3f}", typical))
+    header = ("models", "runs", "violate (105), worst", "(108)", "(125)", "contraction bound", "typically, over error")
     return Table(f"{sum(each.trials for each in found)} random filters", header, tuple(body))
 
 

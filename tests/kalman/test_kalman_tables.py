@@ -160,7 +160,7 @@ def test_slack():
     row = cells(tables.slack([run()], [bounds], terms))[0]
     first, second = theory.coefficients(k, 10, 2)
     assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
-    assert row[-1] == "1.2500"
+    assert row[-1] == "1.25000"
     with pytest.raises(ValueError, match="needed one to step 3"):
         tables.slack(
             [run(steps=np.array([1, 3]))],
@@ -170,22 +170,33 @@ def test_slack():
 
 
 def summary(**numbers):
-    types = ensembles.Summary.__annotations__
-    filled = {name: "" if str(types[name]) == "str" else 0 for name in ensembles.Summary._fields}
+    filled = {name: "" if name in ("kind", "form") else 0 for name in ensembles.Summary._fields}
     return ensembles.Summary(**{**filled, **numbers})
 
 
 def test_trials():
     found = [
-        summary(kind="a", trials=10, violations_105=10, worst_105=3.0, worst_125=0.5, state=0.25, gain=0.5),
+        summary(
+            kind="a",
+            trials=10,
+            violations_105=10,
+            worst_105=3.0,
+            worst_125=0.5,
+            state=0.25,
+            gain=0.5,
+            compared=1,
+            typical=0.25,
+        ),
         summary(kind="b", trials=30, violations_105=1, worst_105=7.0, worst_125=0.1, covariance=0.75),
-        summary(kind="a", trials=10, violations_125=1, worst_125=2.0, contraction_violations=1),
+        summary(
+            kind="a", trials=10, violations_125=1, worst_125=2.0, contraction_violations=1, compared=3, typical=1 / 64
+        ),
     ]
     rows = cells(tables.trials(found))
     assert rows == [
-        ["a", "20", "50.0 %, 3", "0.0 %, 0", "5.0 %, 2", "1, 0.500"],
-        ["b", "30", "3.3 %, 7", "0.0 %, 0", "0.0 %, 0.1", "0, 0.750"],
-        ["all", "50", "22.0 %, 7", "0.0 %, 0", "2.0 %, 2", "1, 0.750"],
+        ["a", "20", "50.0 %, 3", "0.0 %, 0", "5.0 %, 2", "1, 0.500", "32"],
+        ["b", "30", "3.3 %, 7", "0.0 %, 0", "0.0 %, 0.1", "0, 0.750", ""],
+        ["all", "50", "22.0 %, 7", "0.0 %, 0", "2.0 %, 2", "1, 0.750", "32"],
     ]
 
 
