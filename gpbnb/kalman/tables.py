@@ -23,17 +23,19 @@ def example(k: int, n: int, m: int) -> Table:
     """The closing example for (125), printed and mended: coefficients, β, digits, and what IEEE double makes of it."""
     body = []
     for name, faults in theory.MENDINGS.items():
-        counts = theory.coefficients(k, n, m, **faults)
-        cells = [name]
-        for coefficient in counts:
-            cells += [
-                scientific(coefficient, 5),
-                scientific(Fraction(1, coefficient), 4),
-                str(theory.required_precision(coefficient)),
-            ]
-        body.append((*cells, scientific(counts.second * DOUBLE.unit_roundoff, 2)))
-    header = ("(125)", "$a$", "$\\beta = 1/a$", "digits", "$b$", "$\\beta = 1/b$", "digits", "$b\\beta$, IEEE double")
-    return Table(f"the closing example, {len(body)} ways", header, tuple(body))
+        for term, coefficient in zip(("first", "second"), theory.coefficients(k, n, m, **faults), strict=True):
+            body.append(
+                (
+                    name,
+                    term,
+                    scientific(coefficient, 5),
+                    scientific(Fraction(1, coefficient), 4),
+                    str(theory.required_precision(coefficient)),
+                    scientific(coefficient * DOUBLE.unit_roundoff, 2),
+                )
+            )
+    header = ("(125)", "term", "coefficient", "$\\beta$, one over it", "digits", "times $\\beta$ of IEEE double")
+    return Table(f"the closing example, {len(theory.MENDINGS)} ways", header, tuple(body))
 
 
 def slips(k: int, n: int, m: int) -> Table:
@@ -164,8 +166,8 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
             raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
         found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
         cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
-        lost = f"step {run.indefinite}" if run.indefinite else "never"
-        body.append((*([run.case.model] if several else []), *cells, short(float(run.least_eigenvalue[-1])), lost))
+        lost = f", a variance lost at step {run.indefinite:,}" if run.indefinite else ""
+        body.append((*([run.case.model] if several else []), *cells, short(float(run.least_eigenvalue[-1])) + lost))
     header = (
         *(["model"] if several else []),
         "arithmetic",
@@ -175,7 +177,6 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
         "gain, relative",
         "covariance, relative",
         "least eigenvalue",
-        "variance lost",
     )
     return Table(f"{len(body)} years", header, tuple(body))
 
