@@ -81,6 +81,7 @@ def required_precision(
     goals = np.broadcast_to(np.asarray(goal, dtype=np.float64), (model.n,))
     if not (goals > 0).all() or not np.isfinite(goals).any():
         raise ValueError(f"got goal {goal}; needed an error above 0 for each of the {model.n} states, one finite")
+    asked = np.isfinite(goals)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "bound"')
     if base not in LARGEST_PRECISION:
@@ -105,7 +106,7 @@ def required_precision(
                 error, lost = bounded(model, z, fmt, form, marks).state, False
         except ValueError:  # a covariance is not definite in so few digits
             error, lost = np.empty((0, model.n)), True
-        ratio = math.inf if lost or not len(error) else float((np.abs(error) / goals).max())
+        ratio = math.inf if lost or not len(error) else float((np.abs(error[:, asked]) / goals[asked]).max())
         tried.append((precision, ratio))
         if ratio <= 1 and len(tried) > 1 and tried[-2][1] <= 1:
             return Requirement(FloatFormat(base, precision - 1, rounding), basis, steps, tuple(tried))

@@ -44,7 +44,7 @@ def test_cycles_of_matrices_have_periods_of_their_own():
         ("Phi", [1, 2], "got Phi of shape"),
         ("H", [[1, 0, 0]], r"got H of shape \(1, 3\); needed \(m, 2\)"),
         ("H", np.empty((0, 2)), "got H of shape"),
-        ("H", [[1, "nan"]], "H: entry 0, 1: got nan; needed a finite number"),
+        ("H", [[1, "nan"]], "H: entry 0, 1: got 'nan'; needed a finite number"),
         ("Q", [[1, 0], [0, math.inf]], "Q: entry 1, 1"),
         ("Q", [[1, 2], [1, 1]], r"got Q with 2.0 at \(0, 1\) and 1.0 at \(1, 0\); needed a symmetric matrix"),
         ("Q", [[1, 0], [0, -1]], "got Q with a least eigenvalue near -1; needed a positive semidefinite matrix"),
@@ -105,8 +105,10 @@ def test_the_gp_b_model_has_the_periods_of_roll_and_orbit():
     assert math.lcm(60, 585) == 2340
     for k in (0, 7, 77, 2339):
         assert model.H[k][:, :9].tolist() == model.H[(k + 60) % 2340][:, :9].tolist()
-    aberration = [float(model.H[k, 0, 9] ** 2 + model.H[(k + 15) % 2340, 0, 9] ** 2) for k in range(2340)]
-    assert max(aberration) == pytest.approx(2 * 5.2**2 / 2, rel=0.05)
+    # cos a cos b + sin a sin b = cos(a - b), of orbit and roll, from directions to six decimals
+    for k in range(2340):
+        angle = 2 * math.pi * 10 * (k + 1) * (1 / 5850 - 1 / 600)
+        assert float(model.H[k, 0, 9]) == pytest.approx(5.2 * math.cos(angle), abs=5.2 * 2e-6)
 
 
 def test_the_gp_b_model_is_that_of_the_geometry_to_first_order():

@@ -80,6 +80,10 @@ def test_a_goal_for_each_state():
     assert second.precision < first.precision
     assert np.abs(error(first))[:, 0].max() < 3e-6
     assert required_precision(MODEL, STEPS, (1e-6, 1e-2), 2, z=Z).fmt == first
+    # An infinite bound of a state that does not matter is no number of any kind.
+    tried = required_precision(MODEL, STEPS, (1e-6, math.inf), 2, basis="bound", z=Z).tried
+    assert math.isinf(tried[0][1])
+    assert not any(math.isnan(ratio) for _, ratio in tried)
 
 
 def test_no_precision_may_be_enough():
