@@ -40,7 +40,7 @@ FORMATS = tuple(
     for rounding in Rounding
 )
 
-#: How often the command repeats each: 34 x 5 x 12 x 5 = 10,200 trials.
+#: How often the command repeats each, 34 x 5 x 12 x 5 = 10,200 trials.
 REPEATS = 34
 
 _HERE = Path(__file__).parent

@@ -975,7 +975,7 @@ def bounded(
 
 # -- Gravity Probe B ----------------------------------------------------------------------------------
 
-#: The truth at the start of a simulated year: the drift rates that relativity predicts, 6606 and 39 mas/yr.
+#: The truth at the start of a simulated year, with the drift rates that relativity predicts, 6606 and 39 mas/yr.
 TRUTH = (30.0, -20.0, 6606.0, 39.0, 0.0, 0.0, 60.0, -80.0, 0.0, 4.0)
 
 

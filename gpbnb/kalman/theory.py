@@ -199,7 +199,7 @@ def required_precision(
 # -- the closing example ----------------------------------------------------------------------------------------------
 
 EXAMPLE = (3_153_600, 10, 2)
-"""k, n and m of the closing example: a year of steps of 10 s; hung1984, ch. II, section 12."""
+"""The k, n and m of the closing example, a year of steps of 10 s; hung1984, ch. II, section 12."""
 
 PRINTED = {
     "first coefficient": "2.6490e8",
@@ -315,7 +315,7 @@ class Contraction(NamedTuple):
     Infinite where nothing can be said: the error of the covariance is too large for the gain to be known.
     """
 
-    #: (n, n), lower: the weights.
+    #: (n, n), the weights, a lower triangle.
     L: NDArray[np.float64]
     #: bounds the error of the state, in standard deviations.
     eta: float

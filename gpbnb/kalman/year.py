@@ -46,10 +46,10 @@ from gpbnb.kalman.experiment import (
 from gpbnb.kalman.model import YEAR, LinearModel, gravity_probe_b
 from gpbnb.kalman.theory import Contraction
 
-#: In which format the model is stored, by base: a part of every other format of the base in :data:`CASES`.
+#: In which format the model is stored, by base; a part of every other format of the base in :data:`CASES`.
 STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
 
-#: The models: rolling in 600 s as in the reports, in 77.5 s as flown, and in 600 s without process noise.
+#: The models, rolling in 600 s as in the reports, in 77.5 s as flown, and in 600 s without process noise.
 MODELS = ("roll 600 s", "roll 77.5 s", "no process noise")
 
 _HERE = Path(__file__).parent
@@ -108,7 +108,7 @@ def _cases() -> tuple[Case, ...]:
 #: All runs, the most telling first.
 CASES = _cases()
 
-#: Runs with the contraction bound at their side: the references of the first model, on which the others' bounds rest.
+#: Runs with the contraction bound at their side, the references of the first model, on which the others' bounds rest.
 FOLLOWED = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.USUAL) for base in STORED)
 
 
