@@ -116,7 +116,7 @@ def test_the_error_goes_from_useless_to_negligible():
 
 
 def test_the_refined_bound_is_near_the_error_at_the_end_of_the_year():
-    """By a companion, the reference: at most 100 times the error is asked for, 1.001 comes out."""
+    """By a companion, the reference: at most 100 times the error is asked for."""
     bounds = year.bounds()
     assert set(bounds) == set(FOLLOWED)
     ratios = []
