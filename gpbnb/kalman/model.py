@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from gpbnb.bounds import exact
 from gpbnb.formats import FloatFormat
+from gpbnb.measurement import measurement_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +169,8 @@ STATES = (
     ("readout scale", "10⁻³"),
 )
 
+_COLUMNS = ("phi2", "phi3", "phi2_rate", "phi3_rate", "alpha2", "alpha3", "beta2", "gamma2", "bias_z", "scale")
+
 #: Steps of 10 s in 365 days; hung1984, ch. II, section 12, example.
 YEAR = 3_153_600
 
@@ -200,13 +203,13 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     # In half seconds, a step is 20 and an orbit 11700.
     turn, orbit = int(half_seconds), 11_700
     cycle = math.lcm(turn // math.gcd(turn, 20), orbit // 20)
-    H = np.full((cycle, 2, 10), Fraction(0), dtype=object)
-    for k in range(cycle):
-        t = 20 * (k + 1)
-        c, s = _cosine(t, turn), _sine(t, turn)
-        aberration = Fraction("5.2") * (_cosine(t, orbit) * c + _sine(t, orbit) * s)
-        H[k, 0] = [c, s, Fraction(0), Fraction(0), c, s, Fraction(1), Fraction(1), Fraction(1), aberration]
-        H[k, 1, 4:7] = [c, s, Fraction(1)]
+    times = [20 * (k + 1) for k in range(cycle)]
+    C, S = (np.array([wave(t, turn) for t in times], dtype=object) for wave in (_cosine, _sine))
+    size = Fraction("5.2")
+    known = np.array([[0, size * _cosine(t, orbit), size * _sine(t, orbit)] for t in times], dtype=object)
+    gyro = measurement_rows(C, S, _COLUMNS, derolled=False, nominal_theta=known)[:, 1]
+    telescope = measurement_rows(C, S, _COLUMNS, signal="telescope", derolled=False)[:, 1]
+    H = np.stack([gyro, telescope], axis=1)
     Phi = _diagonal("1 1 1 1 0.9 0.9 1 1 0.999 1")
     Phi[0, 2] = Phi[1, 3] = Fraction(1, YEAR)
     wander = "1e-8 1e-8 1e-8 1e-8 76 76 1e-6 1e-6 0.01 1e-10"
