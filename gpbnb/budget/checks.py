@@ -11,7 +11,7 @@ import numpy as np
 
 from gpbnb import ledger
 from gpbnb.budget import derivation, experiment, theory
-from gpbnb.budget.theory import Form, Kind
+from gpbnb.budget.theory import ErrorForm, Kind
 from gpbnb.findings import Checks, Finding, Verdict, answer, compare, unverifiable
 from gpbnb.formats import FloatFormat
 from gpbnb.linalg import dot
@@ -286,7 +286,7 @@ def table() -> Finding:
 @CHECKS.add("hung1982.II.table-abbreviations")
 def abbreviations() -> Finding:
     explained = {"random variable", "random process", "1/f noise", "deterministic"}
-    classes = {kind.value.replace("constant", "variable") for kind in Kind} | {form.value for form in Form}
+    classes = {kind.value.replace("constant", "variable") for kind in Kind} | {form.value for form in ErrorForm}
     stray = sorted(explained - classes)
     return compare(
         not stray,

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from gpbnb.budget import theory
 from gpbnb.budget.experiment import Draws
-from gpbnb.budget.theory import Budget, Form
+from gpbnb.budget.theory import Budget, ErrorForm
 from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
 
 
@@ -40,14 +40,16 @@ def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes
 def shares(budget: Budget, ax: Axes) -> list[Artist]:
     """Each source's share of the square of the total, largest first, in the colour of its form."""
     ordered = sorted(budget.sources, key=budget.share)
-    colours = dict(zip(Form, (OBSERVED, BOUND, *OBSERVED_OTHERS[:2]), strict=True))
+    colours = dict(zip(ErrorForm, (OBSERVED, BOUND, *OBSERVED_OTHERS[:2]), strict=True))
     bars = ax.barh(
         [source.name for source in ordered],
         [100 * budget.share(source) for source in ordered],
         color=[colours[source.form] for source in ordered],
     )
     used = {source.form: bar for source, bar in zip(ordered, bars, strict=True)}
-    legend(ax, handles=[used[form] for form in Form if form in used], labels=[f.value for f in Form if f in used])
+    legend(
+        ax, handles=[used[form] for form in ErrorForm if form in used], labels=[f.value for f in ErrorForm if f in used]
+    )
     ax.grid(False, axis="y")
     label(ax, "share of the total's square (%)", "")
     return list(bars)

@@ -23,7 +23,7 @@ class Kind(Enum):
     PROCESS = "random process"
 
 
-class Form(Enum):
+class ErrorForm(Enum):
     """The second classification, by form."""
 
     BIAS = "bias"
@@ -40,15 +40,15 @@ _BY_KIND: dict[Kind, set[str]] = {
     Kind.CONSTANT: {"roll", "orbit"},
     Kind.PROCESS: {"roll", "orbit", "filter"},
 }
-_BY_FORM: dict[Form, set[str]] = {
-    Form.BIAS: {"roll", "orbit"},
-    Form.DRIFT: set(),
-    Form.SCALE_FACTOR: {"filter"},
-    Form.NOISE: {"filter"},
+_BY_FORM: dict[ErrorForm, set[str]] = {
+    ErrorForm.BIAS: {"roll", "orbit"},
+    ErrorForm.DRIFT: set(),
+    ErrorForm.SCALE_FACTOR: {"filter"},
+    ErrorForm.NOISE: {"filter"},
 }
 
 
-def foreseen(kind: Kind, form: Form) -> frozenset[str]:
+def foreseen(kind: Kind, form: ErrorForm) -> frozenset[str]:
     """Methods that ch. II names for errors of this kind or of this form; what is deterministic is compensated."""
     return frozenset(_BY_KIND[kind] | _BY_FORM[form])
 
@@ -74,7 +74,7 @@ class Source:
 
     name: str
     kind: Kind
-    form: Form
+    form: ErrorForm
     error: float
     roll: float = 1.0
     orbit: float = 1.0
@@ -87,8 +87,8 @@ class Source:
             text = getattr(self, name)
             if text != text.strip() or (name == "name" and not text):
                 raise ValueError(f"got {name} {text!r}; needed text without blanks at its ends; a name, at least")
-        if not isinstance(self.kind, Kind) or not isinstance(self.form, Form):
-            raise ValueError(f"got kind {self.kind!r} and form {self.form!r}; needed a Kind and a Form")
+        if not isinstance(self.kind, Kind) or not isinstance(self.form, ErrorForm):
+            raise ValueError(f"got kind {self.kind!r} and form {self.form!r}; needed a Kind and an ErrorForm")
         if not math.isfinite(self.error):
             raise ValueError(f"got error {self.error}; needed a finite number of milliarcseconds")
         for method in METHODS:
@@ -346,7 +346,7 @@ def _source(header: tuple[str, ...], cells: list[str]) -> Source:
     return Source(
         row["name"],
         _member(Kind, "kind", row["kind"]),
-        _member(Form, "form", row["form"]),
+        _member(ErrorForm, "form", row["form"]),
         _number("error_mas", row["error_mas"]),
         **factors,
         group=row["group"],

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gpbnb.budget import theory
-from gpbnb.budget.theory import Budget, Form, Kind, Source
+from gpbnb.budget.theory import Budget, ErrorForm, Kind, Source
 
 SEEDED = settings(derandomize=True, deadline=None, database=None)
 
@@ -26,7 +26,7 @@ sources = st.builds(
     Source,
     words,
     st.sampled_from(Kind),
-    st.sampled_from(Form),
+    st.sampled_from(ErrorForm),
     sizes,
     factors,
     factors,
@@ -39,7 +39,7 @@ budgets = st.lists(sources, max_size=8, unique_by=lambda source: source.name).ma
 
 def made(*errors, group=""):
     return Budget(
-        tuple(Source(f"s{k}", Kind.CONSTANT, Form.BIAS, error, group=group) for k, error in enumerate(errors))
+        tuple(Source(f"s{k}", Kind.CONSTANT, ErrorForm.BIAS, error, group=group) for k, error in enumerate(errors))
     )
 
 
@@ -51,7 +51,7 @@ def test_independent_sources_add_up_as_squares_and_a_group_with_signs():
     assert made(3, 4, group="g").total == 7
     assert made(3, -4, group="g").total == 1
     assert made(3, -4).worst_case == made(3, -4, group="g").worst_case == 7
-    mixed = Budget((*made(3, 1, group="g").sources, Source("c", Kind.PROCESS, Form.NOISE, 6, filter=0.5)))
+    mixed = Budget((*made(3, 1, group="g").sources, Source("c", Kind.PROCESS, ErrorForm.NOISE, 6, filter=0.5)))
     assert mixed.total == 5
     assert [len(group) for group in mixed.groups()] == [2, 1]
 
@@ -97,7 +97,7 @@ def test_order_does_not_matter():
 
 
 def test_reduction_multiplies():
-    source = Source("a", Kind.PROCESS, Form.NOISE, -8, roll=0.5, orbit=0.25, filter=0.5)
+    source = Source("a", Kind.PROCESS, ErrorForm.NOISE, -8, roll=0.5, orbit=0.25, filter=0.5)
     assert source.residual == -0.5
 
 
@@ -162,11 +162,11 @@ def test_limits_of_averages():
 
 
 def test_what_chapter_ii_foresees():
-    assert theory.foreseen(Kind.DETERMINISTIC, Form.DRIFT) == set()
-    assert theory.foreseen(Kind.CONSTANT, Form.BIAS) == {"roll", "orbit"}
-    assert theory.foreseen(Kind.CONSTANT, Form.SCALE_FACTOR) == {"roll", "orbit", "filter"}
-    assert theory.foreseen(Kind.DETERMINISTIC, Form.NOISE) == {"filter"}
-    source = Source("a", Kind.DETERMINISTIC, Form.BIAS, 1, roll=0.5, filter=0.5)
+    assert theory.foreseen(Kind.DETERMINISTIC, ErrorForm.DRIFT) == set()
+    assert theory.foreseen(Kind.CONSTANT, ErrorForm.BIAS) == {"roll", "orbit"}
+    assert theory.foreseen(Kind.CONSTANT, ErrorForm.SCALE_FACTOR) == {"roll", "orbit", "filter"}
+    assert theory.foreseen(Kind.DETERMINISTIC, ErrorForm.NOISE) == {"filter"}
+    source = Source("a", Kind.DETERMINISTIC, ErrorForm.BIAS, 1, roll=0.5, filter=0.5)
     assert source.unforeseen == ("filter",)
     assert replace(source, filter=1.0).unforeseen == ()
 
@@ -202,7 +202,7 @@ def test_files(tmp_path):
 
 def test_columns_in_any_order_and_only_those_that_are_needed():
     reading = theory.parse("error_mas,form,name,kind\n.5,noise, b ,random process\n")
-    assert reading.budget.sources == (Source("b", Kind.PROCESS, Form.NOISE, 0.5),)
+    assert reading.budget.sources == (Source("b", Kind.PROCESS, ErrorForm.NOISE, 0.5),)
 
 
 @pytest.mark.parametrize(
@@ -259,8 +259,8 @@ def test_a_bad_header_is_refused(header, message):
     ("call", "message"),
     [
         (lambda: Budget(made(1).sources * 2), "got 's0' more than once"),
-        (lambda: Source(" a", Kind.CONSTANT, Form.BIAS, 1), "got name ' a'; needed text without blanks"),
-        (lambda: Source("a", "random constant", Form.BIAS, 1), "needed a Kind and a Form"),
+        (lambda: Source(" a", Kind.CONSTANT, ErrorForm.BIAS, 1), "got name ' a'; needed text without blanks"),
+        (lambda: Source("a", "random constant", ErrorForm.BIAS, 1), "needed a Kind and an ErrorForm"),
         (lambda: theory.equal_error(-1, 3), "got a total of -1 over 3 sources"),
         (lambda: theory.equal_error(1, 0), "over 0 sources"),
         (lambda: theory.equal_sources(1, 0), "from errors of 0"),
