@@ -228,7 +228,7 @@ KALMAN = Calculator(
         Input("goal", "Error granted, unit of the state", 1e-30, 1e30, (1e-6, 1e6), log=True),
     ),
     definitions=derivation.kalman_bound,
-    columns=("(125)", "times β‖xₖ‖", "times β‖u‖", "error", "digits for the error granted"),
+    columns=("(125)", "times β‖xₖ‖", "times β‖u‖", "error", "digits needed"),
     lines=tuple(
         Line(name, (f"a{i}", f"b{i}", f"bound{i}", f"digits{i}")) for i, name in enumerate(_KALMAN_NAMES, 1)
     ),

@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import sympy as sp
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.jscode import JavascriptCodePrinter
 
 MOST_DIGITS = 2000
@@ -66,12 +67,13 @@ def print_expression(expression: Any) -> str:
     ------
     ValueError : something has no counterpart in JavaScript.
     """
-    source = str(_Printer().doprint(sp.sympify(expression).doit()))
-    if "Not supported" in source:
+    try:
+        source = str(_Printer().doprint(sp.sympify(expression).doit()))
+    except PrintMethodNotImplementedError:
         raise ValueError(
             f"got {expression}; needed an expression of arithmetic, powers, sqrt, exp, expm1, log, sin, cos, floor, "
             "Min, Max and Piecewise; rewrite it with these"
-        )
+        ) from None
     return " ".join(source.split())
 
 

@@ -147,7 +147,8 @@ class Formulas:
         self.definitions = [each for each in calculator.definitions() if each.name in calculator.formulas]
 
     def _repr_markdown_(self) -> str:
-        return "\n\n".join(f"$$\n{self._latex(each)}\n$$" for each in self.definitions)
+        lines = " \\\\[0.5em]\n".join(self._latex(each).replace(r"\;=\;", "&=", 1) for each in self.definitions)
+        return f"$$\n\\begin{{aligned}}\n{lines}\n\\end{{aligned}}\n$$"
 
     def _latex(self, each: Definition) -> str:
         letters = self.calculator.letters
