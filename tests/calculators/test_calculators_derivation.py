@@ -107,8 +107,8 @@ def test_the_drift_across_is_that_of_the_chapter(phase):
             lambda x: (x - mpmath.mpf(1) / 2) * x * mpmath.sin(phase * x), np.linspace(0, 1, 12).tolist()
         )
         assert abs(found / by_quadrature - 1) < mpmath.mpf(10) ** -25
-    # The chapter sums 400 terms, of sizes that add up to at most 3/2 min(phase, 1): a rounding of each term, its node and
-    # its weight, and of 399 sums.
+    # The chapter sums 400 terms, of sizes that add up to at most 3/2 min(phase, 1): a rounding of each term, its
+    # node and its weight, and of 399 sums.
     by_sum = 402 * np.finfo(float).eps * 1.5 * min(phase, 1)
     assert abs(float(found) - theory.off_tuned_drift(1.0, phase, 1.0)) < by_sum
 

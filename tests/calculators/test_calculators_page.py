@@ -93,7 +93,7 @@ def test_the_table_needs_no_script_and_is_of_the_chapters_functions(calculator):
         computed = calculator.reference(calculator.values(example))
         wanted = [calculator.examples[example].get(name) or page.show(computed[name]) for name in calculator.shown]
         assert cells == wanted
-        assert "nan" not in row and "—" not in row
+        assert "—" not in row
 
 
 def test_the_sample_calculations_are_in_the_table():
@@ -108,7 +108,8 @@ def test_the_sample_calculations_are_in_the_table():
 @CALCULATORS
 def test_what_is_written_into_a_script_stays_in_it(calculator):
     source = page.script(calculator)
-    assert "</" not in source and "<!--" not in source
+    assert "</" not in source
+    assert "<!--" not in source
     spec = json.loads(source[len("gpbnbCalculators.add(") : source.index(",\n(given)")])
     assert spec["id"] == calculator.id
     assert [each["name"] for each in spec["inputs"]] == [each.name for each in calculator.inputs]
