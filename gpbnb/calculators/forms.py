@@ -260,8 +260,8 @@ KALMAN = Calculator(
     },
     shown={
         "k": "k", "n": "n", "m": "m", "x": "‖xₖ‖", "u": "‖u‖", "f": "‖F‖", "b": "b", "t": "t", "goal": "granted",
-        "bound1": "as printed", "digits1": "digits", "bound4": "errors carried on", "digits4": "digits",
-        "bound5": "inputs forgotten", "digits5": "digits",
+        "bound1": "as printed", "digits1": "digits", "bound4": "mended", "digits4": "digits",
+        "bound5": "forgotten", "digits5": "digits",
     },
     reference=_kalman_reference,
     formulas=("bound1", "a1", "b1", "a3", "b3", "a4", "b4", "memory", "b5"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import asdict
 from html import escape
 from importlib.resources import files
@@ -95,7 +96,7 @@ def _field(calculator: Calculator, each: Input) -> str:
             f'<div class="calculator-field"><label for="{name}">{label}</label>'
             f'<select id="{name}" name="{each.name}">{options}</select></div>'
         )
-    ends = f"from {each.least:g} to {each.most:g}"
+    ends = re.sub(r"e\+?(-?)0*", r"e\1", f"from {each.least:g} to {each.most:g}")
     low, high = (math.log10(end) if each.log else end for end in each.slider)
     step = 1 if each.whole and not each.log else 0.01 if each.log else (high - low) / 1000
     kind = "a whole number" if each.whole else "a number"
