@@ -67,8 +67,10 @@ def rounded(expression: sp.Expr, known: dict[str, tuple[mpmath.mpf, mpmath.mpf]]
         if sum(map(abs, values)) < 2**53 and mpmath.fprod(values) < 2**53:
             return whole, mpmath.mpf(0)
     if isinstance(expression, sp.Add):
-        sizes = sum(abs(v) for v in values)
-        return sum(values), sum(errors) + len(args) * U * sizes
+        sizes = abs(sum(values)) + sum(errors) if len(args) == 2 else len(args) * sum(abs(v) for v in values)
+        return sum(values), sum(errors) + U * sizes
+    if isinstance(expression, sp.Mul) and len(args) == 2 and values[0] == -1:
+        return -values[1], errors[1]
     if isinstance(expression, sp.Mul):
         grown = mpmath.fprod(abs(v) + e for v, e in args) * (1 + len(args) * U)
         return mpmath.fprod(values), grown - mpmath.fprod(abs(v) for v in values)
