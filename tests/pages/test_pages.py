@@ -26,10 +26,10 @@ def test_every_formula_is_rendered(page):
 
 
 def test_no_formula_or_table_is_left_as_typed(page):
-    """An output that is not parsed as MyST shows its dollars and bars; code is meant to."""
+    """An output that is not parsed as MyST shows its dollars and bars; code is meant to, and a script is not seen."""
     text = page.locator("main").evaluate(
-        "e => { e = e.cloneNode(true); e.querySelectorAll('pre, code, dt, mjx-container').forEach(x => x.remove());"
-        " return e.textContent }"
+        "e => { e = e.cloneNode(true);"
+        " e.querySelectorAll('pre, code, dt, script, mjx-container').forEach(x => x.remove()); return e.textContent }"
     )
     assert [line for line in text.splitlines() if "$" in line or "| --" in line or "| —" in line] == []
 

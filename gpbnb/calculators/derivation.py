@@ -1,0 +1,217 @@
+"""The expressions behind the calculators, taken from the derivations of the chapters; and what is new, derived here."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import sympy as sp
+from sympy.codegen.cfunctions import expm1
+
+from gpbnb.calculators.javascript import Definition, stable, symbol
+from gpbnb.derivation import Derivation, Step, over
+from gpbnb.integration import derivation as integration
+from gpbnb.kalman import derivation as kalman
+from gpbnb.rolling import derivation as rolling
+from gpbnb.rounding import derivation as rounding
+
+Definitions = tuple[Definition, ...]
+
+DAY = 86400
+"""In seconds."""
+
+
+def step(derivation: Derivation, begins: str) -> Step:
+    """Return the one step whose name begins so.
+
+    Raises
+    ------
+    ValueError : there is none, or more than one.
+    """
+    found = [each for each in derivation.steps if each.name.startswith(begins)]
+    if len(found) != 1:
+        raise ValueError(f"got {len(found)} steps that begin with {begins!r}; needed one; name more of it")
+    return found[0]
+
+
+def named(expression: Any, **names: str) -> Any:
+    """Return the expression with all of its symbols, found by their own names, under the names of a calculator.
+
+    Raises
+    ------
+    ValueError : a symbol is not there, or one that is there has got no name.
+    """
+    old = {each.name: each for each in expression.free_symbols}
+    if old.keys() != names.keys():
+        raise ValueError(
+            f"got names for {', '.join(sorted(names))} of {expression}; needed them for {', '.join(sorted(old))}"
+        )
+    return expression.doit().subs({old[name]: symbol(new) for name, new in names.items()}, simultaneous=True)
+
+
+def _either(nearest: sp.Expr, chopped: sp.Expr) -> sp.Expr:
+    return sp.Piecewise((nearest, sp.Eq(symbol("chop"), 0)), (chopped, True))
+
+
+# -- the unit of rounding --------------------------------------------------------------------------
+
+
+@cache
+def unit() -> sp.Expr:
+    """Return β of (8) and (13), of b, t and chop."""
+    steps = rounding.one_rounding()
+    return _either(*(named(step(steps, number).right, b="b", t="t") for number in ("(8)", "(13)")))
+
+
+def chopped() -> Derivation:
+    """The sharper bound of one rounding for chopping, which drops :math:`v b^{e-t}`, v < 1, written as 1/(1 + s)."""
+    b, t, e, beta, s = sp.symbols("b t e beta s", positive=True)
+    v = 1 / (1 + s)
+    return Derivation(
+        (
+            Step(
+                "a dropped $vb^{e-t}$ over the least number that had it",
+                over(v * b ** (e - t), b ** (e - 1) + v * b ** (e - t)),
+                over(v * b ** (1 - t), 1 + v * b ** (1 - t)),
+            ),
+            Step(
+                "which is largest for $v\\to1$",
+                over(beta, 1 + beta),
+                over(v * beta, 1 + v * beta),
+                s * beta / ((1 + beta) * (1 + s + beta)),
+            ),
+        )
+    )
+
+
+@cache
+def rounding_unit() -> Definitions:
+    """β of one rounding, the sharper bound, and n roundings: to first order, then to every order."""
+    b, t, beta = symbol("b"), symbol("t"), symbol("beta")
+    sharper = named(step(rounding.one_rounding(), "sharper").right, b="b", t="t").subs(b ** (1 - t), 2 * beta)
+    steps = rounding.roundings()
+    first = named(step(steps, "first order").right, k="n") * beta
+    (gamma,) = (named(term, k="n", beta="beta") for term in step(steps, "$1+\\gamma_k$").left.args if term.free_symbols)
+    return (
+        Definition("beta", unit()),
+        Definition("sharper", sharper),
+        Definition("total", first),
+        Definition("gamma", sp.Piecewise((gamma, symbol("total") < 1), (sp.nan, True)), shown=gamma),
+    )
+
+
+# -- the bound of the Kalman filter ----------------------------------------------------------------
+
+
+def forgotten() -> Derivation:
+    r"""Inputs that a closed loop of norm f < 1 forgets: :math:`\|T_i\| \le f^{k-i}\|u\|`, and no a_i is above a_0."""
+    k, f = sp.Symbol("k", integer=True, positive=True), sp.Symbol("f", positive=True)
+    j = sp.Symbol("j", integer=True, nonnegative=True)
+    start = kalman.count_start(kalman.ONCE[0], kalman.GROWTH)
+    later = kalman.count_input(*kalman.ONCE, kalman.GROWTH).subs(kalman.NTH, j + 1)
+    return Derivation(
+        (
+            Step("sum of $f^{k-i}$: one more step", f * over(1 - f**k, 1 - f) + 1, over(1 - f ** (k + 1), 1 - f)),
+            Step("$a_0$ is not below $a_i$, $i = j+1$", start, later, sp.expand(start - later)),
+        )
+    )
+
+
+MENDED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
+    (name, sp.factor(kalman.count_start(c, g)), sp.factor(kalman.second_coefficient(c, d, g, sign)))
+    for name, (c, d), g, sign in (
+        ("as printed", kalman.TWICE, sp.S.Zero, -1),
+        ("counted once", kalman.ONCE, sp.S.Zero, -1),
+        ("and signs free", kalman.ONCE, sp.S.Zero, 1),
+        ("and errors carried on", kalman.ONCE, kalman.GROWTH, 1),
+    )
+)
+"""The name in ``gpbnb.kalman.theory.MENDINGS``, then the coefficients of ‖x‖ and of B."""
+
+
+@cache
+def kalman_bound() -> Definitions:
+    """(125) as printed, mended three times, and with inputs forgotten: coefficients, bound, and digits for a goal."""
+    f, k, x, u, beta, digits = map(symbol, ("f", "k", "x", "u", "beta", "digits"))
+    result = [Definition("beta", unit())]
+    pairs = [(named(a, k="k", n="n", m="m"), named(b, k="k", n="n", m="m")) for _, a, b in MENDED]
+    memory = sp.Piecewise((-expm1(k * sp.log(f)) / (1 - f), f < 1), (k, True))
+    result.append(Definition("memory", memory, shown=(1 - f**k) / (1 - f)))
+    pairs.append((pairs[-1][0], sp.Min(symbol("b4"), 2 * symbol("a5") * symbol("memory"))))
+    for i, (first, second) in enumerate(pairs, 1):
+        a, b, size = symbol(f"a{i}"), symbol(f"b{i}"), symbol(f"size{i}")
+        result += [
+            Definition(f"a{i}", first),
+            Definition(f"b{i}", second),
+            Definition(f"size{i}", a * x + b * u),
+            Definition(f"bound{i}", beta * size, shown=beta * (a * x + b * u)),
+            Definition(f"digits{i}", size * unit().subs(symbol("t"), digits) <= symbol("goal"), digits),
+        ]
+    return tuple(result)
+
+
+# -- off-tuned deroll ------------------------------------------------------------------------------
+
+
+@cache
+def across() -> sp.Expr:
+    """Return the drift across a drift of 1 that a least-squares fit finds, of the phase error at the end.
+
+    It is the step of the chapter, with :math:`\\sin\\Delta t` for its first order :math:`\\Delta t`.
+    """
+    fit = step(rolling.fits(), "off-tuned").left
+    (k,) = (each for each in fit.function.free_symbols if each.name == "k")
+    moved = fit.function / k / (rolling.OFF * rolling.TIME) * sp.sin(rolling.OFF * rolling.TIME)
+    at = {rolling.T: sp.S.One, rolling.OFF: symbol("phase")}
+    return sp.simplify(sp.integrate(sp.expand(moved.subs(at)), (rolling.TIME, 0, 1), conds="none"))
+
+
+@cache
+def strength() -> sp.Expr:
+    """Return what is left at the end of a signal in one dimension, (11), over what there was."""
+    low = sp.Add(*(term for term in step(rolling.one_dimension(), "(10)").right.args if not term.has(rolling.ROLL)))
+    return (low / low.subs(rolling.OFF, 0)).subs(rolling.OFF * rolling.TIME, symbol("phase"))
+
+
+def lost() -> Derivation:
+    """The share that is lost, without a difference of numbers that are nearly equal."""
+    return Derivation((Step("the share lost", 1 - strength(), 2 * sp.sin(symbol("phase") / 2) ** 2),))
+
+
+@cache
+def off_tuned() -> Definitions:
+    """The error of a roll rate kept in t digits, at worst, and what a deroll with it does to a record."""
+    period, duration, drift, b, rate, error, phase = map(
+        symbol, ("period", "duration", "drift", "b", "rate", "error", "phase")
+    )
+    steps = rounding.one_rounding()
+    dropped = _either(*(named(step(steps, number).left.args[0], b="b", t="t", e="e") for number in ("(8)", "(13)")))
+    return (
+        Definition("rate", 2 * sp.pi / period),
+        Definition("e", sp.floor(sp.log(rate) / sp.log(b)) + 1),
+        Definition("error", dropped),
+        Definition("beat", 2 * sp.pi / error / (365 * DAY)),
+        Definition("phase", error * duration * DAY),
+        Definition("lost", lost().steps[0].right, shown=1 - strength()),
+        Definition("across", drift * stable(across(), phase, 2), shown=drift * across()),
+    )
+
+
+# -- digital integration ---------------------------------------------------------------------------
+
+
+@cache
+def random_walk() -> Definitions:
+    """(35), (39) and their quotient."""
+    sigma, omega, rate, mu, walk, exact, printed = map(
+        symbol, ("sigma", "omega", "rate", "mu", "walk", "exact", "printed")
+    )
+    small = step(integration.small_mu(), "(38) to (39)").right
+    plain = named(integration.walk(), mu="mu")
+    return (
+        Definition("mu", omega / rate),
+        Definition("walk", stable(plain, mu, 4), shown=plain),
+        Definition("exact", sigma * sp.sqrt(walk / rate)),
+        Definition("printed", named(small, omega="omega", f_c="rate", sigma_x="sigma")),
+        Definition("ratio", printed / exact),
+    )
