@@ -11,7 +11,19 @@
 
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, rows, summary
 from gpbnb.ledger.inventory import Entry, load_inventory, select
-from gpbnb.ledger.page import CHAPTERS, Html, links, of_kind, of_topic, searchable, told, topics, undone
+from gpbnb.ledger.page import (
+    CHAPTERS,
+    Html,
+    count_table,
+    links,
+    of_ids,
+    of_kind,
+    of_topic,
+    searchable,
+    told,
+    topics,
+    undone,
+)
 from gpbnb.ledger.render import summary_table, table
 
 __all__ = [
@@ -20,10 +32,12 @@ __all__ = [
     "Entry",
     "Html",
     "Row",
+    "count_table",
     "counts",
     "examine",
     "links",
     "load_inventory",
+    "of_ids",
     "of_kind",
     "of_topic",
     "rows",

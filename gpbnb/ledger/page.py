@@ -13,7 +13,7 @@ from gpbnb.findings import Verdict
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, in_reading_order, load_checks
 from gpbnb.ledger.inventory import Entry, load_inventory
 from gpbnb.ledger.render import OUTCOMES, describe, section_name
-from gpbnb.tables import one_line
+from gpbnb.tables import Table, one_line
 
 CHAPTERS = {
     "rounding": "Rounding bounds",
@@ -91,11 +91,65 @@ def of_kind(kind: str) -> tuple[Row, ...]:
     chosen = [entry for entry in inventory if entry.kind == kind]
     if not chosen:
         raise ValueError(f"no entry of kind {kind!r}; here are: {', '.join({e.kind: 0 for e in inventory})}")
+    return in_reading_order(_checked(chosen, inventory))
+
+
+def of_ids(*ids: str) -> tuple[Row, ...]:
+    """Run the checks of the entries with these ids, in this order.
+
+    Raises
+    ------
+    ExceptionGroup : checks raised.
+    KeyError : the inventory has no such id.
+    """
+    inventory = load_inventory()
+    by_id = {entry.id: entry for entry in inventory}
+    for key in ids:
+        if key not in by_id:
+            raise KeyError(f"no entry {key!r} in the inventory; correct the id")
+    return _checked([by_id[key] for key in ids], inventory)
+
+
+def _checked(chosen: Sequence[Entry], inventory: Sequence[Entry]) -> tuple[Row, ...]:
     found = examine(chosen, load_checks(inventory))
     errors = list(dict.fromkeys(row.error for row in found if row.error))
     if errors:
-        raise ExceptionGroup(f"checks of entries of kind {kind!r} failed", errors)
-    return in_reading_order(found)
+        raise ExceptionGroup(f"checks of {sum(row.error is not None for row in found)} entries failed", errors)
+    return found
+
+
+def count_table(rows: Iterable[Row], by: str) -> Table:
+    """Tabulate the counts of `rows`: a line a document, chapter or kind, a column an outcome, and the sums.
+
+    Parameters
+    ----------
+    rows : what to count.
+    by : ``document``, ``chapter`` (of this book) or ``kind``.
+
+    Raises
+    ------
+    ValueError : `by` is something else.
+    """
+    rows = in_reading_order(rows)
+    owner = topics()
+    groups: dict[str, Callable[[Row], str]] = {
+        "document": lambda row: row.entry.document,
+        "chapter": lambda row: _title(owner.get(row.entry.id, "-")),
+        "kind": lambda row: row.entry.kind,
+    }
+    if by not in groups:
+        raise ValueError(f"by={by!r}; take one of {', '.join(groups)}")
+    total = counts(rows)
+    inside: dict[str, list[Row]] = {}
+    for row in rows:
+        inside.setdefault(groups[by](row), []).append(row)
+    body = [
+        (name, *(str(counts(some).get(outcome, 0)) for outcome in total), str(len(some)))
+        for name, some in inside.items()
+    ]
+    body.append(("all", *map(str, total.values()), str(len(rows))))
+    header = (by.capitalize(), *map(_label, total), "entries")
+    return Table(f"Counts of {len(rows)} entries by {by}", header, tuple(body))
 
 
 def told(rows: Iterable[Row], *ids: str) -> tuple[Row, ...]:
