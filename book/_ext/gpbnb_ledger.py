@@ -21,6 +21,12 @@ def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
         labels[entry.id.lower()] = (PAGE, entry.id, title)
 
 
+def ask_for_mathjax(app: Sphinx, doctree: nodes.document) -> None:
+    """Have MathJax on pages whose only formulas are in HTML outputs."""
+    if any('class="math' in node.astext() for node in doctree.findall(nodes.raw)):
+        app.env.get_domain("math").data["has_equations"][app.env.docname] = True
+
+
 def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     """Where all pages are one, lead the links of HTML outputs to places within it."""
     if app.builder.name != "singlehtml":
@@ -36,6 +42,7 @@ def _within(match: re.Match) -> str:
 
 
 def setup(app: Sphinx) -> dict:
+    app.connect("doctree-read", ask_for_mathjax)
     app.connect("env-updated", add_labels)
     app.connect("doctree-resolved", mend_links)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,4 +1,5 @@
-// Search and filters above the tables of the ledger. Loaded before MathJax, which takes the source of formulas away.
+// Search and filters above the tables of the ledger, and formulas set as they come into sight. Without this script the
+// page is the same, all rows in sight. It runs before MathJax, which takes the source of formulas out of the text.
 const GREEK = { α: "alpha", β: "beta", γ: "gamma", δ: "delta", ε: "epsilon", η: "eta", θ: "theta", μ: "mu", σ: "sigma", φ: "varphi", ω: "omega" };
 const plain = (text) => text.toLowerCase().replace(/[α-ω]/g, (letter) => GREEK[letter] ?? letter);
 
@@ -9,7 +10,7 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     return [...table.tBodies[0].rows].map((row) => ({
       row,
       text: plain(`${row.id} ${row.textContent} ${name}`),
-      values: { document: [name, `${name} ${part}`], ...row.dataset },
+      values: { ...row.dataset, document: [name, `${name} ${part}`] },
     }));
   });
   const filters = [...form.querySelectorAll("select")];
@@ -26,9 +27,10 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     for (const table of tables) table.hidden = !table.querySelector("tbody tr:not([hidden])");
     count.value = `${shown} of ${rows.length} entries shown`;
   };
-  const target = () => rows.find(({ row }) => row.id === decodeURIComponent(location.hash.slice(1)))?.row;
+  // A link to an entry that is filtered away shows everything again.
   const lead = () => {
-    const row = target();
+    const id = decodeURIComponent(location.hash.slice(1));
+    const row = rows.find((each) => each.row.id === id)?.row;
     if (row?.hidden) form.reset();
     row?.scrollIntoView();
   };
@@ -40,8 +42,45 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     show();
   });
   window.addEventListener("hashchange", lead);
-  // Formulas move the rows when they are set.
-  window.addEventListener("load", () => window.MathJax?.startup?.promise?.then(lead));
   form.hidden = false;
   show();
+  setFormulas(rows.map(({ row }) => row), lead);
+}
+
+// Hundreds of formulas set at once stop the page for seconds: rows near the window come first, the others a few at a time.
+function setFormulas(rows, whenReady) {
+  const waiting = new Map();
+  for (const row of rows) {
+    const formulas = [...row.querySelectorAll("span.math")];
+    for (const formula of formulas) formula.classList.remove("math");
+    if (formulas.length) waiting.set(row, formulas);
+  }
+  const near = new Set();
+  const watch = new IntersectionObserver(
+    (seen) => {
+      for (const { isIntersecting, target } of seen) isIntersecting ? near.add(target) : near.delete(target);
+    },
+    { rootMargin: "100%" },
+  );
+  for (const row of waiting.keys()) watch.observe(row);
+
+  const set = async () => {
+    whenReady();
+    while (waiting.size) {
+      const order = [...[...near].filter((row) => waiting.has(row)), ...waiting.keys()];
+      const first = [...new Set(order)].slice(0, 8);
+      const formulas = first.flatMap((row) => waiting.get(row));
+      for (const row of first) {
+        waiting.delete(row);
+        watch.unobserve(row);
+      }
+      for (const formula of formulas) formula.classList.add("math");
+      await MathJax.typesetPromise(formulas);
+      await new Promise((resolve) => setTimeout(resolve));
+    }
+  };
+  // Whoever waits for MathJax, a printer say, waits for these formulas too.
+  document.addEventListener("DOMContentLoaded", () => {
+    if (window.MathJax?.startup?.promise) MathJax.startup.promise = MathJax.startup.promise.then(set);
+  });
 }

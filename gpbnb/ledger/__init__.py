@@ -22,7 +22,6 @@ from gpbnb.ledger.page import (
     searchable,
     told,
     topics,
-    undone,
 )
 from gpbnb.ledger.render import summary_table, table
 
@@ -32,6 +31,7 @@ __all__ = [
     "Entry",
     "Html",
     "Row",
+    "brief",
     "count_table",
     "counts",
     "examine",
@@ -48,5 +48,4 @@ __all__ = [
     "table",
     "told",
     "topics",
-    "undone",
 ]

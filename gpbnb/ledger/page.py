@@ -180,7 +180,7 @@ def searchable(rows: Iterable[Row]) -> Html:
     rows = in_reading_order(rows)
     owner = topics()
     tables = [
-        _table(document, chapter, tuple(inside), owner)
+        _part(document, chapter, tuple(inside), owner)
         for (document, chapter), inside in groupby(rows, lambda row: (row.entry.document, row.entry.chapter))
     ]
     html = f'<div class="ledger">\n{_form(rows, owner)}\n{"".join(tables)}</div>'
@@ -200,54 +200,62 @@ def links(rows: Iterable[Row]) -> Html:
     )
 
 
-def undone(rows: Iterable[Row]) -> Html:
-    """Tabulate what the documents leave undone beside the answer: place, what, verdict, answer, where."""
+def brief(rows: Iterable[Row], left_undone: bool = False) -> Html:
+    """Tabulate some rows, in their order, with links to their places in the complete ledger.
+
+    Parameters
+    ----------
+    rows : which.
+    left_undone : whether to call the columns as for what the documents leave undone.
+    """
     rows = tuple(rows)
     owner = topics()
-    body = [
-        (
-            f'<a href="{_address(row.entry)}">{escape(_document(row.entry.document, row.entry.chapter))}</a>'
-            f"<br>{_text(row.entry.item)}",
-            escape(_outcome(row)),
-            _text(row.entry.printed),
-            _found(row, "recomputed"),
-            _note(row, owner),
-        )
-        for row in rows
-    ]
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("Item", "Verdict", "Left undone", "Our answer", "Where"))
-    lines = "\n".join(_line("<tr>", cells) for cells in body)
-    html = (
-        '<div class="ledger">\n<table class="ledger-table">\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{lines}\n</tbody>\n</table>\n</div>"
-    )
-    return Html(f"{len(rows)} items left undone: {describe(counts(rows)) or 'none'}", html)
-
-
-def _table(document: str, chapter: str, rows: Sequence[Row], owner: dict[str, str]) -> str:
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("Item", "Verdict", "Printed", "Recomputed", "Note"))
     lines = []
     for row in rows:
         entry = row.entry
-        section = section_name(entry.chapter, entry.section)
+        place = section_name(entry.chapter, entry.section)
+        item = f'<a href="{_address(entry)}">{_text(entry.item)}</a><br>{entry.document}, {escape(place)}'
+        lines.append(_line("<tr>", item, row, owner))
+    content = _table("ledger-table ledger-undone" if left_undone else "ledger-table", "", lines, left_undone)
+    return Html(f"{len(rows)} entries: {describe(counts(rows)) or 'none'}", f'<div class="ledger">\n{content}</div>')
+
+
+def _part(document: str, chapter: str, rows: Sequence[Row], owner: dict[str, str]) -> str:
+    lines = []
+    for row in rows:
+        entry = row.entry
         start = (
             f'<tr id="{escape(entry.id)}" data-kind="{entry.kind}" data-verdict="{escape(_outcome(row))}" '
             f'data-chapter="{owner.get(entry.id, "")}">'
         )
+        section = section_name(entry.chapter, entry.section)
         item = f'<a href="#{escape(entry.id)}">{_text(entry.item)}</a><br>{escape(section)}, {entry.kind}'
-        cells = (item, escape(_outcome(row)), _text(entry.printed), _found(row, "recomputed"), _note(row, owner))
-        lines.append(_line(start, cells))
-    caption = f"{_document(document, chapter)}: {len(rows)} {'entry' if len(rows) == 1 else 'entries'}"
+        lines.append(_line(start, item, row, owner))
+    number = f"{len(rows)} {'entry' if len(rows) == 1 else 'entries'}"
+    caption = f"<caption>{escape(_document(document, chapter))}: {number}</caption>\n"
+    return _table(f'ledger-table" data-document="{document}" data-part="{escape(chapter)}', caption, lines)
+
+
+def _table(classes: str, caption: str, lines: Sequence[str], left_undone: bool = False) -> str:
+    names = ("Left undone", "Our answer, and where") if left_undone else ("Printed", "Recomputed, and note")
+    head = "".join(f'<th scope="col">{name}</th>' for name in ("Item", "Verdict", *names))
     return (
-        f'<table class="ledger-table" data-document="{document}" data-part="{escape(chapter)}">\n'
-        f"<caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n"
+        f'<table class="{classes}">\n{caption}<thead><tr>{head}</tr></thead>\n'
         f"<tbody>\n{chr(10).join(lines)}\n</tbody>\n</table>\n"
     )
 
 
-def _line(start: str, cells: Sequence[str]) -> str:
-    first, *others = cells
-    return f'{start}<th scope="row">{first}</th>{"".join(f"<td>{cell}</td>" for cell in others)}</tr>'
+def _line(start: str, item: str, row: Row, owner: dict[str, str]) -> str:
+    """Write a row; what was recomputed, the note, and the chapter unless the note names it, share a cell."""
+    found, note = (_text(row.finding.recomputed), _text(row.finding.note)) if row.finding else ("", "")
+    topic = owner.get(row.entry.id, "")
+    link = _chapter_link(CHAPTERS[topic]) if topic in CHAPTERS else ""
+    if link not in note:
+        note = f"{note} [{link}]" if note else f"[{link}]"
+    return (
+        f'{start}<th scope="row">{item}</th><td>{escape(_outcome(row))}</td><td>{_text(row.entry.printed)}</td>'
+        f"<td>{f'<p>{found}</p>' if found else ''}<p>{note}</p></td></tr>"
+    )
 
 
 def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
@@ -295,18 +303,6 @@ def _label(outcome: str) -> str:
 
 def _outcome(row: Row) -> str:
     return _label(row.outcome)
-
-
-def _found(row: Row, field: str) -> str:
-    return _text(getattr(row.finding, field)) if row.finding else ""
-
-
-def _note(row: Row, owner: dict[str, str]) -> str:
-    """Write the note, and the link to the chapter of the check unless the note has it."""
-    note = _found(row, "note")
-    topic = owner.get(row.entry.id, "")
-    link = _chapter_link(CHAPTERS[topic]) if topic in CHAPTERS else ""
-    return note if not link or link in note else f"{note}{'<br>' if note else ''}Chapter {link}"
 
 
 def _chapter_link(title: str) -> str:
