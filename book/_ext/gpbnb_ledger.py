@@ -15,10 +15,11 @@ def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
     """Give each entry a label: the rows are HTML, in which Sphinx finds none."""
     if PAGE not in env.found_docs:
         return
-    labels = env.get_domain("std").labels
+    standard = env.get_domain("std")
     for entry in load_inventory():
         title = ", ".join(part for part in (entry.document, entry.chapter, entry.item) if part != "-")
-        labels[entry.id.lower()] = (PAGE, entry.id, title)
+        standard.labels[entry.id.lower()] = (PAGE, entry.id, title)
+        standard.anonlabels[entry.id.lower()] = (PAGE, entry.id)
 
 
 def ask_for_mathjax(app: Sphinx, doctree: nodes.document) -> None:

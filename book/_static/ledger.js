@@ -47,7 +47,7 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
   setFormulas(rows.map(({ row }) => row), lead);
 }
 
-// Hundreds of formulas set at once stop the page for seconds: rows near the window come first, the others a few at a time.
+// Hundreds of formulas set at once stop the page for seconds: rows near the window come first, the others 60 at a time.
 function setFormulas(rows, whenReady) {
   const waiting = new Map();
   for (const row of rows) {
@@ -67,8 +67,8 @@ function setFormulas(rows, whenReady) {
   const set = async () => {
     whenReady();
     while (waiting.size) {
-      const order = [...[...near].filter((row) => waiting.has(row)), ...waiting.keys()];
-      const first = [...new Set(order)].slice(0, 8);
+      const inSight = [...near].filter((row) => waiting.has(row));
+      const first = (inSight.length ? inSight : [...waiting.keys()]).slice(0, 60);
       const formulas = first.flatMap((row) => waiting.get(row));
       for (const row of first) {
         waiting.delete(row);

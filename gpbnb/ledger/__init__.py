@@ -14,6 +14,7 @@ from gpbnb.ledger.inventory import Entry, load_inventory, select
 from gpbnb.ledger.page import (
     CHAPTERS,
     Html,
+    brief,
     count_table,
     links,
     of_ids,
