@@ -1,4 +1,4 @@
-"""Labels of the ledger's rows, so that any page can say ``{ref}`hung1984.II.eq125```, and its links in a single page."""
+"""Labels of the ledger's rows, so that any page can name one in ``{ref}``, and MathJax and links for its HTML."""
 
 import re
 
