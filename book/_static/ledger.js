@@ -1,4 +1,4 @@
-// Search and filters above the tables of the ledger, and formulas set as they come into sight. Without this script the
+// Search and filters above the tables of the ledger, and formulas set as they come near. Without this script the
 // page is the same, all rows in sight. It runs before MathJax, which takes the source of formulas out of the text.
 const GREEK = { α: "alpha", β: "beta", γ: "gamma", δ: "delta", ε: "epsilon", η: "eta", θ: "theta", μ: "mu", σ: "sigma", φ: "varphi", ω: "omega" };
 const plain = (text) => text.toLowerCase().replace(/[α-ω]/g, (letter) => GREEK[letter] ?? letter);
@@ -27,27 +27,29 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     for (const table of tables) table.hidden = !table.querySelector("tbody tr:not([hidden])");
     count.value = `${shown} of ${rows.length} entries shown`;
   };
+  const showAll = () => {
+    for (const control of form.querySelectorAll("input, select")) control.value = "";
+    show();
+  };
   // A link to an entry that is filtered away shows everything again.
   const lead = () => {
     const id = decodeURIComponent(location.hash.slice(1));
     const row = rows.find((each) => each.row.id === id)?.row;
-    if (row?.hidden) form.reset();
+    if (row?.hidden) showAll();
     row?.scrollIntoView();
   };
 
   form.addEventListener("submit", (event) => event.preventDefault());
   form.addEventListener("input", show);
-  form.addEventListener("reset", () => {
-    for (const control of form.querySelectorAll("input, select")) control.value = "";
-    show();
-  });
+  form.querySelector("button").addEventListener("click", showAll);
   window.addEventListener("hashchange", lead);
   form.hidden = false;
   show();
   setFormulas(rows.map(({ row }) => row), lead);
 }
 
-// Hundreds of formulas set at once stop the page for seconds: rows near the window come first, the others 60 at a time.
+// More than a thousand formulas would stop the page for seconds: those of a row are set when it comes near the window,
+// and all before the page is printed.
 function setFormulas(rows, whenReady) {
   const waiting = new Map();
   for (const row of rows) {
@@ -55,32 +57,33 @@ function setFormulas(rows, whenReady) {
     for (const formula of formulas) formula.classList.remove("math");
     if (formulas.length) waiting.set(row, formulas);
   }
-  const near = new Set();
-  const watch = new IntersectionObserver(
-    (seen) => {
-      for (const { isIntersecting, target } of seen) isIntersecting ? near.add(target) : near.delete(target);
-    },
-    { rootMargin: "100%" },
-  );
-  for (const row of waiting.keys()) watch.observe(row);
-
-  const set = async () => {
-    whenReady();
-    while (waiting.size) {
-      const inSight = [...near].filter((row) => waiting.has(row));
-      const first = (inSight.length ? inSight : [...waiting.keys()]).slice(0, 60);
-      const formulas = first.flatMap((row) => waiting.get(row));
-      for (const row of first) {
-        waiting.delete(row);
-        watch.unobserve(row);
-      }
-      for (const formula of formulas) formula.classList.add("math");
-      await MathJax.typesetPromise(formulas);
-      await new Promise((resolve) => setTimeout(resolve));
+  const take = (near) => {
+    const formulas = near.flatMap((row) => waiting.get(row) ?? []);
+    for (const row of near) {
+      waiting.delete(row);
+      watch.unobserve(row);
+    }
+    for (const formula of formulas) formula.classList.add("math");
+    return formulas;
+  };
+  const reach = (formulas) => {
+    for (const box of formulas.map((formula) => formula.firstElementChild)) {
+      if (box && box.scrollWidth > box.clientWidth) box.tabIndex = 0;
     }
   };
-  // Whoever waits for MathJax, a printer say, waits for these formulas too.
-  document.addEventListener("DOMContentLoaded", () => {
-    if (window.MathJax?.startup?.promise) MathJax.startup.promise = MathJax.startup.promise.then(set);
+  let last = Promise.resolve();
+  const watch = new IntersectionObserver(
+    (seen) => {
+      const formulas = take(seen.filter((each) => each.isIntersecting).map((each) => each.target));
+      if (formulas.length) last = last.then(() => MathJax.typesetPromise(formulas)).then(() => reach(formulas));
+    },
+    { rootMargin: "150%" },
+  );
+  window.addEventListener("load", async () => {
+    await window.MathJax?.startup?.promise;
+    if (!window.MathJax?.typesetPromise) return;
+    whenReady();
+    for (const row of waiting.keys()) watch.observe(row);
+    window.addEventListener("beforeprint", () => MathJax.typeset(take([...waiting.keys()])));
   });
 }

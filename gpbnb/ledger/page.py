@@ -280,7 +280,7 @@ def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
     return (
         '<form class="ledger-form" role="search" aria-label="The ledger" hidden>\n'
         '<label>Search <input type="search" name="words" autocomplete="off" spellcheck="false"></label>\n'
-        f'{labels}<button type="reset">Show all</button>\n'
+        f'{labels}<button type="button">Show all</button>\n'
         '<output role="status" aria-live="polite"></output>\n</form>'
     )
 

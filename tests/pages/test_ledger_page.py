@@ -122,12 +122,19 @@ def test_a_link_to_a_hidden_entry_shows_it(page):
     assert 0 <= box["y"] < tools.SIZES["desktop"]["height"]
 
 
-def test_every_formula_of_the_ledger_is_set(page):
-    left = page.locator(".ledger span.notranslate").evaluate_all(
-        "all => all.filter(e => !e.querySelector('mjx-container') || e.querySelector('mjx-merror'))"
-        ".map(e => e.textContent)"
-    )
-    assert left == []
+UNSET = (
+    "all => all.filter(e => !e.querySelector('mjx-container') || e.querySelector('mjx-merror')).map(e => e.textContent)"
+)
+
+
+def test_formulas_are_set_when_they_come_near_and_all_before_printing(page):
+    formulas = page.locator(".ledger span.notranslate")
+    page.locator('input[name="words"]').fill("eq125")
+    page.locator('[id="hung1984.II.eq125"]').scroll_into_view_if_needed()
+    page.locator('[id="hung1984.II.eq125"] mjx-container').first.wait_for()
+    page.locator(".ledger-form button").click()
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert formulas.evaluate_all(UNSET) == []
     assert page.faults == []
 
 
