@@ -11,18 +11,42 @@
 
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, rows, summary
 from gpbnb.ledger.inventory import Entry, load_inventory, select
+from gpbnb.ledger.page import (
+    CHAPTERS,
+    Html,
+    brief,
+    count_table,
+    links,
+    of_ids,
+    of_kind,
+    of_topic,
+    searchable,
+    told,
+    topics,
+)
 from gpbnb.ledger.render import summary_table, table
 
 __all__ = [
+    "CHAPTERS",
     "TOPICS",
     "Entry",
+    "Html",
     "Row",
+    "brief",
+    "count_table",
     "counts",
     "examine",
+    "links",
     "load_inventory",
+    "of_ids",
+    "of_kind",
+    "of_topic",
     "rows",
+    "searchable",
     "select",
     "summary",
     "summary_table",
     "table",
+    "told",
+    "topics",
 ]

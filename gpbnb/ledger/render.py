@@ -13,7 +13,7 @@ from gpbnb.tables import Table, one_line
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
 _AGREES = {True: "true", False: "false", None: ""}
-_OUTCOMES = {MISSING: "no check", FAILED: "check failed"}
+OUTCOMES = {MISSING: "no check", FAILED: "check failed"}
 
 
 def to_csv(rows: Iterable[Row]) -> str:
@@ -78,24 +78,24 @@ def summary_table(rows: Iterable[Row]) -> Table:
     body = [
         (
             place.document,
-            _section(place.chapter, place.section),
+            section_name(place.chapter, place.section),
             *(str(inside.get(outcome, 0)) for outcome in total),
             str(sum(inside.values())),
         )
         for place, inside in summary(rows).items()
     ]
     body.append(("all", "", *map(str, total.values()), str(len(rows))))
-    header = ("Document", "Section", *(_OUTCOMES.get(outcome, outcome) for outcome in total), "entries")
+    header = ("Document", "Section", *(OUTCOMES.get(outcome, outcome) for outcome in total), "entries")
     return Table(f"{_title(rows)}; by section", header, tuple(body))
 
 
 def describe(counted: dict[str, int]) -> str:
     """Say `counted` in words, as in ``3 verified, 1 no check``."""
-    return ", ".join(f"{number} {_OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
+    return ", ".join(f"{number} {OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
 
 
 def _outcome(row: Row) -> str:
-    return _OUTCOMES.get(row.outcome, row.outcome)
+    return OUTCOMES.get(row.outcome, row.outcome)
 
 
 def _title(rows: tuple[Row, ...]) -> str:
@@ -103,10 +103,11 @@ def _title(rows: tuple[Row, ...]) -> str:
 
 
 def _place(entry: Entry) -> str:
-    return f"{entry.document}, {_section(entry.chapter, entry.section)}: {entry.item}"
+    return f"{entry.document}, {section_name(entry.chapter, entry.section)}: {entry.item}"
 
 
-def _section(chapter: str, section: str) -> str:
+def section_name(chapter: str, section: str) -> str:
+    """Name a section with its chapter, as in ``II.9.1``; ``-`` where there is neither."""
     return ".".join(part for part in (chapter, section) if part != "-") or "-"
 
 

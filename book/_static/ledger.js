@@ -1,0 +1,89 @@
+// Search and filters above the tables of the ledger, and formulas set as they come near. Without this script the
+// page is the same, all rows in sight. It runs before MathJax, which takes the source of formulas out of the text.
+const GREEK = { α: "alpha", β: "beta", γ: "gamma", δ: "delta", ε: "epsilon", η: "eta", θ: "theta", μ: "mu", σ: "sigma", φ: "varphi", ω: "omega" };
+const plain = (text) => text.toLowerCase().replace(/[α-ω]/g, (letter) => GREEK[letter] ?? letter);
+
+for (const form of document.querySelectorAll("form.ledger-form")) {
+  const tables = [...form.parentElement.querySelectorAll("table")];
+  const rows = tables.flatMap((table) => {
+    const { document: name, part } = table.dataset;
+    return [...table.tBodies[0].rows].map((row) => ({
+      row,
+      text: plain(`${row.id} ${row.textContent} ${name}`),
+      values: { ...row.dataset, document: [name, `${name} ${part}`] },
+    }));
+  });
+  const filters = [...form.querySelectorAll("select")];
+  const count = form.querySelector("output");
+
+  const show = () => {
+    const words = plain(form.elements.words.value).split(/\s+/);
+    let shown = 0;
+    for (const { row, text, values } of rows) {
+      const fits = filters.every(({ name, value }) => !value || [values[name]].flat().includes(value));
+      row.hidden = !fits || !words.every((word) => text.includes(word));
+      shown += !row.hidden;
+    }
+    for (const table of tables) table.hidden = !table.querySelector("tbody tr:not([hidden])");
+    count.value = `${shown} of ${rows.length} entries shown`;
+  };
+  const showAll = () => {
+    for (const control of form.querySelectorAll("input, select")) control.value = "";
+    show();
+  };
+  // A link to an entry that is filtered away shows everything again.
+  const lead = () => {
+    const id = decodeURIComponent(location.hash.slice(1));
+    const row = rows.find((each) => each.row.id === id)?.row;
+    if (row?.hidden) showAll();
+    row?.scrollIntoView();
+  };
+
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.addEventListener("input", show);
+  form.querySelector("button").addEventListener("click", showAll);
+  window.addEventListener("hashchange", lead);
+  form.hidden = false;
+  show();
+  setFormulas(rows.map(({ row }) => row), lead);
+}
+
+// More than a thousand formulas would stop the page for seconds: those of a row are set when it comes near the window,
+// and all before the page is printed.
+function setFormulas(rows, whenReady) {
+  const waiting = new Map();
+  for (const row of rows) {
+    const formulas = [...row.querySelectorAll("span.math")];
+    for (const formula of formulas) formula.classList.remove("math");
+    if (formulas.length) waiting.set(row, formulas);
+  }
+  const take = (near) => {
+    const formulas = near.flatMap((row) => waiting.get(row) ?? []);
+    for (const row of near) {
+      waiting.delete(row);
+      watch.unobserve(row);
+    }
+    for (const formula of formulas) formula.classList.add("math");
+    return formulas;
+  };
+  const reach = (formulas) => {
+    for (const box of formulas.map((formula) => formula.firstElementChild)) {
+      if (box && box.scrollWidth > box.clientWidth) box.tabIndex = 0;
+    }
+  };
+  let last = Promise.resolve();
+  const watch = new IntersectionObserver(
+    (seen) => {
+      const formulas = take(seen.filter((each) => each.isIntersecting).map((each) => each.target));
+      if (formulas.length) last = last.then(() => MathJax.typesetPromise(formulas)).then(() => reach(formulas));
+    },
+    { rootMargin: "150%" },
+  );
+  window.addEventListener("load", async () => {
+    await window.MathJax?.startup?.promise;
+    if (!window.MathJax?.typesetPromise) return;
+    whenReady();
+    for (const row of waiting.keys()) watch.observe(row);
+    window.addEventListener("beforeprint", () => MathJax.typeset(take([...waiting.keys()])));
+  });
+}

@@ -1,0 +1,189 @@
+"""The searchable ledger in a real browser: search, filters, keyboard, links, phone, paper, and without scripts."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from . import browser as tools
+
+ERRATA = "book/errata.html"
+pytestmark = pytest.mark.skipif(not (tools.HTML / ERRATA).is_file(), reason="the book has no errata page")
+EMPTY = "[...document.querySelectorAll('.ledger table[data-part]')].filter(t => t.offsetHeight).map(t => t.innerText)"
+SHOWN = "document.querySelectorAll('.ledger tbody tr[id]:not([hidden])').length"
+
+
+@pytest.fixture(scope="module")
+def page(open_page):
+    with open_page(ERRATA) as page:
+        yield page
+
+
+@pytest.fixture(autouse=True)
+def reset(page):
+    yield
+    page.set_viewport_size(tools.SIZES["desktop"])
+    page.emulate_media(media="screen")
+    page.locator(".ledger-form button").click()
+
+
+def count(page):
+    """What the page says, checked against the rows that are there to be seen."""
+    said = page.locator(".ledger-form output").text_content()
+    shown, every = map(int, re.fullmatch(r"(\d+) of (\d+) entries shown", said).groups())
+    assert shown == page.evaluate(SHOWN)
+    assert every == page.locator(".ledger tbody tr[id]").count()
+    return shown, every
+
+
+def test_everything_is_shown_at_first(page):
+    shown, every = count(page)
+    assert shown == every > 400
+
+
+@pytest.mark.parametrize("name", ["document", "verdict", "kind", "chapter"])
+def test_each_choice_shows_as_many_entries_as_it_says(page, name):
+    select = page.locator(f'.ledger-form select[name="{name}"]')
+    for option in select.locator("option").all()[1:]:
+        select.select_option(option.get_attribute("value"))
+        assert count(page)[0] == int(re.search(r"\((\d+)\)$", option.text_content())[1])
+    select.select_option("")
+    shown, every = count(page)
+    assert shown == every
+
+
+def test_filters_and_words_hold_together(page):
+    page.locator('select[name="document"]').select_option("hung1984")
+    page.locator('select[name="kind"]').select_option("equation")
+    both = page.evaluate(
+        "[...document.querySelectorAll('table[data-document=hung1984] tr[data-kind=equation]')].map(r => r.id)"
+    )
+    assert count(page)[0] == len(both)
+    page.locator('input[name="words"]').fill("EQ20 hung1984")
+    shown = page.evaluate("[...document.querySelectorAll('.ledger tbody tr[id]:not([hidden])')].map(r => r.id)")
+    assert shown == [row for row in both if "eq20" in row.lower()]
+    assert "hung1984.II.eq20" in shown
+
+
+def test_formulas_are_found_as_typed_and_by_greek_letter(page):
+    words = page.locator('input[name="words"]')
+    words.fill(r"\beta")
+    tex, _ = count(page)
+    words.fill("β")
+    letter, _ = count(page)
+    assert letter >= tex > 20
+
+
+def test_nothing_found_leaves_no_empty_table(page):
+    page.locator('input[name="words"]').fill("zzzz")
+    assert count(page)[0] == 0
+    assert page.evaluate(EMPTY) == []
+
+
+def test_the_count_is_announced(page):
+    output = page.locator(".ledger-form output")
+    assert output.get_attribute("aria-live") == "polite"
+    assert output.get_attribute("role") == "status"
+
+
+def test_the_keyboard_alone_searches_filters_and_resets(page):
+    words = page.locator('input[name="words"]')
+    words.focus()
+    page.keyboard.type("deroll")
+    found, every = count(page)
+    assert 0 < found < every
+    for name in ("document", "verdict", "kind", "chapter"):
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.name") == name
+        assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
+    page.keyboard.press("Tab")
+    page.keyboard.press("Enter")
+    assert count(page) == (every, every)
+    assert words.input_value() == ""
+
+
+def test_enter_in_the_search_box_stays_on_the_page(page):
+    words = page.locator('input[name="words"]')
+    words.fill("roll")
+    before = page.url
+    words.press("Enter")
+    assert page.url == before
+    assert words.input_value() == "roll"
+
+
+def test_a_link_to_a_hidden_entry_shows_it(page):
+    page.locator('input[name="words"]').fill("zzzz")
+    page.evaluate("location.hash = 'hung1982.IV.eq8'")
+    row = page.locator('[id="hung1982.IV.eq8"]')
+    row.wait_for(state="visible")
+    box = row.bounding_box()
+    assert 0 <= box["y"] < tools.SIZES["desktop"]["height"]
+
+
+UNSET = (
+    "all => all.filter(e => !e.querySelector('mjx-container') || e.querySelector('mjx-merror')).map(e => e.textContent)"
+)
+
+
+def test_formulas_are_set_when_they_come_near_and_all_before_printing(page):
+    formulas = page.locator(".ledger span.notranslate")
+    page.locator('input[name="words"]').fill("eq125")
+    page.locator('[id="hung1984.II.eq125"]').scroll_into_view_if_needed()
+    page.locator('[id="hung1984.II.eq125"] mjx-container').first.wait_for()
+    page.locator(".ledger-form button").click()
+    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+    assert formulas.evaluate_all(UNSET) == []
+    assert page.faults == []
+
+
+def test_nothing_is_cut_on_a_phone(page):
+    page.set_viewport_size(tools.SIZES["phone"])
+    assert page.evaluate("document.documentElement.scrollWidth") == tools.SIZES["phone"]["width"]
+    for box in page.locator(".ledger-form :is(input, select, button)").evaluate_all(
+        "all => all.map(e => { const b = e.getBoundingClientRect(); return [b.left, b.right] })"
+    ):
+        assert 0 <= box[0] < box[1] <= tools.SIZES["phone"]["width"]
+    page.locator('input[name="words"]').fill("zzzz")
+    assert page.evaluate(EMPTY) == []
+
+
+def test_paper_has_the_tables_and_no_form(page):
+    page.emulate_media(media="print")
+    assert not page.locator(".ledger-form").is_visible()
+    row = page.locator('[id="hung1984.II.eq20"]')
+    assert row.is_visible()
+    assert row.evaluate("e => getComputedStyle(e).display") == "table-row"
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+def test_it_works_from_the_file_system_and_without_scripts(open_page, page, scripts):
+    context = page.context.browser.new_context(java_script_enabled=scripts)
+    try:
+        other = context.new_page()
+        other.goto((tools.HTML / ERRATA).as_uri(), wait_until="domcontentloaded")
+        assert other.locator(".ledger-form").is_visible() == scripts
+        assert other.locator('[id="hung1984.II.eq125"]').is_visible()
+        if scripts:
+            other.locator('input[name="words"]').fill("zzzz")
+            assert other.locator(".ledger-form output").text_content().startswith("0 of ")
+    finally:
+        context.close()
+
+
+def test_other_pages_can_be_led_to_an_entry():
+    """The labels that Sphinx was given lead to rows that are there."""
+    notation = (tools.HTML / "book" / "notation.html").read_text(encoding="utf-8")
+    targets = set(re.findall(r'href="errata\.html#([^"]+)"', notation))
+    rows = set(re.findall(r'<tr id="([^"]+)"', (tools.HTML / ERRATA).read_text(encoding="utf-8")))
+    assert len(targets) > 20
+    assert targets <= rows
+
+
+def test_the_search_of_the_book_knows_the_ledger():
+    index = (tools.HTML / "searchindex.js").read_text(encoding="utf-8")
+    data = json.loads(index[index.index("{") : index.rindex("}") + 1])
+    errata = data["docnames"].index("book/errata")
+    places = data["terms"]["boresight"]
+    assert errata in (places if isinstance(places, list) else [places])
