@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.formats import Rounding
 from gpbnb.kalman import theory
+from gpbnb.kalman.answers import Answers, decimal_digits, end
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.experiment import Bounded, Form
 from gpbnb.kalman.year import Year
@@ -24,11 +24,6 @@ _QUANTITIES = {
     "covariance": "error / covariance, norms (no unit)",
 }
 _MARKERS = {Form.REPORT: "o", Form.SECOND: "P", Form.USUAL: "^", Form.JOSEPH: "s", Form.UD: "D"}
-
-
-def decimal_digits(fmt: FloatFormat) -> float:
-    """The t for which β = 0.5 × 10^(1-t), (8) of hung1984, ch. II, is the unit error of a format."""
-    return 1 - math.log10(2 * float(fmt.unit_roundoff))
 
 
 def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = None) -> list[Artist]:
@@ -111,7 +106,7 @@ def year_end(
     looks = [(form, rounding) for rounding in Rounding for form in Form]
     for form, rounding in looks:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), _end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        points = [(decimal_digits(fmt), end(run)) for run in group if (fmt := run.case.fmt) is not None]
         if points:
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
             name = f"{form}, {rounding.value}"
@@ -132,9 +127,19 @@ def year_end(
     return artists
 
 
-def _end(run: Year) -> float:
-    """The larger of the errors of angles and rates at the last step."""
-    return float(max(np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max()))
+def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
+    """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
+    lines = [
+        ("(125), printed formula", theory.coefficients(*theory.EXAMPLE)),
+        ("(125), all faults mended", theory.coefficients(*theory.EXAMPLE, **theory.MENDINGS["and errors carried on"])),
+    ]
+    marked: list[tuple[str, Sequence[float]]] = [
+        ("printed answers", found.printed),
+        ("formula", found.formula),
+        ("all faults mended", found.mended),
+        ("observed", [found.observed[Rounding.NEAREST]]),
+    ]
+    return year_end(found.runs, ax, found.goal, lines, marked)
 
 
 def contraction(found: Bounded, state: int, ax: Axes, name: str) -> list[Artist]:

@@ -10,6 +10,7 @@ from matplotlib.colors import to_hex
 from gpbnb import plotting
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles, figures, smallest, theory, year
+from gpbnb.kalman.answers import decimal_digits
 from gpbnb.kalman.experiment import Form, bounded
 from gpbnb.kalman.model import LinearModel
 
@@ -43,7 +44,7 @@ def colour(artist):
     [(FloatFormat(10, 7), 7), (FloatFormat(10, 7, Rounding.CHOP), 7 - np.log10(2)), (FloatFormat(2, 1), 1)],
 )
 def test_decimal_digits_invert_8(fmt, number):
-    found = figures.decimal_digits(fmt)
+    found = decimal_digits(fmt)
     assert found == pytest.approx(number, abs=1e-12)
     assert 0.5 * 10 ** (1 - found) == pytest.approx(float(fmt.unit_roundoff), rel=1e-12)
 
@@ -95,7 +96,7 @@ def test_year_end(ax, runs):
     artists = figures.year_end([runs[case] for case in cases], ax, 1.0, counts, answers)
     rounded, chopped, line, goal, *marks = artists
     ends = [max(np.abs(runs[case].drift[-1]).max(), np.abs(runs[case].rate[-1]).max()) for case in cases]
-    assert np.allclose(rounded.get_xdata(), [figures.decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)
+    assert np.allclose(rounded.get_xdata(), [decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)
     assert list(rounded.get_ydata()) == ends[:2]
     assert list(chopped.get_ydata()) == ends[2:]
     assert colour(rounded) == plotting.OBSERVED != colour(chopped)

@@ -1,0 +1,81 @@
+"""How many digits does a year need? The printed answers, the corrected ones, and the observed one."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import theory, year
+
+
+def decimal_digits(fmt: FloatFormat) -> float:
+    """The t for which β = 0.5 × 10^(1-t), (8) of hung1984, ch. II, is the unit error of a format."""
+    return 1 - math.log10(2 * float(fmt.unit_roundoff))
+
+
+def end(run: year.Year) -> float:
+    """The larger of the errors of drift angles (mas) and of their rates (mas/yr) at the end of a year."""
+    return float(max(np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max()))
+
+
+class Answers(NamedTuple):
+    """Decimal digits that a year asks for, by the two terms of (125) and by emulation."""
+
+    #: in mas and mas/yr, for what was observed.
+    goal: float
+    #: the emulated years of the usual model.
+    runs: tuple[year.Year, ...]
+    #: of the closing example.
+    printed: tuple[int, int]
+    #: what its formula gives.
+    formula: tuple[int, int]
+    #: the formula with all its faults mended.
+    mended: tuple[int, int]
+    #: the fewest with which an emulated year met the goal, of the formats that were run.
+    observed: dict[Rounding, float]
+
+
+def find(goal: float = 1.0) -> Answers:
+    """Collect the answers to the closing example of hung1984, ch. II, section 12.
+
+    Parameters
+    ----------
+    goal : largest error of drift angles and rates at the end of the year; mas and mas/yr, above 0.
+
+    Raises
+    ------
+    ValueError : no emulated year meets the goal, with one of the roundings.
+    """
+    runs = tuple(run for run in year.load() if run.case.model == year.MODELS[0])
+    observed = {}
+    for rounding in Rounding:
+        enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, goal)) is not None]
+        if not enough:
+            raise ValueError(
+                f"got a goal of {goal}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
+            )
+        observed[rounding] = min(enough)
+    mended = theory.coefficients(*theory.EXAMPLE, **theory.MENDINGS["and errors carried on"])
+    return Answers(
+        goal,
+        runs,
+        (int(theory.PRINTED["first digits"]), int(theory.PRINTED["second digits"])),
+        _both(theory.coefficients(*theory.EXAMPLE)),
+        _both(mended),
+        observed,
+    )
+
+
+def _good(run: year.Year, rounding: Rounding, goal: float) -> FloatFormat | None:
+    return run.case.fmt if run.case.rounding is rounding and end(run) <= goal else None
+
+
+def _best(runs: tuple[year.Year, ...]) -> float:
+    return max(min(end(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
+
+
+def _both(counts: theory.Coefficients) -> tuple[int, int]:
+    return theory.required_precision(counts.first), theory.required_precision(counts.second)

@@ -1,0 +1,47 @@
+"""gpbnb.kalman.answers: the digits that a year asks for."""
+
+from __future__ import annotations
+
+import pytest
+
+from gpbnb import plotting
+from gpbnb.formats import Rounding
+from gpbnb.kalman import answers, figures, theory, year
+
+
+def test_the_answers_are_those_of_the_example_and_of_the_years():
+    found = answers.find()
+    first, second = theory.coefficients(*theory.EXAMPLE)
+    for digits, coefficient in zip(found.formula, (first, second), strict=True):
+        assert coefficient * 0.5 * 10.0 ** (1 - digits) <= 1 < coefficient * 0.5 * 10.0 ** (2 - digits)
+    assert found.printed == (9, 17)
+    assert all(mended > formula for mended, formula in zip(found.mended, found.formula, strict=True))
+    for rounding, digits in found.observed.items():
+        met = [run for run in found.runs if run.case.rounding is rounding and answers.end(run) <= 1]
+        assert digits == min(answers.decimal_digits(run.case.fmt) for run in met)
+        fewer = [r for r in found.runs if r.case.rounding is rounding and answers.decimal_digits(r.case.fmt) < digits]
+        assert fewer
+        assert min(answers.end(run) for run in fewer) > 1
+
+
+def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
+    assert answers.find(100.0).observed[Rounding.NEAREST] < answers.find().observed[Rounding.NEAREST]
+    with pytest.raises(ValueError, match="needed one that some year meets: the best rounds to"):
+        answers.find(1e-12)
+
+
+def test_only_the_usual_model_counts():
+    assert {run.case.model for run in answers.find().runs} == {year.MODELS[0]}
+
+
+def test_the_picture_shows_each_answer_on_the_goal():
+    _, axes = plotting.figure()
+    found = answers.find()
+    figures.digits_needed(found, axes[0])
+    shown = {line.get_label(): line for line in axes[0].lines}
+    marked = {"printed answers": found.printed, "formula": found.formula, "all faults mended": found.mended}
+    for name, places in marked.items():
+        assert list(shown[name].get_xdata()) == list(places)
+        assert set(shown[name].get_ydata()) == {found.goal}
+    assert list(shown["observed"].get_xdata()) == [found.observed[Rounding.NEAREST]]
+    axes[0].figure.canvas.draw()
