@@ -37,7 +37,7 @@ def sensor(sigma_x: float, bandwidth_hz: float, unit: str, rates: Sequence[float
         )
     header = (
         "$f_c$, Hz",
-        "$\\mu$",
+        "ratio $\\mu$",
         f"(35), {unit}/√s",
         f"(39), {unit}/√s",
         "(39)/(35) − 1",

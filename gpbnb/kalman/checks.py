@@ -796,3 +796,10 @@ def remark_4() -> Finding:
 @CHECKS.add("hung1982.III.s13.remark-5")
 def remark_5() -> Finding:
     return left_open("the compensation data are not in the documents")
+
+
+@CHECKS.add("hung1984.II.s14.references")
+def references() -> Finding:
+    return unverifiable(
+        "", "six of the seven works cited are not among the documents; the seventh is the report of 1982"
+    )

@@ -23,8 +23,8 @@ def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
             body.append((name, case, *_cells(error)))
     header = (
         "register",
-        "$\\Delta\\omega$",
-        "rad/s",
+        "which $\\Delta\\omega$",
+        "$\\Delta\\omega$ (rad/s)",
         "phase after a year (rad)",
         "strength lost, one dimension",
         "drift across, two dimensions (mas a year)",
