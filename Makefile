@@ -81,6 +81,7 @@ exactness: .venv/made-for ## forty million operations compared with independent 
 bench: .venv/made-for ## timings against peers, side by side
 	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r benchmarks/environment.txt
 	$(PY) -m benchmarks
+	$(PY) -m benchmarks.year
 
 environment: .venv/made-for ## compile both environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
 	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group book --group test --group pages --group dev \

@@ -13,6 +13,7 @@ from gpbnb.ledger.inventory import Entry, load_inventory, select
 TOPICS = (
     "gpbnb.rounding.checks",
     "gpbnb.inversion.checks",
+    "gpbnb.kalman.checks",
     "gpbnb.rolling.checks",
     "gpbnb.integration.checks",
     "gpbnb.budget.checks",

@@ -1,0 +1,168 @@
+"""Figures of the chapter on the Kalman filter: results in, artists out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import theory
+from gpbnb.kalman.ensembles import Summary
+from gpbnb.kalman.experiment import Bounded, Form
+from gpbnb.kalman.year import Year
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.tables import digits
+
+_QUANTITIES = {
+    "drift": "error of the drift angle (mas)",
+    "rate": "error of the drift rate (mas/yr)",
+    "gain": "error / gain, norms (no unit)",
+    "covariance": "error / covariance, norms (no unit)",
+}
+_MARKERS = {Form.REPORT: "o", Form.SECOND: "P", Form.USUAL: "^", Form.JOSEPH: "s", Form.UD: "D"}
+
+
+def decimal_digits(fmt: FloatFormat) -> float:
+    """The t for which β = 0.5 × 10^(1-t), (8) of hung1984, ch. II, is the unit error of a format."""
+    return 1 - math.log10(2 * float(fmt.unit_roundoff))
+
+
+def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = None) -> list[Artist]:
+    """Error of one quantity against the step, a curve a run.
+
+    Parameters
+    ----------
+    quantity : "drift" or "rate", of both the largest; "gain" or "covariance", norms.
+    goal : drawn as a line, in the unit of the quantity.
+
+    Raises
+    ------
+    ValueError : another quantity, or more curves than there are colours.
+    """
+    if quantity not in _QUANTITIES:
+        raise ValueError(f"got quantity {quantity!r}; needed one of {', '.join(_QUANTITIES)}")
+    colours = (OBSERVED, *OBSERVED_OTHERS, STRICT, REFERENCE)
+    if len(runs) > len(colours):
+        raise ValueError(f"got {len(runs)} curves; needed at most {len(colours)}; draw two figures")
+    artists: list[Artist] = []
+    for run, colour in zip(runs, colours, strict=False):
+        values = np.abs(getattr(run, quantity))
+        if values.ndim > 1:
+            values = values.max(axis=1)
+        if run.case.fmt is None:
+            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+        seen = values > 0
+        artists += ax.plot(
+            run.steps[seen], values[seen], marker=_MARKERS[run.case.form], color=colour, lw=0.8, label=_name(run)
+        )
+    if goal is not None:
+        artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    label(ax, "step $k$", _QUANTITIES[quantity])
+    return artists
+
+
+def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Axes) -> list[Artist]:
+    """Bounds against the step: name, steps and values of each; the last one is black, the others are printed ones."""
+    artists: list[Artist] = []
+    for number, (name, steps, values) in enumerate(curves):
+        last = number == len(curves) - 1
+        style = "-" if last else ("-", "--", "-.")[number % 3]
+        artists += ax.plot(steps, values, color=STRICT if last else BOUND, ls=style, label=name)
+    return artists
+
+
+def level(name: str, value: float, ax: Axes) -> Artist:
+    """A bound that is the same at each step."""
+    return ax.axhline(value, color=BOUND, label=name)
+
+
+def _name(run: Year) -> str:
+    fmt = run.case.fmt
+    if fmt is None:
+        return "reference"
+    chopped = ", chopped" if fmt.rounding is Rounding.CHOP else ""
+    form = "" if run.case.form is Form.REPORT else f", {run.case.form}"
+    return f"{digits(fmt)}{chopped}{form}"
+
+
+def year_end(
+    runs: Sequence[Year],
+    ax: Axes,
+    goal: float,
+    counts: Sequence[tuple[str, theory.Coefficients]],
+    answers: Sequence[tuple[str, Sequence[float]]],
+) -> list[Artist]:
+    """Error of drift or rate at the end of a year against the digits, beside (125) and the answers to how many.
+
+    Parameters
+    ----------
+    goal : in mas and mas/yr.
+    counts : name and coefficients of bounds like (125), which are drawn for a norm of the state and a B of 1, as in the
+        report's example.
+    answers : name and numbers of digits, open markers on the goal; the last is drawn upright, through it.
+    """
+    artists: list[Artist] = []
+    looks = [(form, rounding) for rounding in Rounding for form in Form]
+    for form, rounding in looks:
+        group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
+        points = [(decimal_digits(fmt), _end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        if points:
+            colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
+            name = f"{form}, {rounding.value}"
+            artists += ax.plot(*zip(*sorted(points), strict=True), _MARKERS[form], color=colour, label=name, alpha=0.7)
+    t = np.linspace(3.5, 23, 50)
+    beta = 0.5 * 10.0 ** (1 - t)
+    for (name, each), style in zip(counts, ("-", "--", "-."), strict=False):
+        artists += ax.plot(t, beta * (each.first + each.second), color=BOUND, ls=style, label=name)
+    artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
+    for (name, places), marker in zip(answers[:-1], "os^", strict=False):
+        colour = BOUND if marker == "o" else STRICT
+        artists += ax.plot(list(places), [goal] * len(places), marker, mfc="none", mec=colour, ms=9, label=name)
+    for name, places in answers[-1:]:
+        artists += ax.plot(list(places), [goal] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name)
+    ax.set_yscale("log")
+    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "error after a year (mas, mas/yr)")
+    return artists
+
+
+def _end(run: Year) -> float:
+    """The larger of the errors of angles and rates at the last step."""
+    return float(max(np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max()))
+
+
+def contraction(found: Bounded, state: int, ax: Axes, name: str) -> list[Artist]:
+    """Error of one state (points) and its contraction bound (line) against the step."""
+    steps, error = found.history.steps, np.abs(found.history.state[:, state])
+    seen = error > 0
+    artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
+    artists += ax.plot(steps, found.state[:, state], color=BOUND, label="contraction bound")
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    legend(ax)
+    label(ax, "step $k$", f"error of {name}")
+    return artists
+
+
+def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
+    """Share of random filters that violate each bound, a group of bars a form."""
+    bounds = (("(105)", "violations_105"), ("(108)", "violations_108"), ("(125)", "violations_125"))
+    forms = list(dict.fromkeys(summary.form for summary in summaries))
+    artists: list[Artist] = []
+    for number, ((name, field), colour) in enumerate(zip(bounds, (OBSERVED, *OBSERVED_OTHERS), strict=False)):
+        shares = []
+        for form in forms:
+            group = [summary for summary in summaries if summary.form == form]
+            shares.append(100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group))
+        artists += ax.bar(np.arange(len(forms)) + 0.27 * (number - 1), shares, 0.25, color=colour, label=name).patches
+    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]) for form in forms])
+    ax.set_ylim(0, 118)
+    legend(ax, ncols=3, loc="upper right")
+    label(ax, "form of the filter", "filters that violate it (%)")
+    return artists

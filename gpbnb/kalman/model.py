@@ -1,0 +1,239 @@
+"""What a Kalman filter is told: a linear model, checked once; and a model of Gravity Probe B."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds import exact
+from gpbnb.formats import FloatFormat
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    r"""A linear process and its measurements; hung1984, ch. II, before (98).
+
+    .. math:: x_k = \Phi_{k-1} x_{k-1} + w_{k-1}, \qquad z_k = H_k x_k + v_k, \qquad
+        w_k \sim N(0, Q_k),\ v_k \sim N(0, R_k)
+
+    Each of the four matrices may be one for all steps, or a cycle of them with a leading axis: step k = 1, 2, … takes
+    the member (k - 1) mod p, of each cycle with its own p. Entries are held exactly, as Fractions; numbers, strings
+    and Decimals are read exactly too.
+
+    Parameters
+    ----------
+    Phi : (n, n) or (p, n, n), transition.
+    H : (m, n) or (p, m, n), measurement.
+    Q : (n, n) or (p, n, n), covariance of the process noise, positive semidefinite.
+    R : (m, m) or (p, m, m), covariance of the measurement noise, positive definite.
+    x0 : (n,), the first estimate.
+    P0 : (n, n), its covariance, positive semidefinite.
+    name : what tables and figures call it.
+
+    Raises
+    ------
+    ValueError : shapes that do not fit; NaN or infinity; a covariance that is not symmetric or not definite.
+    """
+
+    Phi: NDArray[Any]
+    H: NDArray[Any]
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    x0: NDArray[Any]
+    P0: NDArray[Any]
+    name: str = "a linear model"
+
+    def __post_init__(self) -> None:
+        for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
+            try:
+                entries = exact(getattr(self, letter))
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{letter}: {error}") from None
+            if letter in ("Phi", "H", "Q", "R") and entries.ndim == 2:
+                entries = entries[np.newaxis]
+            entries.flags.writeable = False
+            object.__setattr__(self, letter, entries)
+        if self.x0.ndim != 1 or not self.x0.size:
+            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number a state")
+        n = self.x0.size
+        if self.H.ndim != 3 or 0 in self.H.shape or self.H.shape[2] != n:
+            raise ValueError(
+                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), a row a measurement and a column a state of x0"
+            )
+        m = self.H.shape[1]
+        for letter, size in (("Phi", n), ("Q", n), ("R", m)):
+            shape = getattr(self, letter).shape
+            if len(shape) != 3 or shape[1:] != (size, size) or not shape[0]:
+                raise ValueError(
+                    f"got {letter} of shape {shape[-2:]}; needed ({size}, {size}), or a cycle (p, {size}, {size}): "
+                    f"x0 has {n} states and H {m} measurements"
+                )
+        if self.P0.shape != (n, n):
+            raise ValueError(f"got P0 of shape {self.P0.shape}; needed ({n}, {n}), as x0 has {n} states")
+        for letter, matrices, strictly in (("Q", self.Q, False), ("R", self.R, True), ("P0", self.P0[None], False)):
+            for matrix in matrices:
+                _check_covariance(letter, matrix, strictly)
+
+    @property
+    def n(self) -> int:
+        """How many states there are."""
+        return int(self.x0.size)
+
+    @property
+    def m(self) -> int:
+        """How many measurements a step brings."""
+        return int(self.H.shape[1])
+
+    @property
+    def cycle(self) -> int:
+        """After how many steps all four matrices begin again."""
+        return math.lcm(*(len(each) for each in (self.Phi, self.H, self.Q, self.R)))
+
+    def rounded(self, fmt: FloatFormat) -> LinearModel:
+        """The model as a computer of this format stores it: each entry rounded.
+
+        Raises
+        ------
+        ValueError : so few digits make a covariance indefinite.
+        """
+        stored = {letter: fmt.array(getattr(self, letter)).to_fractions() for letter in _LETTERS}
+        return LinearModel(**stored, name=f"{self.name}, in {fmt}")
+
+    def to_float(self) -> dict[str, NDArray[np.float64]]:
+        """The nearest float64 of each entry, by letter."""
+        return {letter: getattr(self, letter).astype(np.float64) for letter in _LETTERS}
+
+
+_LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
+
+
+def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Exact L and d of a symmetric matrix L diag(d) L', L lower with ones on its diagonal.
+
+    Raises
+    ------
+    ValueError : the matrix is not positive semidefinite.
+    """
+    rest, n = covariance.copy(), len(covariance)
+    lower = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
+    d = np.array([Fraction(0)] * n, dtype=object)
+    for j in range(n):
+        d[j] = rest[j, j]
+        if d[j] < 0 or (d[j] == 0 and np.any(rest[j + 1 :, j] != 0)):
+            raise ValueError("not positive semidefinite")
+        if d[j] > 0:
+            lower[j + 1 :, j] = rest[j + 1 :, j] / d[j]
+            rest[j + 1 :, j + 1 :] -= np.multiply.outer(lower[j + 1 :, j], rest[j, j + 1 :])
+    return lower, d
+
+
+def _check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None:
+    if np.any(matrix != matrix.T):
+        i, j = np.argwhere(matrix != matrix.T)[0]
+        raise ValueError(
+            f"got {letter} with {float(matrix[i, j])!r} at ({i}, {j}) and {float(matrix[j, i])!r} at ({j}, {i}); "
+            f"needed a symmetric matrix; take ({letter} + {letter}.T) / 2 if you mean their mean"
+        )
+    needed = "definite" if strictly else "semidefinite"
+    try:
+        definite = bool(np.all(factor(matrix)[1] > 0)) or not strictly
+    except ValueError:
+        definite = False
+    if not definite:
+        least = float(np.linalg.eigvalsh(matrix.astype(np.float64))[0])
+        raise ValueError(
+            f"got {letter} with a least eigenvalue near {least:.3g}; needed a positive {needed} matrix: "
+            f"no variance may be {'zero or ' if strictly else ''}negative, in any direction"
+        )
+
+
+# -- Gravity Probe B ----------------------------------------------------------------------------------
+
+#: The states of :func:`gravity_probe_b`, and their units.
+STATES = (
+    ("drift ψ2", "mas"),
+    ("drift ψ3", "mas"),
+    ("drift rate 2", "mas/yr"),
+    ("drift rate 3", "mas/yr"),
+    ("pointing α2", "mas"),
+    ("pointing α3", "mas"),
+    ("misalignment β2", "mas"),
+    ("misalignment γ2", "mas"),
+    ("readout bias", "mas"),
+    ("readout scale", "10⁻³"),
+)
+
+#: Steps of 10 s in 365 days; hung1984, ch. II, section 12, example.
+YEAR = 3_153_600
+
+
+def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearModel:
+    r"""A filter for one gyroscope of Gravity Probe B, n = 10, m = 2, a step each 10 s.
+
+    To first order in the angles, (1) and (2) of hung1982, ch. IV, give what the gyro's readout and the telescope show
+    along the z axis of the rolling spacecraft,
+
+    .. math:: z_r = \beta_2 + \gamma_2 + (\psi_2 + \alpha_2)\cos\omega t + (\psi_3 + \alpha_3)\sin\omega t,
+        \qquad z_t = \beta_2 + \alpha_2\cos\omega t + \alpha_3\sin\omega t,
+
+    with :math:`\psi = \theta - \alpha`, (7). To z_r the model adds a bias and, for the readout's scale factor, the
+    known aberration of starlight by the orbit, 5.2 arcseconds in 97.5 minutes, which calibrated it in flight. What the
+    reports do not print, all noise and time constants, is our choice. Directions are tabulated to six decimals.
+
+    Parameters
+    ----------
+    roll : period in seconds, "600" (as in the reports) or "77.5" (as flown); or another multiple of half a second.
+    process_noise : whether drift, misalignments and scale wander; without, gains fall for ever.
+
+    References
+    ----------
+    hung1982, ch. IV, eqs. (1)-(7); hung1984, ch. II, section 12, example.
+    """
+    half_seconds = Fraction(roll) * 2
+    if half_seconds.denominator != 1 or half_seconds <= 20:
+        raise ValueError(f"got roll = {roll!r}; needed a period in seconds above 10, a multiple of 0.5, as in '77.5'")
+    # In half seconds, a step is 20 and an orbit 11700.
+    turn, orbit = int(half_seconds), 11_700
+    cycle = math.lcm(turn // math.gcd(turn, 20), orbit // 20)
+    H = np.full((cycle, 2, 10), Fraction(0), dtype=object)
+    for k in range(cycle):
+        t = 20 * (k + 1)
+        c, s = _cosine(t, turn), _sine(t, turn)
+        aberration = Fraction("5.2") * (_cosine(t, orbit) * c + _sine(t, orbit) * s)
+        H[k, 0] = [c, s, Fraction(0), Fraction(0), c, s, Fraction(1), Fraction(1), Fraction(1), aberration]
+        H[k, 1, 4:7] = [c, s, Fraction(1)]
+    Phi = _diagonal("1 1 1 1 0.9 0.9 1 1 0.999 1")
+    Phi[0, 2] = Phi[1, 3] = Fraction(1, YEAR)
+    wander = "1e-8 1e-8 1e-8 1e-8 76 76 1e-6 1e-6 0.01 1e-10"
+    still = "0 0 0 0 76 76 0 0 0.01 0"
+    return LinearModel(
+        Phi=Phi,
+        H=H,
+        Q=_diagonal(wander if process_noise else still),
+        R=_diagonal("2500 25"),
+        x0=np.array([Fraction(0)] * 10, dtype=object),
+        P0=_diagonal("1e4 1e4 1e8 1e8 400 400 1e4 1e4 5 100"),
+        name=f"GP-B, roll {roll} s" + ("" if process_noise else ", without process noise"),
+    )
+
+
+def _diagonal(entries: str) -> NDArray[Any]:
+    values = [Fraction(entry) for entry in entries.split()]
+    matrix = np.full((len(values), len(values)), Fraction(0), dtype=object)
+    for i, value in enumerate(values):
+        matrix[i, i] = value
+    return matrix
+
+
+def _cosine(part: int, whole: int) -> Fraction:
+    # The last digits of a machine's cosine are its own: six decimals are the same on all.
+    return Fraction(round(1_000_000 * math.cos(2 * math.pi * (part % whole) / whole)), 1_000_000)
+
+
+def _sine(part: int, whole: int) -> Fraction:
+    return Fraction(round(1_000_000 * math.sin(2 * math.pi * (part % whole) / whole)), 1_000_000)

@@ -1,0 +1,83 @@
+"""What (125) allows a run: the quantities of hung1984, ch. II, (122), taken from a filter on its way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.formats import FloatFormat
+from gpbnb.kalman import theory
+from gpbnb.kalman.experiment import Kept
+from gpbnb.kalman.model import LinearModel
+
+
+@dataclass(frozen=True, eq=False)
+class Terms:
+    r"""What (125) needs of a run, after each of its first steps; arrays (c,).
+
+    Parameters
+    ----------
+    n, m : dimensions of the state and of the measurement.
+    x : :math:`\|x_k\|`, norm (21).
+    u : largest :math:`\|u_i\|` so far, norm (21); the least that B may be, as (122) asks for it with i = 0.
+    columns, rows : largest :math:`\|F_i\|` so far, by the norm (22) and by that which belongs to (21).
+    """
+
+    n: int
+    m: int
+    x: NDArray[np.float64]
+    u: NDArray[np.float64]
+    columns: NDArray[np.float64]
+    rows: NDArray[np.float64]
+
+    def kindest(self, fmt: FloatFormat, k: int, **faults: bool) -> float:
+        """Bound (125) at step k with the least B that any filter with these inputs could have.
+
+        Parameters
+        ----------
+        fmt : gives β. k : 1 or more; beyond the last of the steps, x and u of the last are taken.
+        faults : to mend, as for :func:`gpbnb.kalman.theory.coefficients`.
+        """
+        first, second = theory.coefficients(k, self.n, self.m, **faults)
+        last = min(k, len(self.x)) - 1
+        return float(fmt.unit_roundoff) * (first * float(self.x[last]) + second * float(self.u[last]))
+
+    def powers(self) -> float:
+        r"""How many powers of ten :math:`F^{k-1}`, which B must contain, is worth after the last step."""
+        return (len(self.columns) - 1) * float(np.log10(self.columns[-1]))
+
+
+def terms(model: LinearModel, true: Kept) -> Terms:
+    """Take the quantities of (122) from a run.
+
+    Parameters
+    ----------
+    true : estimates and gains of each step from the first on.
+
+    Raises
+    ------
+    ValueError : steps left out, or none.
+    """
+    if not true.steps or true.steps != tuple(range(1, len(true.steps) + 1)):
+        raise ValueError(
+            f"got the steps {true.steps[:4]} …; needed 1, 2, 3, …; take marks = range(1, {len(true.steps) + 1})"
+        )
+    given, c = model.to_float(), len(true.steps)
+    x, K = true.x.astype(np.float64), true.K.astype(np.float64)
+    at = np.arange(c)
+    Phi, H = given["Phi"][at % len(given["Phi"])], given["H"][at % len(given["H"])]
+    before = np.concatenate([given["x0"][np.newaxis], x[:-1]])
+    F = Phi - K @ (H @ Phi)
+    u = x - np.einsum("kij,kj->ki", F, before)  # (111)
+    size = np.abs(F)
+    so_far = np.maximum.accumulate
+    return Terms(
+        model.n,
+        model.m,
+        np.abs(x).max(axis=1),
+        so_far(np.abs(u).max(axis=1)),
+        so_far(size.sum(axis=1).max(axis=1)),
+        so_far(size.sum(axis=2).max(axis=1)),
+    )

@@ -1,0 +1,151 @@
+"""The smallest filters that break (105), (108) and (125): one step, in exact arithmetic on rounded Fractions.
+
+This is slow and obvious, shares nothing with the compiled filter of :mod:`gpbnb.kalman.experiment`, and is its oracle.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds import exact, max_norm
+from gpbnb.formats import FloatFormat
+from gpbnb.kalman import theory
+
+
+class Case(NamedTuple):
+    """A filter and its first measurement, exact: the arguments of :func:`gpbnb.kalman.theory.exact_step`."""
+
+    Phi: NDArray[Any]
+    H: NDArray[Any]
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    x: NDArray[Any]
+    P: NDArray[Any]
+    z: NDArray[Any]
+
+
+class Ratios(NamedTuple):
+    """Error over bound, the worst entry; infinite for an error where the bound allows none."""
+
+    covariance: float
+    gain: float
+    state: float
+
+
+def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
+    """One state and one measurement, every number 1 but R and z, and perhaps H.
+
+    Parameters
+    ----------
+    fmt : for the R by default, a unit of the second digit after the last: b**(-t - 1), that 1 + R does not show.
+    r, h, z : others; numbers or strings.
+    """
+    one = exact([[1]])
+    small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else Fraction(r)
+    return Case(one, exact([[h]]), one * 0, exact([[small]]), exact([1]), one, exact([z]))
+
+
+def correlated() -> Case:
+    """Two states and one measurement: the smallest that breaks (108) with the first form of (99), in four digits.
+
+    The first entry of the gain is (1.001 · 1.001 - 1.002)/S: in four digits, nothing is left of it.
+    """
+    one = np.eye(2, dtype=int)
+    P = [["1.001", "-1.002"], ["-1.002", "2"]]
+    return Case(exact(one), exact([["1.001", "1"]]), exact(one * 0), exact([[1]]), exact([0, 0]), exact(P), exact([1]))
+
+
+def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """One step with each operation rounded, in the order of the report: (100), (99), (101), (109)-(111).
+
+    Parameters
+    ----------
+    fmt : rounds each result; the numbers of `case` are taken as they are.
+    case : of one measurement.
+    second : whether the estimate takes the second form of (99), with the new covariance.
+
+    Returns
+    -------
+    x (n,), K (n, 1), P (n, n), as Fractions.
+
+    Raises
+    ------
+    ValueError : more than one measurement.
+    """
+    Phi, H, Q, R, x, P, z = case
+    if len(H) != 1:
+        raise ValueError(f"got {len(H)} measurements; needed one; take them one after another")
+    fl = np.vectorize(fmt.round, otypes=[object])
+
+    def product(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
+        total = fl(np.multiply.outer(A[:, 0], B[0]))
+        for k in range(1, len(B)):
+            total = fl(total + fl(np.multiply.outer(A[:, k], B[k])))
+        return np.asarray(total)
+
+    predicted = fl(product(product(Phi, P), Phi.T) + Q)
+    PH = product(predicted, H.T)
+    S = fl(product(H, PH) + R)
+    K = product(PH, fl(1 / S))
+    identity = exact(np.eye(len(x), dtype=int))
+    W = fl(identity - product(K, H))
+    P = product(W, predicted)
+    if second:
+        K = product(product(P, H.T), fl(1 / R))
+        W = fl(identity - product(K, H))
+    x = fl(product(product(W, Phi), x[:, None]) + product(K, z[:, None]))
+    return x[:, 0], K, P
+
+
+def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -> Ratios:
+    r"""Compare the errors of the last of a few rounded steps with (105), (108) and (125).
+
+    Parameters
+    ----------
+    fmt, case, second : as for :func:`rounded_step`; each step brings the same measurement.
+    steps : k. The B of (125) is the least that (122) allows.
+    """
+    rounded, exactly = case, case
+    transitions, inputs = [], []
+    for _ in range(steps):
+        x, K, P = rounded_step(fmt, rounded, second)
+        rounded = rounded._replace(x=x, P=P)
+        true = theory.exact_step(*exactly)
+        exactly = exactly._replace(x=true.x, P=true.P)
+        transitions.append(true.transition)
+        inputs.append(true.gain @ case.z)
+    beta, (n, m) = fmt.unit_roundoff, true.gain.shape
+    B = theory.printed_input_bound(transitions, inputs)
+    bound = theory.state_bound(max_norm(true.x), B, beta, theory.coefficients(steps, n, m))
+    return Ratios(
+        _worst(P - true.P, theory.printed_covariance_bound(true.P, m, beta)),
+        _worst(K - true.gain, theory.printed_gain_bound(true.gain, beta)),
+        _worst(exact([max_norm(x - true.x)]), exact([bound])),
+    )
+
+
+def mildest(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
+    """The largest R up to 1 in :func:`scalar` that breaks each bound, of all R of the format above b**-t.
+
+    Returns
+    -------
+    largest : by the names of `Ratios`; a bound that none breaks is left out.
+    """
+    largest: dict[str, Fraction] = {}
+    b, t = fmt.base, fmt.precision
+    for e in range(t + 1):
+        for d in range(b**t - 1, b ** (t - 1) - 1, -1):
+            r = Fraction(d, b ** (t - 1 + e))
+            if r <= 1 and len(largest) < 3:
+                found = ratios(fmt, scalar(fmt, r), second)._asdict()
+                largest |= {name: r for name, ratio in found.items() if ratio > 1 and name not in largest}
+    return largest
+
+
+def _worst(error: NDArray[Any], bound: NDArray[Any]) -> float:
+    pairs = zip(abs(error).flat, bound.flat, strict=True)
+    return max((float(e / b) if b else float("inf") for e, b in pairs if e), default=0.0)

@@ -1,0 +1,263 @@
+"""Tables of the chapter on the Kalman bound."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import smallest, theory, year
+from gpbnb.kalman.ensembles import Summary
+from gpbnb.kalman.model import STATES, LinearModel
+from gpbnb.kalman.precision import Requirement
+from gpbnb.kalman.printed import Terms
+from gpbnb.tables import Table, digits
+
+DOUBLE = FloatFormat(2, 53)
+
+
+def example(k: int, n: int, m: int) -> Table:
+    """The closing example for (125), printed and mended: coefficients, β, digits, and what IEEE double makes of it."""
+    body = []
+    for name, faults in theory.MENDINGS.items():
+        for term, coefficient in zip(("first", "second"), theory.coefficients(k, n, m, **faults), strict=True):
+            body.append(
+                (
+                    name,
+                    term,
+                    scientific(coefficient, 5),
+                    scientific(Fraction(1, coefficient), 4),
+                    str(theory.required_precision(coefficient)),
+                    scientific(coefficient * DOUBLE.unit_roundoff, 2),
+                )
+            )
+    header = ("(125)", "term", "coefficient", "$\\beta$, one over it", "digits", "times $\\beta$ of IEEE double")
+    return Table(f"the closing example, {len(theory.MENDINGS)} ways", header, tuple(body))
+
+
+def slips(k: int, n: int, m: int) -> Table:
+    """Each printed number of the closing example, what the printed formula gives, and what gives the printed number."""
+    first, second = theory.coefficients(k, n, m)
+    printed = theory.PRINTED
+    wrong = theory.one_figure_slips(k, n, m, printed["first coefficient"])
+    loops = sorted({a * n + b * m + c for a, b, c in wrong})
+    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in wrong)
+    products = [loop for loop in loops if theory.prints_as(theory.read_as_product(k, n, m, loop), printed[_SECOND])]
+    values: list[tuple[str, str, str]] = [
+        ("first coefficient", scientific(first, 5), f"{', '.join(map(str, loops))} times $k$, as by {ways}"),
+        (
+            "second coefficient",
+            scientific(second, 5),
+            f"with {', '.join(map(str, products))}, and times for plus: $k(3n+1)\\cdot0.5(k-1)\\cdot{products[0]}$"
+            if products
+            else "not found",
+        ),
+    ]
+    for name, coefficient in (("first", first), ("second", second)):
+        given = Fraction(printed[f"{name} coefficient"])
+        beta = Fraction(printed[f"{name} beta"])
+        follows = theory.prints_as(1 / given, printed[f"{name} beta"])
+        values.append(
+            (f"{name} beta", scientific(Fraction(1, coefficient), 4), _yes(follows, "one over the printed coefficient"))
+        )
+        exact_digits = 1 - math.log10(2 * float(beta))
+        needed = theory.required_precision(1 / beta)
+        values.append(
+            (
+                f"{name} digits",
+                str(theory.required_precision(coefficient)),
+                f"the printed β is that of {exact_digits:.2f} digits; it needs {needed}",
+            )
+        )
+    body = tuple((name, f"${_typeset(printed[name])}$", value, why) for name, value, why in values)
+    return Table("the printed numbers of the closing example", ("number", "printed", "formula", "what gives it"), body)
+
+
+_SECOND = "second coefficient"
+
+
+def goals(k: int, n: int, m: int, goal: Fraction, size: Fraction) -> Table:
+    """Digits that each coefficient asks for an error of all of `size`, as in the example, and for one of `goal`.
+
+    Parameters
+    ----------
+    k, n, m : of the example. goal, size : the error that is wanted and what it is an error of, in the same units.
+    """
+    body = []
+    for name, coefficient in zip(("first", "second"), theory.coefficients(k, n, m), strict=True):
+        for granted in (Fraction(1), Fraction(goal) / Fraction(size)):
+            body.append(
+                (
+                    f"{name} term",
+                    scientific(granted, 2),
+                    scientific(granted * Fraction(size), 2),
+                    str(theory.required_precision(coefficient, granted)),
+                    str(theory.required_precision(coefficient, granted, base=2)),
+                )
+            )
+    header = ("dominates", "error granted, relative", "in mas", "decimal digits", "bits")
+    return Table("what an error of one grants", header, tuple(body))
+
+
+def violations(fmts: Sequence[FloatFormat]) -> Table:
+    """The scalar filter that breaks all three bounds: error over bound in several formats, both forms of (99)."""
+    body = []
+    for fmt in fmts:
+        for name, second in (("first", False), ("second", True)):
+            found = smallest.ratios(fmt, smallest.scalar(fmt), second)
+            body.append((arithmetic(fmt), name, *(short(ratio, 3) for ratio in found)))
+    return Table(
+        f"{len(body)} runs of the smallest filter",
+        ("arithmetic", "form of (99)", "error / (105)", "error / (108)", "error / (125)"),
+        tuple(body),
+    )
+
+
+def order() -> Table:
+    """In which order the four equations can be computed."""
+    body = []
+    for name, second in (("first", False), ("second", True)):
+        found = theory.order(second)
+        body.append((name, " → ".join(found) if found else "none: (99) waits for (101), and (101) for (99)"))
+    return Table("the order of (98)-(101)", ("form of (99)", "order"), tuple(body))
+
+
+def mildest(fmts: Sequence[FloatFormat]) -> Table:
+    """How large R may be, beside a variance of 1, for the scalar filter still to break each bound."""
+    body = []
+    for fmt in fmts:
+        for name, second in (("first", False), ("second", True)):
+            found = smallest.mildest(fmt, second)
+            cells = (f"{float(found[each]):.3g}" if each in found else "none" for each in smallest.Ratios._fields)
+            body.append((arithmetic(fmt), name, *cells))
+    header = ("arithmetic", "form of (99)", "$R$ for (105)", "$R$ for (108)", "$R$ for (125)")
+    return Table(f"the largest noise that breaks a bound, {len(body)} ways", header, tuple(body))
+
+
+def arithmetic(fmt: FloatFormat) -> str:
+    """Digits and rounding of a format."""
+    return digits(fmt) + (", chopped" if fmt.rounding is Rounding.CHOP else "")
+
+
+def states(model: LinearModel) -> Table:
+    """What :func:`gpbnb.kalman.model.gravity_probe_b` takes for its states: what is kept, known and added."""
+    given = model.to_float()
+    body = tuple(
+        (name, unit, f"{given['Phi'][0, i, i]:g}", _root(given["P0"][i, i]), _root(given["Q"][0, i, i]))
+        for i, (name, unit) in enumerate(STATES)
+    )
+    header = ("state", "unit", "kept in a step", "first standard deviation", "wander in a step")
+    return Table(f"{len(body)} states", header, body)
+
+
+def _root(variance: float) -> str:
+    return short(math.sqrt(variance), 3)
+
+
+def year_ends(runs: Sequence[year.Year]) -> Table:
+    """Errors at the last step of each run, and where it lost a positive variance; the model, if there are several."""
+    several = len({run.case.model for run in runs}) > 1
+    body = []
+    for run in runs:
+        if run.case.fmt is None:
+            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+        found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
+        cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
+        lost = f", a variance lost at step {run.indefinite:,}" if run.indefinite else ""
+        body.append((*([run.case.model] if several else []), *cells, short(float(run.least_eigenvalue[-1])) + lost))
+    header = (
+        *(["model"] if several else []),
+        "arithmetic",
+        "form",
+        "drift (mas)",
+        "rate (mas/yr)",
+        "gain, relative",
+        "covariance, relative",
+        "least eigenvalue",
+    )
+    return Table(f"{len(body)} years", header, tuple(body))
+
+
+def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms) -> Table:
+    """Bound over error of the drift rate at the end of a year: (125) at its kindest, and the companion bound.
+
+    Parameters
+    ----------
+    runs, bounds : rounded runs, and of each the bound of its reference.
+    terms : of the model; the same for all.
+    """
+    body = []
+    for run, reference in zip(runs, bounds, strict=True):
+        fmt, k = run.case.fmt, int(run.steps[-1])
+        if fmt is None or reference.steps[-1] != k:
+            raise ValueError(f"got {run.case.name} with a bound to step {reference.steps[-1]}; needed one to step {k}")
+        at = int(np.abs(run.rate[-1]).argmax())
+        error = abs(float(run.rate[-1, at]))
+        companion = float(theory.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
+        cells = [terms.kindest(fmt, k, **faults) / error for faults in theory.MENDINGS.values()]
+        body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.5f}"))
+    header = ("arithmetic", "rate, error (mas/yr)", *(f"(125), {name}" for name in theory.MENDINGS), "companion bound")
+    return Table(f"bound over error, {len(body)} years", header, tuple(body))
+
+
+def trials(found: Sequence[Summary]) -> Table:
+    """Random filters: how many violate each bound, and the largest error over it, a line a kind and one for all."""
+    body = []
+    kinds = list(dict.fromkeys(each.kind for each in found))
+    for name, group in [(kind, [each for each in found if each.kind == kind]) for kind in kinds] + [
+        ("all", list(found))
+    ]:
+        count = sum(each.trials for each in group)
+        cells = []
+        for bound in ("105", "108", "125"):
+            violated = sum(getattr(each, f"violations_{bound}") for each in group)
+            largest = max(getattr(each, f"worst_{bound}") for each in group)
+            cells.append(f"{100 * violated / count:.1f} %, {short(largest)}")
+        largest = max(max(each.state, each.gain, each.covariance) for each in group)
+        violated = sum(each.contraction_violations for each in group)
+        compared = sum(each.compared for each in group)
+        logarithm = sum(each.compared * math.log(each.typical) for each in group if each.compared)
+        typical = short(math.exp(-logarithm / compared)) if compared else ""
+        body.append((name, str(count), *cells, f"{violated}, {largest:.3f}", typical))
+    header = ("models", "runs", "violate (105), worst", "(108)", "(125)", "contraction bound", "typically, over error")
+    return Table(f"{sum(each.trials for each in found)} random filters", header, tuple(body))
+
+
+def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
+    """What :func:`gpbnb.kalman.precision.required_precision` answered."""
+    body = []
+    for name, answer in answers:
+        ratio = f"{dict(answer.tried)[answer.fmt.precision]:.2g}" if answer.fmt else ""
+        smallest_format = arithmetic(answer.fmt) if answer.fmt else "none"
+        body.append((name, answer.basis, str(answer.steps), smallest_format, ratio))
+    header = ("filter", "rests on", "steps", "smallest precision", "error or bound / goal")
+    return Table(f"{len(body)} answers", header, tuple(body))
+
+
+def scientific(value: Fraction | int, figures: int) -> str:
+    r"""A number as ``$2.5860\\times10^{8}$``."""
+    mantissa, _, power = f"{float(value):.{figures - 1}e}".partition("e")
+    return f"${mantissa}\\times10^{{{int(power)}}}$" if int(power) else f"${mantissa}$"
+
+
+def short(value: float, figures: int = 2) -> str:
+    """A number in a cell: plain, or with a power of ten where it is large or small."""
+    rounded = float(f"{value:.{figures - 1}e}")
+    if rounded == 0 or not math.isfinite(value):
+        return f"{rounded:g}"
+    if 1e-4 <= abs(rounded) < 1e6:
+        return np.format_float_positional(rounded, trim="-")
+    mantissa, _, power = f"{rounded:.{figures - 1}e}".partition("e")
+    return f"${mantissa}\\times10^{{{int(power)}}}$"
+
+
+def _typeset(printed: str) -> str:
+    mantissa, _, power = printed.partition("e")
+    return rf"{mantissa}\times10^{{{power}}}" if power else mantissa
+
+
+def _yes(holds: bool, what: str) -> str:
+    return what if holds else f"not {what}"

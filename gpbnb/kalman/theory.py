@@ -1,0 +1,650 @@
+r"""What may happen to a Kalman filter whose every operation is rounded: printed bounds, and one that is a bound.
+
+The bounds named ``printed_…`` are those of hung1984, ch. II, section 12; :func:`coefficients` gives (125) as printed
+and with each of its faults mended. They are exact: ints and Fractions in, Fractions out.
+
+The contraction bound needs no pattern and no first order. Let :math:`(\hat x_k, \hat P_k)` be what any program
+computed, by any form of the filter (of an asymmetric covariance, its symmetric part), and :math:`\mathcal E` one exact
+step (98)-(101). Only two residuals of a step enter,
+
+.. math:: q_k = \hat x_k - \mathcal E_x(\hat x_{k-1}, \hat P_{k-1}, z_k), \qquad
+    T_k = \hat P_k - \mathcal E_P(\hat P_{k-1}),
+
+for the errors :math:`e_k = \hat x_k - x_k` and :math:`E_k = \hat P_k - P_k` obey *exactly*
+
+.. math:: E_k = A_k E_{k-1} F_k^T + T_k, \quad e_k = F_k (e_{k-1} + E_{k-1} y_k) + q_k, \quad
+    F_k = A_k (I - E_{k-1} G_k)^{-1},
+
+    A_k = (I - K^\circ_k H_k)\Phi_{k-1}, \quad y_k = \Phi^T H^T S^{\circ-1}\hat\nu_k, \quad
+    G_k = \Phi^T H^T S^{\circ-1} H \Phi,
+
+where :math:`K^\circ, S^\circ` are the gain and the innovation covariance of (99) for :math:`\hat P_{k-1}`, and
+:math:`\hat\nu_k = z_k - H\Phi\hat x_{k-1}`; :math:`F_k` is (109), the closed loop of the exact filter. Proof:
+:func:`gpbnb.kalman.derivation.contraction`. In the norm :math:`\|v\|_k = \|L_k^{-1}v\|_2`, with :math:`L_kL_k^T`
+about the filter's own covariance, the closed loop does not expand: errors are added up, not multiplied up. The norm has
+no units; an entry of the error is at most :math:`\|v\|_k` of these standard deviations.
+
+The functions of the contraction bound are compiled, take and return float64, and have their own roundings in the bound.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from numba import njit
+from numpy.typing import NDArray
+
+from gpbnb.bounds import column_sum_norm, exact, max_norm
+from gpbnb.formats import FloatFormat, Rounding
+
+# -- the counts of the report -----------------------------------------------------------------------------------------
+
+
+def prediction_count(n: int) -> int:
+    """Roundings of the predicted covariance, 2n + 1; hung1984, ch. II, (103)."""
+    return 2 * n + 1
+
+
+def covariance_count(n: int, m: int) -> int:
+    """Roundings of the covariance, 3n + m + 2; hung1984, ch. II, (105)."""
+    return 3 * n + m + 2
+
+
+def gain_count(n: int, m: int) -> int:
+    """Roundings of the gain, 4n + 2m + 3; hung1984, ch. II, (108)."""
+    return 4 * n + 2 * m + 3
+
+
+def transition_count(n: int, m: int) -> int:
+    """Roundings of the closed loop in a step, its product with the state among them, 6n + 3m + 5; (115)."""
+    return 6 * n + 3 * m + 5
+
+
+def input_count(n: int, m: int) -> int:
+    """Roundings of what a step adds, its addition among them, 4n + 3m + 4; hung1984, ch. II, (116)."""
+    return 4 * n + 3 * m + 4
+
+
+def printed_covariance_bound(P: Any, m: int, beta: Fraction) -> NDArray[Any]:
+    r"""Bound entry by entry, :math:`(3n+m+2)\beta\,|P_k|`; hung1984, ch. II, (105).
+
+    Parameters
+    ----------
+    P : (n, n), the exact covariance after the step.
+    m : number of measurements.
+    beta : unit roundoff β.
+    """
+    entries: Any = exact(P)
+    return np.asarray(covariance_count(entries.shape[0], m) * beta * abs(entries))
+
+
+def printed_gain_bound(K: Any, beta: Fraction) -> NDArray[Any]:
+    r"""Bound entry by entry, :math:`(4n+2m+3)\beta\,|K_k|`; hung1984, ch. II, (108). K : (n, m), the exact gain."""
+    entries: Any = exact(K)
+    n, m = entries.shape
+    return np.asarray(gain_count(n, m) * beta * abs(entries))
+
+
+class Coefficients(NamedTuple):
+    r"""What multiplies :math:`\beta\|x_k\|` and :math:`\beta B` in a bound like (125)."""
+
+    first: int
+    second: int
+
+
+def coefficients(
+    k: int, n: int, m: int, once: bool = False, free_signs: bool = False, carried: bool = False
+) -> Coefficients:
+    r"""Return the coefficients of (125), as printed or with faults mended.
+
+    With :math:`c_j` roundings of the closed loop of step j and :math:`d_j` of its input, the report bounds
+    :math:`\|\tilde x_k\|` by :math:`\beta\{a_0\|x_k\| + \sum_{i=1}^k (a_0 - a_i)B\}`,
+    :math:`a_i = \sum_{j=i+1}^k c_j + d_i`, :math:`a_0 = \sum_{j=1}^k c_j`.
+
+    Parameters
+    ----------
+    k : steps. n, m : dimensions of the state and of the measurement.
+    once : do not count the product with the state and the last addition again, that (114)-(116) have counted already.
+    free_signs : let each term have an error of its own sign, :math:`a_0 + a_i` for :math:`a_0 - a_i`.
+    carried : let the errors of P from the steps before go on into P, K and F, as the report's own algebra does with
+        every other error: 3n + m + 2 more roundings at each step.
+
+    Raises
+    ------
+    ValueError : k, n or m below 1.
+
+    References
+    ----------
+    hung1984, ch. II, (112)-(125).
+    """
+    if min(k, n, m) < 1:
+        raise ValueError(f"got k = {k}, n = {n}, m = {m}; needed each at least 1")
+    c, d, more = transition_count(n, m), input_count(n, m), covariance_count(n, m) if carried else 0
+    if not once:
+        c, d = c + n + 1, d + 1
+    first = c * k + more * k * (k - 1) // 2
+    loops = c * k * (k + 1) // 2 + more * (k + 1) * k * (k - 1) // 6  # sum over i of c_1 + ... + c_i
+    inputs = d * k + more * k * (k - 1) // 2
+    return Coefficients(first, 2 * k * first - loops + inputs if free_signs else loops - inputs)
+
+
+MENDINGS: dict[str, dict[str, bool]] = {
+    "as printed": {},
+    "counted once": {"once": True},
+    "and signs free": {"once": True, "free_signs": True},
+    "and errors carried on": {"once": True, "free_signs": True, "carried": True},
+}
+"""Arguments of :func:`coefficients`, one more fault of (125) mended on each line."""
+
+
+def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fraction:
+    r"""Return the least B of (122), :math:`F^i u \le B` for i = 0 … k - 1, in the norms (21) and (22).
+
+    Parameters
+    ----------
+    transitions : F_1 … F_k of (109). inputs : u_1 … u_k of (110).
+
+    Raises
+    ------
+    ValueError : none, or not as many of one as of the other.
+    """
+    if not transitions or len(transitions) != len(inputs):
+        raise ValueError(f"got {len(transitions)} transitions and {len(inputs)} inputs; needed as many, at least one")
+    F, u = max(map(column_sum_norm, transitions)), max(map(max_norm, inputs))
+    return u * max(Fraction(1), F ** (len(inputs) - 1))
+
+
+def state_bound(
+    x_norm: Fraction,
+    B: Fraction,
+    beta: Fraction,
+    counts: Coefficients,
+) -> Fraction:
+    r"""Return :math:`\beta\{a\|x_k\| + bB\}`, (a, b) from :func:`coefficients`; as printed, hung1984, ch. II, (125)."""
+    return beta * (counts.first * x_norm + counts.second * B)
+
+
+def required_precision(
+    coefficient: int | Fraction, goal: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
+) -> int:
+    r"""Smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{goal}`.
+
+    Parameters
+    ----------
+    coefficient : what multiplies β. goal : the error that is granted, in the same units.
+    base, rounding : of the format.
+
+    Raises
+    ------
+    ValueError : coefficient or goal not positive.
+
+    References
+    ----------
+    hung1984, ch. II, (8), (13) and the example of section 12.
+    """
+    if coefficient <= 0 or goal <= 0:
+        raise ValueError(f"got coefficient {coefficient} and goal {goal}; needed both positive")
+    precision = 1
+    while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > goal:
+        precision += 1
+    return precision
+
+
+# -- the closing example ----------------------------------------------------------------------------------------------
+
+EXAMPLE = (3_153_600, 10, 2)
+"""The k, n and m of the closing example, a year of steps of 10 s; hung1984, ch. II, section 12."""
+
+PRINTED = {
+    "first coefficient": "2.6490e8",
+    "second coefficient": "1.2949e16",
+    "first beta": ".3775e-8",
+    "first digits": "9",
+    "second beta": ".7723e-16",
+    "second digits": "17",
+}
+"""Numbers of the closing example as hung1982 prints them; hung1984 loses a minus sign."""
+
+
+def prints_as(value: Fraction | int, printed: str) -> bool:
+    """Whether `value`, rounded to as many digits as `printed` has, is `printed`."""
+    figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("0"))
+    return FloatFormat(10, figures).round(value) == Fraction(printed)
+
+
+def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
+    """The second coefficient with its plus sign read as times, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
+
+    Parameters
+    ----------
+    k, n, m : as in :func:`coefficients`. loop : another value of 7n + 3m + 6.
+    """
+    return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
+
+
+def one_figure_slips(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
+    """Every (a, b, c) that differs from (7, 3, 6) in one figure and for which k(an + bm + c) comes out as `printed`."""
+    right = (7, 3, 6)
+    changed = [(*right[:i], figure, *right[i + 1 :]) for i in range(3) for figure in range(10) if figure != right[i]]
+    return [(a, b, c) for a, b, c in changed if prints_as(k * (a * n + b * m + c), printed)]
+
+
+def dependencies(second: bool) -> dict[str, set[str]]:
+    """Which of (98)-(101) needs which, with the first or the second form of (99)."""
+    return {
+        "(100)": set(),
+        "(99)": {"(101)"} if second else {"(100)"},
+        "(101)": {"(99)", "(100)"},
+        "(98)": {"(99)"},
+    }
+
+
+def order(second: bool) -> tuple[str, ...] | None:
+    """In which order (98)-(101) can be computed; None if in none."""
+    try:
+        return tuple(TopologicalSorter(dependencies(second)).static_order())
+    except CycleError:
+        return None
+
+
+# -- one exact step ---------------------------------------------------------------------------------------------------
+
+
+class ExactStep(NamedTuple):
+    """One exact step; object arrays of Fractions."""
+
+    #: (n,), the estimate (98).
+    x: NDArray[Any]
+    #: (n, n), its covariance (101).
+    P: NDArray[Any]
+    #: (n, n), the predicted covariance (100).
+    predicted: NDArray[Any]
+    #: (n, m), the gain (99).
+    gain: NDArray[Any]
+    #: (m, m), :math:`HP_pH^T + R`.
+    innovation_covariance: NDArray[Any]
+    #: (m,), :math:`z - H\Phi x`.
+    innovation: NDArray[Any]
+    #: (n, n), the closed loop (109).
+    transition: NDArray[Any]
+
+
+def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> ExactStep:
+    """One step of the filter without any rounding, in Fractions; (98)-(101) in the order (100), (99), (101), (98).
+
+    Parameters
+    ----------
+    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model. x (n,), P (n, n) : before the step. z (m,) : measurement.
+
+    Raises
+    ------
+    ZeroDivisionError : :math:`HP_pH^T + R` is singular.
+    """
+    Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
+    predicted = Phi @ P @ Phi.T + Q
+    S = H @ predicted @ H.T + R
+    gain = predicted @ H.T @ _inverse_of(S)
+    transition = Phi - gain @ (H @ Phi)
+    innovation = z - H @ (Phi @ x)
+    return ExactStep(
+        Phi @ x + gain @ innovation, predicted - gain @ (H @ predicted), predicted, gain, S, innovation, transition
+    )
+
+
+def _inverse_of(S: NDArray[Any]) -> NDArray[Any]:
+    m = len(S)
+    inverse = fmpq_mat(m, m, [fmpq(s.numerator, s.denominator) for s in S.flat]).inv()
+    entries = [Fraction(int(e.p), int(e.q)) for e in inverse.entries()]
+    return np.array(entries, dtype=object).reshape(m, m)
+
+
+# -- the contraction bound --------------------------------------------------------------------------------------------
+
+_U = 2.0**-53
+
+
+class Contraction(NamedTuple):
+    r"""The bound after a step: :math:`\|e_k\|_k \le \eta`, :math:`\|L_k^{-1}E_kL_k^{-T}\|_F \le \zeta`.
+
+    Infinite where nothing can be said: the error of the covariance is too large for the gain to be known.
+    """
+
+    #: (n, n), the weights, a lower triangle.
+    L: NDArray[np.float64]
+    #: bounds the error of the state, in standard deviations.
+    eta: float
+    #: bounds the error of the covariance, relative to it.
+    zeta: float
+    #: bounds the norm of :math:`A_k`, at most about 1.
+    alpha: float
+    #: (m,), bounds what the error of the covariance does to each column of the gain.
+    gain: NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def contraction_start(P: Any, de: Any, dE: Any) -> Any:
+    """Begin the bound.
+
+    Parameters
+    ----------
+    P : (n, n), first covariance, for the weights.
+    de, dE : (n,) and (n, n), componentwise bounds of the errors of the first state and covariance; zero if exact.
+
+    Returns
+    -------
+    bound : Contraction.
+    """
+    L = _weights((P + P.T) / 2)
+    Y, delta = _inverse(L)
+    eta = _norm(_times(np.abs(Y), de.reshape(-1, 1))) / (1 - delta)
+    zeta = _norm(_times(_times(np.abs(Y), dE), np.abs(Y).T)) / (1 - delta) ** 2
+    up = 1 + _many(len(P), 0)
+    if not (delta < 1 and eta < np.inf and zeta < np.inf):
+        eta, zeta = np.inf, np.inf
+    return Contraction(L, eta * up, zeta * up, 1.0, np.zeros(1))
+
+
+@njit(cache=True, nogil=True)
+def contraction_step(
+    before: Any,
+    Phi: Any,
+    H: Any,
+    Q: Any,
+    R: Any,
+    K: Any,
+    S: Any,
+    innovation: Any,
+    q: Any,
+    T: Any,
+    dq: Any,
+    dT: Any,
+    dK: Any,
+    dinnovation: Any,
+) -> Any:
+    r"""Take the bound over one step.
+
+    .. math:: \zeta_k = \|T_k\|_k + \frac{\alpha^2\zeta}{1-g\zeta}, \qquad
+        \eta_k = \|q_k\|_k + \frac{\alpha\,(\eta + \|y_k\|\zeta)}{1-g\zeta}, \qquad g\zeta < 1,
+
+    with :math:`\alpha = \|L_k^{-1}A_kL_{k-1}\|_2`, :math:`g = \|L_{k-1}^TG_kL_{k-1}\|`,
+    :math:`\|y_k\| = \|L_{k-1}^Ty_k\|`. The weights :math:`L_kL_k^T` go on by Joseph's form with the gain K.
+
+    Parameters
+    ----------
+    before : the bound after the step before, Contraction.
+    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model, nearest float64.
+    K (n, m), S (m, m), innovation (m,) : gain K°, innovation covariance S° and ν̂ of the exact step from what the
+        program had, nearest float64 of a double-double evaluation.
+    q (n,), T (n, n) : residuals of the step, program minus exact step, subtracted before they become float64.
+    dq, dT, dK, dinnovation : componentwise bounds of the errors of that evaluation, of :func:`evaluation_errors`.
+
+    Returns
+    -------
+    bound : Contraction.
+    """
+    n, m = K.shape
+    L, zeta = before.L, before.zeta
+    many = _many(n, m)
+    HPhi = _times(H, Phi)
+    A = Phi - _times(K, HPhi)
+    aK, aH, aPhi, aL = np.abs(K), np.abs(H), np.abs(Phi), np.abs(L)
+    AL = _times(A, L)
+    C = np.eye(n) - _times(K, H)
+    W = _times(AL, AL.T) + _times(_times(C, Q), C.T) + _times(_times(K, R), K.T)
+    new = _weights((W + W.T) / 2)
+    Y, delta = _inverse(new)
+    aY = np.abs(Y)
+    # What A, AL and YAL may be off: their roundings, and the error of K.
+    spread = _times(aPhi + _times(aK, _times(aH, aPhi)), aL) * many + _times(dK, _times(aH, _times(aPhi, aL)))
+    alpha = (_norm2(_times(Y, AL)) + _norm(_times(aY, spread))) / (1 - delta)
+
+    inverse, dinverse = _inverse_general(S)
+    HL, aHL = _times(HPhi, L), _times(aH, _times(aPhi, aL))
+    N, dN = _times(HL.T, inverse), _times(aHL.T, dinverse + many * np.abs(inverse))  # L'N, N = Phi' H' S^-1
+    g = _norm(_times(N, HL)) + _norm(_times(dN, aHL)) + many * _norm(_times(np.abs(N), aHL))
+    nu, dnu = innovation.reshape(-1, 1), dinnovation.reshape(-1, 1) + many * np.abs(innovation).reshape(-1, 1)
+    y = _norm(_times(N, nu)) + _norm(_times(dN, np.abs(nu) + dnu)) + _norm(_times(np.abs(N), dnu))
+
+    q1, dq1 = q.reshape(-1, 1), (dq + many * np.abs(q)).reshape(-1, 1)
+    size_q = (_norm(_times(Y, q1)) + _norm(_times(aY, dq1))) / (1 - delta)
+    size_T = (_norm(_times(_times(Y, T), Y.T)) + _norm(_times(_times(aY, dT + many * np.abs(T)), aY.T))) / (
+        1 - delta
+    ) ** 2
+    up = 1 + many  # roundings of these few norms and sums
+    known = 1 - g * zeta * up
+    columns = np.zeros(m)
+    if not (delta < 1 and known > 0 and alpha < np.inf and size_T < np.inf and size_q < np.inf and y < np.inf):
+        return Contraction(new, np.inf, np.inf, alpha, columns + np.inf)
+    for j in range(m):
+        columns[j] = (_norm(N[:, j : j + 1]) + _norm(dN[:, j : j + 1])) * alpha * zeta / known * up
+    eta = (size_q + alpha * (before.eta + y * zeta) / known) * up
+    return Contraction(new, eta, (size_T + alpha * alpha * zeta / known) * up, alpha, columns)
+
+
+@njit(cache=True, nogil=True)
+def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
+    r"""Bound the errors of the evaluation of one step, componentwise.
+
+    It is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`,
+    :math:`K = P_pH^TS^{-1}` by Cholesky or by elimination without exchange of rows, the inverse formed or not, P by
+    :math:`(I-KH)P_p` or Joseph's form, its two halves averaged; sums in any order.
+
+    Parameters
+    ----------
+    Phi, H, Q, R : the model. x (n,), P (n, n) : where the step starts. z (m,) : measurement.
+    K (n, m), S (m, m) : gain and innovation covariance of this step.
+    unit : unit roundoff of one operation of the evaluation, 2**-102 for :mod:`gpbnb._kernels.doubledouble`.
+
+    Returns
+    -------
+    dq (n,), dT (n, n), dK (n, m), dinnovation (m,).
+    """
+    n, m = K.shape
+    many = (16 * (n + m) + 64) * unit * (1 + _many(n, m))
+    aPhi, aH, aK = np.abs(Phi), np.abs(H), np.abs(K)
+    predicted = _times(_times(aPhi, np.maximum(np.abs(P), np.abs(P.T))), aPhi.T) + np.abs(Q)
+    PH = _times(predicted, aH.T)
+    sizes = _times(aH, PH) + np.abs(R)
+    pivots = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            pivots[i, j] = math.sqrt(sizes[i, i] * sizes[j, j])
+    inverse, dinverse = _inverse_general(S)
+    aS = np.abs(inverse) + dinverse
+    dK = many * _times(PH + m * _times(_times(PH, aS), pivots), aS)
+    left = np.eye(n) + _times(aK, aH)
+    dT = many * (_times(_times(left, predicted), left.T) + _times(_times(aK, np.abs(R)), aK.T))
+    dT += 2 * _times(_times(dK, PH.T), left.T) + 2 * _times(left, _times(PH, dK.T))
+    ahead = _times(aPhi, np.abs(x).reshape(-1, 1))
+    seen = np.abs(z).reshape(-1, 1) + _times(aH, ahead)
+    dq = many * (ahead + _times(aK, seen)) + _times(dK, seen)
+    return dq[:, 0], dT, dK, many * seen[:, 0]
+
+
+@njit(cache=True, nogil=True)
+def state_error_bound(bound: Any) -> Any:
+    r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,), in its units."""
+    rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
+    return rows * bound.eta
+
+
+@njit(cache=True, nogil=True)
+def covariance_error_bound(bound: Any) -> Any:
+    r"""Bound each entry of the error of the covariance, :math:`\zeta\sqrt{(LL^T)_{ii}(LL^T)_{jj}}`; (n, n)."""
+    rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
+    return bound.zeta * np.outer(rows, rows)
+
+
+@njit(cache=True, nogil=True)
+def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
+    r"""Bound each entry of the error of the gain that the program used in the step that led to `bound`; (n, m).
+
+    .. math:: \hat K_k - K_k = (\hat K_k - K^\circ_k) + F_k E_{k-1} \Phi^T H^T S^{\circ-1}
+
+    Parameters
+    ----------
+    bound : Contraction after the step. K, dK : as in :func:`contraction_step`. used : (n, m), the program's gain.
+    """
+    up = 1 + _many(K.shape[0], K.shape[1])
+    rows = np.sqrt((bound.L * bound.L).sum(axis=1))
+    return (np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(rows, bound.gain)) * up
+
+
+def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
+    r"""Bound the errors of a run by those of a companion, of more digits say, that has a small bound of its own.
+
+    .. math:: |\hat x - x| \le |\hat x - \hat x_c| + |\hat x_c - x|
+
+    Parameters
+    ----------
+    difference : the run minus its companion, entry by entry, subtracted before it became float64.
+    bound : of each entry of the companion's errors, as from :func:`state_error_bound`.
+    """
+    return (np.abs(difference) + np.asarray(bound)) * (1 + 4 * _U)
+
+
+@njit(cache=True)
+def _many(n: int, m: int) -> float:
+    """Bounds the relative error, by magnitudes, of what a step computes in float64."""
+    return (16 * (n + m) + 64) * _U
+
+
+@njit(cache=True)
+def _times(A: Any, B: Any) -> Any:
+    rows, inner, columns = A.shape[0], A.shape[1], B.shape[1]
+    product = np.zeros((rows, columns))
+    for i in range(rows):
+        for k in range(inner):
+            a = A[i, k]
+            if a != 0.0:
+                for j in range(columns):
+                    product[i, j] += a * B[k, j]
+    return product
+
+
+@njit(cache=True)
+def _norm(A: Any) -> float:
+    total = 0.0
+    for i in range(A.shape[0]):
+        for j in range(A.shape[1]):
+            total += A[i, j] * A[i, j]
+    return math.sqrt(total)
+
+
+@njit(cache=True)
+def _norm2(X: Any) -> float:
+    """Upper bound of the largest singular value: mu - X'X proved positive by elimination, mu found by bisection.
+
+    Elimination that runs through proves a matrix of trace t to be above -2 (n + 2) u t (Rump 2006).
+    """
+    n = X.shape[1]
+    B = _times(X.T, X)
+    trace = 0.0
+    for i in range(n):
+        trace += B[i, i]
+    if not trace < np.inf:
+        return np.inf
+    low, high = trace / n * 0.999, trace
+    while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # what matters is how far it is from 1
+        middle = low + (high - low) / 2
+        if not low < middle < high:
+            break
+        if _is_positive(middle, B):
+            high = middle
+        else:
+            low = middle
+    return math.sqrt(high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace) * (1 + 4 * _U)
+
+
+@njit(cache=True)
+def _is_positive(mu: float, B: Any) -> bool:
+    n = len(B)
+    M = -B
+    for i in range(n):
+        M[i, i] += mu
+    for k in range(n):
+        if not M[k, k] > 0:
+            return False
+        for i in range(k + 1, n):
+            factor = M[i, k] / M[k, k]
+            for j in range(k + 1, n):
+                M[i, j] -= factor * M[k, j]
+    return True
+
+
+@njit(cache=True)
+def _weights(W: Any) -> Any:
+    """A nonsingular lower factor of about W: any will do, so a pivot that is lost is replaced by a small one."""
+    n = len(W)
+    L = np.zeros((n, n))
+    for j in range(n):
+        pivot = W[j, j]
+        for k in range(j):
+            pivot -= L[j, k] * L[j, k]
+        least = 1e-13 * abs(W[j, j])
+        if not pivot > least:
+            pivot = least if least > 0 else 1.0
+        L[j, j] = math.sqrt(pivot)
+        for i in range(j + 1, n):
+            entry = W[i, j]
+            for k in range(j):
+                entry -= L[i, k] * L[j, k]
+            L[i, j] = entry / L[j, j]
+    return L
+
+
+@njit(cache=True)
+def _inverse(L: Any) -> Any:
+    """Y near the inverse of a lower matrix, and a bound of the Frobenius norm of YL - I."""
+    n = len(L)
+    Y = np.zeros((n, n))
+    for j in range(n):
+        Y[j, j] = 1 / L[j, j]
+        for i in range(j + 1, n):
+            entry = 0.0
+            for k in range(j, i):
+                entry -= L[i, k] * Y[k, j]
+            Y[i, j] = entry / L[i, i]
+    return Y, _norm(_times(Y, L) - np.eye(n)) + _many(n, 0) * _norm(_times(np.abs(Y), np.abs(L)))
+
+
+@njit(cache=True)
+def _inverse_general(S: Any) -> Any:
+    """Inverse of S by elimination with pivoting, and a componentwise bound of its error; infinite if singular."""
+    m = len(S)
+    M, Y = S.copy(), np.eye(m)
+    for k in range(m):
+        p = k
+        for i in range(k + 1, m):
+            if abs(M[i, k]) > abs(M[p, k]):
+                p = i
+        if not abs(M[p, k]) > 0:
+            return np.eye(m), np.full((m, m), np.inf)
+        for j in range(m):
+            M[k, j], M[p, j] = M[p, j], M[k, j]
+            Y[k, j], Y[p, j] = Y[p, j], Y[k, j]
+        pivot = M[k, k]
+        for j in range(m):
+            M[k, j] /= pivot
+            Y[k, j] /= pivot
+        for i in range(m):
+            factor = M[i, k]
+            if i != k and factor != 0.0:
+                for j in range(m):
+                    M[i, j] -= factor * M[k, j]
+                    Y[i, j] -= factor * Y[k, j]
+    # (I + E) S^-1 = Y with E = YS - I, so |S^-1 - Y| <= |E| |Y| / (1 - |E|), norms of rows and all.
+    aY = np.abs(Y)
+    E = np.abs(_times(Y, S) - np.eye(m)) + _many(m, m) * _times(aY, np.abs(S))
+    largest = 0.0
+    for i in range(m):
+        largest = max(largest, E[i].sum())
+    if not largest < 0.5:
+        return Y, np.full((m, m), np.inf)
+    return Y, 2 * _times(np.full((m, m), largest), aY)

@@ -1,0 +1,271 @@
+"""gpbnb.kalman.ensembles: trials come out the same wherever they run, and none is lost when workers die."""
+
+from __future__ import annotations
+
+import csv
+import os
+import signal
+import threading
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+
+import numpy as np
+import pytest
+from distributed import Client, KilledWorker, LocalCluster
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import ensembles
+from gpbnb.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
+from gpbnb.kalman.experiment import Form, bounded, emulate
+
+SINGLE = FloatFormat(2, 24)
+
+
+def some(count=8):
+    return tuple(
+        Task("stable", SINGLE, form, seed, 16) for seed in range(count // 2) for form in (Form.REPORT, Form.UD)
+    )
+
+
+# -- trials ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_trial_compares_every_step_with_the_bounds(kind):
+    task = Task(kind, FloatFormat(10, 8, Rounding.CHOP), Form.JOSEPH, 3, 10)
+    found = trial(task)
+    rng = np.random.default_rng([3, KINDS.index(kind)])
+    model, size = random_model(rng, kind)
+    z = np.array([[float(f"{v:.6g}") for v in row] for row in size * rng.standard_normal((10, model.m))])
+    z = np.abs(z) if kind == "one sign" else z
+    run = bounded(model, z, task.fmt, task.form, range(1, 11))
+    assert [found.state, found.gain, found.covariance] == run.ratios().max(axis=0).tolist()
+    assert found.last == run.ratios()[-1, 0]
+    assert found.bounded == np.isfinite(run.state).all(axis=1).mean()
+    history = emulate(model, z, task.fmt, task.form, range(1, 11))
+    beta, n, m = 1e-7, model.n, model.m
+    for error, true, count, ratio in (
+        (history.covariance, history.reference.P, 3 * n + m + 2, found.printed_covariance),
+        (history.gain, history.reference.K, 4 * n + 2 * m + 3, found.printed_gain),
+    ):
+        true = true.astype(float)
+        assert ratio == pytest.approx(np.nanmax(np.abs(error) / (count * beta * np.abs(true))), rel=1e-12)
+    # (125) as it is printed, with the least B that (122) allows.
+    x, K = history.reference.x.astype(float), history.reference.K.astype(float)
+    given = model.to_float()
+    Phi, H = given["Phi"][0], given["H"][0]
+    worst = F = u = 0.0
+    c = 7 * n + 3 * m + 6
+    for k in range(1, 11):
+        F = max(F, np.abs((np.eye(n) - K[k - 1] @ H) @ Phi).sum(axis=0).max())
+        u = max(u, np.abs(K[k - 1] @ z[k - 1]).max())
+        B = u * max(1, F ** (k - 1))
+        bound = beta * (k * c * np.abs(x[k - 1]).max() + (k * (3 * n + 1) + k * (k - 1) * c / 2) * B)
+        worst = max(worst, np.abs(history.state[k - 1]).max() / bound)
+    # The model is stored in eight digits, which enter F and u.
+    assert found.printed_state == pytest.approx(worst, rel=1e-4)
+
+
+def test_models_are_of_their_kinds():
+    for seed in range(20):
+        models = {kind: random_model(np.random.default_rng([seed, 0]), kind)[0] for kind in KINDS}
+        radius = {kind: np.abs(np.linalg.eigvals(model.to_float()["Phi"][0])).max() for kind, model in models.items()}
+        assert radius["stable"] < 0.951
+        assert radius["far scales"] < 0.96
+        assert 0.979 < radius["oscillating"] < 1
+        assert radius["drifting"] == pytest.approx(1, abs=1e-3)
+        assert (models["one sign"].to_float()["Phi"] >= 0).all()
+        assert (models["one sign"].to_float()["H"] >= 0).all()
+        assert all(1 <= model.n <= 4 and 1 <= model.m <= 2 for model in models.values())
+    with pytest.raises(ValueError, match="got kind 'odd'; needed one of stable"):
+        random_model(np.random.default_rng(0), "odd")
+
+
+def test_tasks_are_every_kind_format_and_form():
+    todo = tasks(2, steps=7, first_seed=5)
+    assert len(todo) == len(set(todo)) == 2 * len(KINDS) * len(FORMATS) * len(Form)
+    assert {task.seed for task in todo} == {5, 6}
+    assert {task.steps for task in todo} == {7}
+
+
+# -- what the package brings ----------------------------------------------------------------------
+
+
+def test_no_bound_was_violated_in_ten_thousand_trials():
+    found = ensembles.load()
+    assert [(each.kind, each.form) for each in found] == [(kind, form.name.lower()) for kind in KINDS for form in Form]
+    assert sum(each.trials for each in found) == ensembles.provenance()["trials"] == 10_200
+    for each in found:
+        assert each.contraction_violations == 0
+        assert max(each.state, each.gain, each.covariance) <= 1
+        # Not in vain: mostly finite, near the error somewhere, and within two powers of ten of it at the end.
+        assert each.steps_bounded > 0.7
+        assert each.state > 0.99
+        assert each.compared > 0.7 * each.trials
+        assert each.typical > 0.01
+        assert each.violations_105 > 0 and each.violations_108 > 0  # noqa: PT018
+    assert sum(each.violations_125 for each in found) > 1000
+
+
+@pytest.mark.parametrize("seed", [0, 33])
+def test_a_part_of_the_sweep_comes_out_as_it_is_stored(seed):
+    with (ensembles._HERE / "ensembles.csv").open(encoding="utf-8", newline="") as file:
+        stored = [tuple(line) for line in csv.reader(file)]
+    assert stored[0] == ensembles.HEADER
+    todo = [task for task in tasks(1, first_seed=seed) if task.kind in ("one sign", "far scales")]
+    expected = [line for line in stored if line[:2] in {(str(seed), "one sign"), (str(seed), "far scales")}]
+    assert ensembles.lines(seed, sweep(todo, batch=len(todo))) == expected
+
+
+def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
+    monkeypatch.setattr(ensembles, "FORMATS", (SINGLE,))
+    monkeypatch.setattr(ensembles, "KINDS", KINDS[:1])
+    monkeypatch.setattr(ensembles, "sweep", lambda todo, progress: tuple(trial(task) for task in todo))
+    assert ensembles.main(["--repeats", "2", "--output", str(tmp_path / "new")]) == 0
+    found = ensembles.load(tmp_path / "new")
+    assert [each.form for each in found] == [form.name.lower() for form in Form]
+    assert [each.trials for each in found] == [2] * len(Form)
+    again = summaries([trial(task) for task in tasks(2)])
+    for stored, each in zip(found, again, strict=True):
+        assert stored._replace(**dict.fromkeys(stored._fields[2:], 0)) == each._replace(
+            **dict.fromkeys(stored._fields[2:], 0)
+        )
+        assert stored[2:] == pytest.approx(each[2:], rel=1e-5)
+    assert ensembles.provenance(tmp_path / "new")["trials"] == 10
+    (tmp_path / "new" / "ensembles.csv").write_text("kind\n", encoding="utf-8")
+    ensembles.load.cache_clear()
+    with pytest.raises(ValueError, match="make it anew"):
+        ensembles.load(tmp_path / "new")
+
+
+def outcome(form=Form.UD, **changed):
+    values = dict.fromkeys(("state", "gain", "covariance", "last", "bounded"), 0.5)
+    values |= dict.fromkeys(("printed_covariance", "printed_gain", "printed_state"), 0.25)
+    return Outcome(Task("stable", SINGLE, form, 0, 4), **(values | {"indefinite": False} | changed))
+
+
+def test_a_summary_counts():
+    found = summaries(
+        [
+            outcome(state=1.5, printed_gain=3.0),
+            outcome(gain=np.nan, last=0.0, bounded=0.0),
+            outcome(covariance=np.inf, last=0.02, indefinite=True, printed_covariance=1.01),
+            outcome(Form.USUAL, printed_state=7.0),
+            outcome(),
+        ]
+    )
+    assert [each.form for each in found] == ["ud", "usual"]
+    ud, usual = found
+    assert (ud.trials, usual.trials) == (4, 1)
+    assert ud.contraction_violations == 3  # no number is no bound
+    assert ud.steps_bounded == 0.375
+    assert ud.state == 1.5
+    assert ud.compared == 3
+    assert ud.typical == pytest.approx((0.5 * 0.02 * 0.5) ** (1 / 3))
+    assert (ud.violations_105, ud.worst_105) == (1, 1.01)
+    assert (ud.violations_108, ud.worst_108) == (1, 3.0)
+    assert (ud.violations_125, ud.worst_125) == (0, 0.25)
+    assert (usual.violations_125, usual.worst_125) == (1, 7.0)
+    assert (ud.indefinite, usual.indefinite) == (1, 0)
+
+
+# -- executors ------------------------------------------------------------------------------------
+
+
+def test_threads_and_one_after_another_give_the_same():
+    todo = some()
+    serial = sweep(todo, batch=len(todo))
+    assert serial == tuple(trial(task) for task in todo)
+    with ThreadPoolExecutor(2) as pool:
+        assert sweep(todo, pool, batch=3) == serial
+
+
+class Failing(Executor):
+    """Fails with given exceptions first, then works."""
+
+    def __init__(self, *errors):
+        self.errors, self.sent = list(errors), 0
+
+    def submit(self, function, /, *arguments):
+        self.sent += 1
+        future = Future()
+        if self.errors:
+            future.set_exception(self.errors.pop(0))
+        else:
+            future.set_result(function(*arguments))
+        return future
+
+
+def killed():
+    return KilledWorker("some", None, 3)
+
+
+def test_a_batch_whose_worker_died_is_sent_anew():
+    executor = Failing(killed(), killed())
+    assert sweep(some(4), executor, batch=2) == sweep(some(4), batch=4)
+    assert executor.sent == 4
+
+
+def test_after_so_many_deaths_it_is_told():
+    executor = Failing(*(killed() for _ in range(9)))
+    with pytest.raises(RuntimeError, match="got 3 workers that died under one batch of 2 trials"):
+        sweep(some(2), executor, batch=2, attempts=3)
+    assert executor.sent == 3
+
+
+@pytest.mark.parametrize("error", [ValueError("mine"), BrokenProcessPool("gone")])
+def test_another_error_is_not_hidden(error):
+    executor = Failing(error)
+    with pytest.raises(type(error)):
+        sweep(some(2), executor)
+    assert executor.sent == 1
+
+
+@pytest.mark.parametrize("changed", [{"batch": 0}, {"attempts": 0}])
+def test_what_a_sweep_refuses(changed):
+    with pytest.raises(ValueError, match="needed both at least 1"):
+        sweep(some(2), **changed)
+
+
+def test_nothing_to_do_is_done():
+    assert sweep(()) == ()
+
+
+@pytest.fixture
+def cluster():
+    """Two worker processes, each under a nanny that starts it again when it dies."""
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        yield cluster
+
+
+@pytest.mark.filterwarnings("default")  # of a worker that is killed while it speaks
+def test_none_is_lost_on_a_cluster_whose_workers_are_killed(cluster):
+    todo = some(120)
+    with Client(cluster) as client:
+        pids = set(client.run(os.getpid).values())
+        assert len(pids) == 2
+        finished, killed_pids = threading.Event(), []
+
+        def kill():
+            """Each worker once, while they work."""
+            for pid in pids:
+                if finished.wait(1.0):
+                    return
+                os.kill(pid, signal.SIGKILL)
+                killed_pids.append(pid)
+
+        assassin = threading.Thread(target=kill)
+        assassin.start()
+        try:
+            found = sweep(todo, client.get_executor(), batch=4)
+        finally:
+            finished.set()
+            assassin.join()
+        assert set(killed_pids) == pids
+        assert not pids & set(client.run(os.getpid).values())
+    assert found == sweep(todo, batch=len(todo))
+
+
+def test_the_processes_of_this_machine_give_the_same():
+    todo = some(4)
+    assert sweep(todo, batch=2) == sweep(todo, batch=4)

@@ -1,0 +1,574 @@
+"""gpbnb.kalman.experiment: every digit of the compiled filters against filters on Fractions, written anew here."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import oracles
+import pytest
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import smallest, theory
+from gpbnb.kalman.experiment import (
+    BLOCK,
+    Followed,
+    Form,
+    Run,
+    Simulation,
+    bounded,
+    compare_runs,
+    emulate,
+    log_spaced,
+    reference,
+)
+from gpbnb.kalman.model import LinearModel, gravity_probe_b
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FORMATS = (
+    FloatFormat(2, 11, NEAREST),
+    FloatFormat(2, 24, CHOP),
+    FloatFormat(2, 53, NEAREST),
+    FloatFormat(10, 4, CHOP),
+    FloatFormat(10, 8, NEAREST),
+    FloatFormat(10, 12, NEAREST),
+    FloatFormat(16, 6, CHOP),
+)
+STEPS = 6
+
+
+def model(**changed):
+    """Three states and two measurements, nothing zero, one or the same; H and R are cycles of 2 and 3."""
+    return LinearModel(
+        **{
+            "Phi": [["0.91", "0.3", "-0.07"], ["-0.23", "0.84", "0.11"], ["0.05", "-0.4", "0.77"]],
+            "H": [[["1.3", "-0.7", "0.2"], ["0.4", "0.9", "-1.1"]], [["0.6", "0.1", "1.7"], ["-0.3", "1.2", "0.8"]]],
+            "Q": [["0.3", "0.1", "0.02"], ["0.1", "0.4", "-0.03"], ["0.02", "-0.03", "0.5"]],
+            "R": [
+                [["0.7", "0.2"], ["0.2", "0.9"]],
+                [["1.1", "-0.3"], ["-0.3", "0.6"]],
+                [["0.8", "0.05"], ["0.05", "1.2"]],
+            ],
+            "x0": ["1.7", "-2.3", "0.6"],
+            "P0": [["2.1", "0.3", "-0.4"], ["0.3", "1.9", "0.2"], ["-0.4", "0.2", "1.4"]],
+            **changed,
+        }
+    )
+
+
+def measurements(steps=STEPS, m=2):
+    return np.round(np.random.default_rng(1).standard_normal((steps, m)) * 3, 2)
+
+
+class Slow:
+    """Filters on lists of Fractions, each operation rounded by the oracle; exact if there is no format."""
+
+    def __init__(self, told, fmt):
+        self.told = told
+        arithmetic = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST) if fmt else None
+        self.fl = arithmetic.fl if arithmetic else lambda x: x
+        self.arithmetic = arithmetic
+        self.x = [[self.fl(v)] for v in told.x0]
+        self.P = self.held(told.P0)
+
+    def held(self, matrix):
+        return [[self.fl(v) for v in row] for row in matrix]
+
+    def times(self, *matrices):
+        result = matrices[0]
+        for other in matrices[1:]:
+            columns = list(zip(*other, strict=True))
+            rows = []
+            for row in result:
+                products = [[self.fl(p * q) for p, q in zip(row, column, strict=True)] for column in columns]
+                rows.append([self.total(each) for each in products])
+            result = rows
+        return result
+
+    def total(self, terms):
+        s = terms[0]
+        for term in terms[1:]:
+            s = self.fl(s + term)
+        return s
+
+    def plus(self, a, b, sign=1):
+        return [[self.fl(p + sign * q) for p, q in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+    def inverse(self, S):
+        if self.arithmetic:
+            return self.arithmetic.inv(S, pivot=False)
+        (a, b), (c, d) = S
+        return [[d / (a * d - b * c), -b / (a * d - b * c)], [-c / (a * d - b * c), a / (a * d - b * c)]]
+
+    def step(self, k, z, form):
+        Phi, H, Q, R = (
+            self.held(each[k % len(each)]) for each in (self.told.Phi, self.told.H, self.told.Q, self.told.R)
+        )
+        Pt, Ht = transposed(Phi), transposed(H)
+        z = [[self.fl(v)] for v in z]
+        identity = [[Fraction(int(i == j)) for j in range(len(Phi))] for i in range(len(Phi))]
+        predicted = self.plus(self.times(Phi, self.P, Pt), Q)
+        PH = self.times(predicted, Ht)
+        self.K = self.times(PH, self.inverse(self.plus(self.times(H, PH), R)))
+        W = self.plus(identity, self.times(self.K, H), -1)
+        if form is Form.JOSEPH:
+            noise = self.times(self.K, R, transposed(self.K))
+            self.P = self.plus(self.times(W, predicted, transposed(W)), noise)
+        else:
+            self.P = self.times(W, predicted)
+        if form is Form.SECOND:
+            self.K = self.times(self.P, Ht, self.inverse(R))
+            W = self.plus(identity, self.times(self.K, H), -1)
+        if form in (Form.REPORT, Form.SECOND):
+            self.x = self.plus(self.times(W, Phi, self.x), self.times(self.K, z))
+        else:
+            ahead = self.times(Phi, self.x)
+            self.x = self.plus(ahead, self.times(self.K, self.plus(z, self.times(H, ahead), -1)))
+
+
+def transposed(matrix):
+    return [list(column) for column in zip(*matrix, strict=True)]
+
+
+def run(fmt, form, told=None, z=None):
+    told, z = told or model(), measurements() if z is None else z
+    found = Run(told, fmt, form, range(1, len(z) + 1))
+    found.take(z)
+    return found
+
+
+# -- every digit ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", [Form.REPORT, Form.SECOND, Form.USUAL, Form.JOSEPH])
+@pytest.mark.parametrize("fmt", FORMATS)
+def test_every_digit_is_that_of_a_filter_on_fractions(fmt, form):
+    told, z = model(), measurements()
+    kept = run(fmt, form).kept()
+    slow = Slow(told, fmt)
+    assert kept.steps == tuple(range(1, STEPS + 1))
+    for k in range(STEPS):
+        slow.step(k, [Fraction(float(v)) for v in z[k]], form)
+        assert [[v] for v in kept.x[k]] == slow.x
+        assert kept.K[k].tolist() == slow.K
+        assert kept.P[k].tolist() == slow.P
+
+
+class SlowUD:
+    """Thornton's and Bierman's recursions, from Bierman 1977, ch. V and VI, on Fractions; each operation rounded."""
+
+    def __init__(self, told, fmt):
+        self.told, self.fl = told, oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST).fl
+        self.n = told.n
+        self.U, self.D = self.factors(told.P0)
+        self.x = [self.fl(v) for v in told.x0]
+
+    def held(self, matrix):
+        return [[self.fl(v) for v in row] for row in matrix]
+
+    def factors(self, matrix):
+        fl, a = self.fl, self.held(matrix)
+        n = len(a)
+        U, D = [[Fraction(int(i == j)) for j in range(n)] for i in range(n)], [Fraction(0)] * n
+        for j in reversed(range(n)):
+            D[j] = a[j][j]
+            for i in range(j):
+                U[i][j] = fl(a[i][j] / D[j])
+            for i in range(j):
+                for k in range(i + 1):
+                    a[k][i] = fl(a[k][i] - fl(U[k][j] * a[i][j]))
+        return U, D
+
+    def dot(self, terms):
+        s = terms[0]
+        for term in terms[1:]:
+            s = self.fl(s + term)
+        return s
+
+    def step(self, k, z):
+        fl, n, told = self.fl, self.n, self.told
+        Phi, H = self.held(told.Phi[k % len(told.Phi)]), self.held(told.H[k % len(told.H)])
+        UQ, DQ = self.factors(told.Q[k % len(told.Q)])
+        UR, DR = self.factors(told.R[k % len(told.R)])
+        # Thornton: orthogonalise the rows of (Phi U, UQ), weighed by (D, DQ), the last one first.
+        W = [[self.dot([fl(Phi[i][p] * self.U[p][j]) for p in range(n)]) for j in range(n)] + UQ[i] for i in range(n)]
+        weights = self.D + DQ
+        for j in reversed(range(n)):
+            c = [fl(d * w) for d, w in zip(weights, W[j], strict=True)]
+            self.D[j] = self.dot([fl(w * v) for w, v in zip(W[j], c, strict=True)])
+            for i in range(j):
+                s = fl(self.dot([fl(w * v) for w, v in zip(W[i], c, strict=True)]) / self.D[j])
+                self.U[i][j] = s
+                W[i] = [fl(a - fl(s * b)) for a, b in zip(W[i], W[j], strict=True)]
+        self.x = [self.dot([fl(Phi[i][j] * self.x[j]) for j in range(n)]) for i in range(n)]
+        # Of two measurements with R = UR DR UR', the first less UR[0][1] times the second is not correlated with it.
+        u = UR[0][1]
+        rows = [[fl(a - fl(u * b)) for a, b in zip(*H, strict=True)], H[1]]
+        seen = [fl(fl(z[0]) - fl(u * fl(z[1]))), fl(z[1])]
+        self.gains = [self.observe(h, y, r) for h, y, r in zip(rows, seen, DR, strict=True)]
+
+    def observe(self, h, z, r):
+        fl, n = self.fl, self.n
+        y = z
+        for j in range(n):
+            y = fl(y - fl(h[j] * self.x[j]))
+        f = [self.dot([fl(self.U[i][j] * h[i]) for i in range(j)] + [h[j]]) for j in range(n)]
+        g = [fl(d * v) for d, v in zip(self.D, f, strict=True)]
+        a, gain = r, [Fraction(0)] * n
+        for j in range(n):
+            before, a = a, fl(a + fl(f[j] * g[j]))
+            self.D[j] = fl(fl(self.D[j] * before) / a)
+            factor = -fl(f[j] / before)
+            for i in range(j):
+                u = self.U[i][j]
+                self.U[i][j] = fl(u + fl(factor * gain[i]))
+                gain[i] = fl(gain[i] + fl(g[j] * u))
+            gain[j] = g[j]
+        gain = [fl(v / a) for v in gain]
+        self.x = [fl(v + fl(w * y)) for v, w in zip(self.x, gain, strict=True)]
+        return gain
+
+
+@pytest.mark.parametrize("fmt", FORMATS)
+def test_every_digit_of_the_factors_is_that_of_bierman_on_fractions(fmt):
+    z = measurements()
+    found, slow = run(fmt, Form.UD), SlowUD(model(), fmt)
+    triangles, gains = found.exactly(found.C), found.exactly(found.G)
+    for k in range(STEPS):
+        slow.step(k, [Fraction(float(v)) for v in z[k]])
+        assert found.exactly(found.X)[k, :, 0].tolist() == slow.x
+        assert triangles[k].diagonal().tolist() == slow.D
+        assert np.triu(triangles[k], 1).tolist() == np.triu(np.array(slow.U, dtype=object), 1).tolist()
+        assert gains[k].T.tolist() == slow.gains
+
+
+@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("fmt", [FloatFormat(10, 4), FloatFormat(2, 6, CHOP)])
+def test_the_smallest_filters_come_out_of_the_emulation_too(fmt, second):
+    """The chapter's counterexamples were found in exact arithmetic, on rounded Fractions."""
+    form = Form.SECOND if second else Form.REPORT
+    for case in (smallest.scalar(fmt), smallest.scalar(fmt, z=1), smallest.correlated()):
+        if case.P.shape == (2, 2) and fmt.base == 2:
+            continue  # its numbers are decimal
+        told = LinearModel(case.Phi, case.H, case.Q, case.R, case.x, case.P)
+        kept = run(fmt, form, told, np.array([case.z] * 3, dtype=object)).kept()
+        for k in range(3):
+            x, K, P = smallest.rounded_step(fmt, case, second)
+            case = case._replace(x=x, P=P)
+            assert (kept.x[k] == x).all()
+            assert (kept.K[k] == K).all()
+            assert (kept.P[k] == P).all()
+
+
+# -- the reference --------------------------------------------------------------------------------
+
+
+def exactly(told, z):
+    """Exact estimates, gains and covariances of each step."""
+    x, P, found = told.x0, told.P0, []
+    for k in range(len(z)):
+        Phi, H, Q, R = (each[k % len(each)] for each in (told.Phi, told.H, told.Q, told.R))
+        step = theory.exact_step(Phi, H, Q, R, x, P, z[k])
+        x, P = step.x, step.P
+        found.append(step)
+    return found
+
+
+def test_the_reference_is_the_exact_filter_to_thirty_digits():
+    told, z = model(), measurements()
+    kept = reference(told, z, range(1, STEPS + 1))
+    for k, step in enumerate(exactly(told, z)):
+        for found, true in ((kept.x[k], step.x), (kept.K[k], step.gain), (kept.P[k], step.P)):
+            # A hundred operations a step, each within 2**-102, on numbers that nothing here magnifies a hundredfold.
+            assert np.abs(found - true).max() < Fraction(10**4 * (k + 1), 2**102) * np.abs(true).max()
+
+
+@pytest.mark.parametrize("form", list(Form))
+def test_all_forms_are_one_filter(form):
+    """In double-double each is the exact filter; in many digits, each comes near."""
+    told, z = model(), measurements()
+    kept = reference(told, z, (STEPS,), form)
+    step = exactly(told, z)[-1]
+    for found, true in ((kept.x[0], step.x), (kept.P[0], step.P)):
+        assert np.abs(found - true).max() < Fraction(1, 2**85)
+    if form is not Form.SECOND:  # whose own gain is P H' R^-1 as well, but by another rounding
+        assert np.abs(kept.K[0] - step.gain).max() < Fraction(1, 2**85)
+    history = emulate(told, z, FloatFormat(2, 53), form)
+    assert 0 < history.state_norm.max() < 1e-14
+    assert history.gain_norm.max() < 1e-14
+    assert history.covariance_norm.max() < 1e-14
+    assert history.indefinite is None
+    assert history.stopped is None
+
+
+def test_errors_fall_with_the_digits_in_every_form():
+    told, z = model(), measurements(40)
+    for form in Form:
+        errors = [emulate(told, z, FloatFormat(2, t), form, (40,)).covariance_norm[0] for t in (12, 24, 36, 48)]
+        for coarse, fine in pairwise(errors):
+            assert 2**7 < coarse / fine < 2**17  # 2**12, and what chance may do
+
+
+def test_a_reference_of_the_model_as_given_adds_the_errors_of_storing_it():
+    told, z, fmt = model(), measurements(), FloatFormat(10, 4)
+    alone = emulate(told, z, fmt, Form.USUAL, (STEPS,))
+    stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
+    both = emulate(told, z, fmt, Form.USUAL, (STEPS,), reference(told, z, (STEPS,)))
+    step = exactly(told.rounded(fmt), stored)[-1]
+    assert alone.state[0] == pytest.approx((run(fmt, Form.USUAL).kept().x[-1] - step.x).astype(float), rel=1e-12)
+    step = exactly(told, z)[-1]
+    assert both.state[0] == pytest.approx((run(fmt, Form.USUAL).kept().x[-1] - step.x).astype(float), rel=1e-12)
+
+
+# -- runs -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", [Form.REPORT, Form.UD])
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), None])
+def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
+    told, z = model(), measurements(20)
+    whole, parts = run(fmt, form, told, z), Run(told, fmt, form, range(1, 21))
+    for piece in (z[:1], z[1:1], z[1:8], z[8:]):
+        parts.take(piece)
+    assert parts.steps == whole.steps == 20
+    for name in ("x", "P", "X", "G", "C", "notes"):
+        assert np.array_equal(getattr(parts, name), getattr(whole, name))
+
+
+def test_the_norms_of_a_history():
+    history = emulate(model(), measurements(), FloatFormat(10, 4), Form.REPORT, (2, 5))
+    assert history.steps.tolist() == [2, 5]
+    for at in range(2):
+        true = history.reference
+        assert history.state_norm[at] == np.abs(history.state[at]).max()
+        for norm, error, size in (
+            (history.gain_norm, history.gain, true.K),
+            (history.covariance_norm, history.covariance, true.P),
+        ):
+            columns = np.abs(error[at]).sum(axis=0).max() / np.abs(size[at].astype(float)).sum(axis=0).max()
+            assert norm[at] == pytest.approx(columns, rel=1e-15)
+        computed = true.P[at].astype(float) + history.covariance[at]
+        scale = np.diag(1 / np.sqrt(np.diag(true.P[at].astype(float))))
+        values = np.linalg.eigvalsh(scale @ (computed + computed.T) @ scale / 2)
+        assert history.least_eigenvalue[at] == pytest.approx(values[0], rel=1e-9)
+
+
+def scalar(r, p=1, h=1, q=0):
+    return LinearModel([[1]], [[h]], [[q]], [[r]], [1], [[p]])
+
+
+def test_a_variance_that_is_lost_is_a_result():
+    fmt = FloatFormat(10, 4)
+    history = emulate(scalar("1e-6"), np.ones((5, 1)), fmt, Form.REPORT, range(1, 6))
+    # 1 + 1e-6 is 1 in four digits, the gain is 1, and nothing is left of 1 - 1.
+    assert history.indefinite == 1
+    assert history.stopped is None
+    assert history.steps.tolist() == [1, 2, 3, 4, 5]
+    assert history.covariance[0, 0, 0] == pytest.approx(-1e-6, rel=1e-5)
+    assert emulate(scalar("1e-6"), np.ones((5, 1)), fmt, Form.JOSEPH).indefinite is None
+
+
+def test_a_covariance_that_is_indefinite_in_a_run_is_a_result():
+    """Two states that are nearly one, measured precisely, in four digits."""
+    told = LinearModel(np.eye(2), [[1, "0.99"]], np.zeros((2, 2)), [["1e-5"]], [0, 0], [[1, "0.97"], ["0.97", 1]])
+    found = {form: emulate(told, np.ones((30, 1)), FloatFormat(10, 4), form, range(1, 31)) for form in Form}
+    assert found[Form.REPORT].indefinite == 5
+    assert found[Form.REPORT].least_eigenvalue.min() < -1
+    # Joseph's keeps its variances, and loses the rest by less; the factors keep all.
+    assert found[Form.JOSEPH].indefinite is None
+    assert -1e-4 < found[Form.JOSEPH].least_eigenvalue.min() < 0
+    assert found[Form.UD].indefinite is None
+    assert found[Form.UD].least_eigenvalue.min() > 0
+    assert all(history.steps[-1] == 30 for history in found.values())
+
+
+def test_a_division_by_zero_ends_a_run_and_is_a_result():
+    """In the first step, P comes out as 0; R, whose size one digit does not tell from 0, must hold the rest."""
+    told = LinearModel([[1]], [[[1]], [[1]]], [[0]], [[[1]], [["1e-40"]]], [1], [[1]])
+    # The second row: P = 0.5 after the first step; S = 0.5 + 1e-40 = 0.5 in a format; K = 1, P = 0.
+    history = emulate(told, np.ones((4, 1)), FloatFormat(2, 8), Form.REPORT, range(1, 5))
+    assert history.indefinite == 2
+    # A negative variance can make S zero: P0 = 1, H'P H + R with one digit.
+    run = Run(scalar(1), FloatFormat(2, 8), Form.REPORT, range(1, 5))
+    run.P[...] = -1.0
+    run.take(np.ones((3, 1)))
+    assert run.stopped == 1
+    assert run.steps == 0
+    before = run.x.copy()
+    run.take(np.ones((3, 1)))
+    assert run.steps == 0
+    assert np.array_equal(run.x, before)
+    assert run.kept().steps == ()
+
+
+@pytest.mark.parametrize("form", list(Form))
+def test_a_number_beyond_the_carrier_ends_a_run_and_is_a_result(form):
+    """A state that grows by 1e60 a step, and that nobody sees: its variance would be 1e360 after the third."""
+    told = LinearModel([["1e60", 0], [0, 1]], [[0, 1]], np.zeros((2, 2)), [[1]], [1, 1], np.eye(2))
+    found = run(FloatFormat(2, 24), form, told, np.ones((9, 1)))
+    assert (found.steps, found.stopped) == (2, 3)
+    kept = found.kept()
+    history = compare_runs(found, reference(told, np.ones((2, 1)), (1, 2)))
+    assert history.stopped == 3
+    assert history.steps.tolist() == list(kept.steps) == [1, 2]
+    # Base 10 has exponents for it.
+    assert run(FloatFormat(10, 8), form, told, np.ones((9, 1))).steps == 9
+
+
+def test_what_a_run_refuses():
+    told = model()
+    with pytest.raises(ValueError, match="needed a format with compiled loops"):
+        Run(told, FloatFormat(3, 5), Form.REPORT, (1,))
+    for marks in ((2, 1), (0, 1), (1, 1)):
+        with pytest.raises(ValueError, match="needed steps of 1 or more, each above the one before"):
+            Run(told, FloatFormat(2, 24), Form.REPORT, marks)
+    for kind in (Run, Followed):
+        for z in (np.ones((3, 3)), np.ones(2)):
+            with pytest.raises(ValueError, match=r"needed \(steps, 2\)"):
+                kind(told, FloatFormat(2, 24), Form.REPORT, (1,)).take(z)
+    with pytest.raises(ValueError, match="finite"):
+        emulate(told, [[1.0, math.nan]], FloatFormat(2, 24))
+    with pytest.raises(OverflowError, match="beyond the range of the compiled loops"):
+        Run(scalar(Fraction(10**400)), FloatFormat(2, 24), Form.REPORT, (1,))
+    # In two digits 1.04 * 1.07 > 1.05**2 becomes 1.0 * 1.1 < 1.1**2.
+    close = LinearModel(np.eye(2), [[1, 0]], np.eye(2), [[1]], [0, 0], [["1.04", "1.05"], ["1.05", "1.07"]])
+    with pytest.raises(ValueError, match="needed covariances that stay definite"):
+        Run(close, FloatFormat(10, 2), Form.UD, (1,))
+    assert Run(close, FloatFormat(10, 3), Form.UD, (1,)).steps == 0
+    with pytest.raises(ValueError, match="needed the same"):
+        compare_runs(run(FloatFormat(2, 24), Form.REPORT), reference(told, measurements(), (2, 4)))
+    with pytest.raises(ArithmeticError, match="the reference stopped at step 1"):
+        reference(LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]]), np.ones((3, 1)), (1,))
+
+
+def test_marks():
+    assert log_spaced(1) == (1,)
+    assert log_spaced(1000, 3) == (1, 2, 5, 10, 22, 46, 100, 215, 464, 1000)
+    assert log_spaced(20, 1) == (1, 10, 20)
+    with pytest.raises(ValueError, match="got 0 steps"):
+        log_spaced(0)
+    with pytest.raises(ValueError, match="0 a decade"):
+        log_spaced(5, 0)
+
+
+def test_the_names_of_the_forms():
+    assert [str(form) for form in Form] == ["report", "report, second gain", "innovation", "Joseph", "UD"]
+
+
+# -- simulated measurements -----------------------------------------------------------------------
+
+
+def test_measurements_are_the_same_in_blocks_and_at_once():
+    source = Simulation(model(), (1.0, 2.0, 3.0), seed=3, resolution=0.25)
+    z = source.measurements(BLOCK + 10)
+    first, truth = source.block(0, np.array([1.0, 2.0, 3.0]))
+    second, _ = source.block(1, truth, 10)
+    assert np.array_equal(z, np.concatenate([first, second]))
+    assert np.array_equal(z * 4, np.rint(z * 4))
+    assert source.measurements(0).shape == (0, 2)
+    assert not np.array_equal(z, Simulation(model(), (1.0, 2.0, 3.0), seed=4, resolution=0.25).measurements(BLOCK + 10))
+
+
+def test_measurements_are_those_of_the_model():
+    """The filter that knows the model finds its innovations white, with the covariance that it predicts."""
+    told = model()
+    z = Simulation(told, tuple(told.x0.astype(float)), seed=5, resolution=2.0**-20).measurements(4000)
+    x, P = told.x0.astype(float), told.P0.astype(float) * 0 + np.eye(3) * 1e-12
+    given, squares, lagged, last = told.to_float(), [], [], None
+    for k in range(len(z)):
+        Phi, H, Q, R = (given[name][k % len(given[name])] for name in ("Phi", "H", "Q", "R"))
+        P = Phi @ P @ Phi.T + Q
+        S = H @ P @ H.T + R
+        innovation = np.linalg.solve(np.linalg.cholesky(S), z[k] - H @ Phi @ x)
+        K = P @ H.T @ np.linalg.inv(S)
+        x, P = Phi @ x + K @ (z[k] - H @ Phi @ x), P - K @ H @ P
+        squares.append(np.outer(innovation, innovation))
+        if last is not None:
+            lagged.append(np.outer(innovation, last))
+        last = innovation
+    # Means of 4000 products of unit normals: variance 2 or 1; five standard errors.
+    assert np.abs(np.mean(squares, axis=0) - np.eye(2)).max() < 5 * math.sqrt(2 / 4000)
+    assert np.abs(np.mean(lagged, axis=0)).max() < 5 / math.sqrt(3999)
+
+
+def test_what_a_simulation_refuses():
+    with pytest.raises(ValueError, match="got a start of 2 numbers; needed 3"):
+        Simulation(model(), (1.0, 2.0), 0, 1.0)
+    for resolution in (0.0, -1.0, math.inf, math.nan):
+        with pytest.raises(ValueError, match="got resolution"):
+            Simulation(model(), (1.0, 2.0, 3.0), 0, resolution)
+
+
+# -- the bound beside a run -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", list(Form))
+@pytest.mark.parametrize("fmt", FORMATS)
+def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
+    """Against the exact filter, not the reference."""
+    told, z = model(), measurements()
+    found = bounded(told, z, fmt, form, range(1, STEPS + 1))
+    ratios = found.ratios()
+    assert ratios.max() <= 1
+    stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
+    kept = run(fmt, form).kept()
+    worst = 0.0
+    for k, step in enumerate(exactly(told.rounded(fmt), stored)):
+        P = (kept.P[k] + kept.P[k].T) / 2
+        for error, bound in (
+            (kept.x[k] - step.x, found.state[k]),
+            (kept.K[k] - step.gain, found.gain[k]),
+            (P - step.P, found.covariance[k]),
+        ):
+            assert (np.abs(error).astype(float) <= bound * (1 + 1e-12)).all()
+            worst = max(worst, float((np.abs(error).astype(float) / bound).max()))
+    if fmt.precision * math.log2(fmt.base) > 20:  # with fewer, the covariance's error may be too large
+        assert worst > 0.01
+        assert np.isfinite(found.state).all()
+    # The run itself is the one without a bound at its side.
+    assert np.array_equal(found.history.state, emulate(told, z, fmt, form, range(1, STEPS + 1)).state)
+
+
+def test_the_bound_of_the_reference_holds():
+    """Also where the stored model is no double-double number."""
+    told, z = model(), measurements(40)
+    run = Followed(told, None, Form.USUAL, range(1, 41))
+    run.take(z[:7])
+    run.take(z[7:])
+    kept = run.kept()
+    for k, step in enumerate(exactly(told, z)):
+        for error, bound in ((kept.x[k] - step.x, run.bounds[0][k]), (kept.P[k] - step.P, run.bounds[2][k])):
+            ratio = (np.abs(error).astype(float) / bound).max()
+            assert ratio <= 1
+            assert (bound < 1e-22).all()
+
+
+def test_ratios_tell_a_violation():
+    found = bounded(model(), measurements(), FloatFormat(2, 24), Form.REPORT, (1, 6))
+    for name, column in (("state", 0), ("gain", 1), ("covariance", 2)):
+        small = {each: getattr(found, each) * (1e-9 if each == name else 1) for each in ("state", "gain", "covariance")}
+        ratios = type(found)(found.history, **small).ratios()
+        assert ratios.shape == (2, 3)
+        assert (ratios[:, column] > 1).all()
+        assert (np.delete(ratios, column, axis=1) <= 1).all()
+
+
+def test_the_bound_ends_where_the_gain_is_not_known():
+    found = bounded(scalar("1e-6"), np.ones((3, 1)), FloatFormat(10, 4), Form.REPORT, (1, 2, 3))
+    assert np.isfinite(found.state[:2]).all()
+    assert np.isinf(found.state[2]).all()
+    assert found.ratios().max() <= 1
+
+
+def test_a_year_of_gravity_probe_b_begins_like_the_exact_filter():
+    """Three steps of ten states, in every digit: the model of the book, not a small one."""
+    fmt = FloatFormat(2, 24)
+    told = gravity_probe_b().rounded(FloatFormat(2, 14))
+    z = np.array([[12.0, -7.0], [30.0, 4.0], [-5.0, 9.0]])
+    slow, kept = Slow(told, fmt), run(fmt, Form.REPORT, told, z).kept()
+    for k in range(3):
+        slow.step(k, [Fraction(float(v)) for v in z[k]], Form.REPORT)
+        assert [[v] for v in kept.x[k]] == slow.x
+        assert kept.P[k].tolist() == slow.P

@@ -1,0 +1,143 @@
+"""gpbnb.kalman.figures: what is drawn is the result; axes, legends and colours say what it is."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+
+from gpbnb import plotting
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import ensembles, figures, smallest, theory, year
+from gpbnb.kalman.experiment import Form, bounded
+from gpbnb.kalman.model import LinearModel
+
+USUAL = year.MODELS[0]
+TWENTY_FOUR = year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT)
+
+
+@pytest.fixture
+def ax():
+    _, axes = plotting.figure()
+    yield axes[0]
+    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return {run.case: run for run in year.load()}
+
+
+def legend_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def colour(artist):
+    return to_hex(artist.get_color()).upper()
+
+
+@pytest.mark.parametrize(
+    ("fmt", "number"),
+    [(FloatFormat(10, 7), 7), (FloatFormat(10, 7, Rounding.CHOP), 7 - np.log10(2)), (FloatFormat(2, 1), 1)],
+)
+def test_decimal_digits_invert_8(fmt, number):
+    found = figures.decimal_digits(fmt)
+    assert found == pytest.approx(number, abs=1e-12)
+    assert 0.5 * 10 ** (1 - found) == pytest.approx(float(fmt.unit_roundoff), rel=1e-12)
+
+
+def test_years(ax, runs):
+    chosen = [runs[TWENTY_FOUR], runs[TWENTY_FOUR._replace(form=Form.UD, rounding=Rounding.CHOP)]]
+    *curves, goal = figures.years(chosen, "rate", ax, goal=1.0)
+    for curve, run in zip(curves, chosen, strict=True):
+        assert np.array_equal(curve.get_xdata(), run.steps)
+        assert np.array_equal(curve.get_ydata(), np.maximum(*np.abs(run.rate).T))
+    assert len({colour(curve) for curve in curves}) == 2
+    assert list(goal.get_ydata()) == [1, 1]
+    assert [curve.get_label() for curve in curves] == ["24 bits", "24 bits, chopped, UD"]
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("step $k$", "error of the drift rate (mas/yr)")
+
+
+@pytest.mark.parametrize("quantity", ["gain", "covariance"])
+def test_years_of_a_norm(ax, runs, quantity):
+    (curve,) = figures.years([runs[TWENTY_FOUR]], quantity, ax)
+    assert np.array_equal(curve.get_ydata(), getattr(runs[TWENTY_FOUR], quantity))
+    assert "no unit" in ax.get_ylabel()
+
+
+def test_years_refuse_what_they_cannot_draw(ax, runs):
+    run = runs[TWENTY_FOUR]
+    with pytest.raises(ValueError, match="got quantity 'speed'; needed one of drift, rate"):
+        figures.years([run], "speed", ax)
+    with pytest.raises(ValueError, match="got 8 curves; needed at most 7"):
+        figures.years([run] * 8, "rate", ax)
+    reference = year.Year(run.case.reference, *(getattr(run, name) for name in list(vars(run))[1:]))
+    with pytest.raises(ValueError, match="got the reference among the runs"):
+        figures.years([reference], "rate", ax)
+
+
+def test_lines_and_levels(ax):
+    curves = [("a", [1, 2], [3, 4]), ("b", [1, 2], [5, 6]), ("c", [1, 2], [7, 8])]
+    artists = figures.lines(curves, ax)
+    assert [(a.get_label(), list(a.get_ydata())) for a in artists] == [(name, y) for name, _, y in curves]
+    assert [colour(a) for a in artists] == [plotting.BOUND, plotting.BOUND, plotting.STRICT]
+    assert artists[0].get_linestyle() != artists[1].get_linestyle()
+    assert list(figures.level("d", 9.0, ax).get_ydata()) == [9, 9]
+
+
+def test_year_end(ax, runs):
+    cases = [TWENTY_FOUR, TWENTY_FOUR._replace(precision=32), TWENTY_FOUR._replace(rounding=Rounding.CHOP)]
+    counts = [("printed", theory.coefficients(*theory.EXAMPLE))]
+    answers = [("print", [9, 17]), ("formula", [10, 16]), ("seen", [10.3])]
+    artists = figures.year_end([runs[case] for case in cases], ax, 1.0, counts, answers)
+    rounded, chopped, line, goal, *marks = artists
+    ends = [max(np.abs(runs[case].drift[-1]).max(), np.abs(runs[case].rate[-1]).max()) for case in cases]
+    assert np.allclose(rounded.get_xdata(), [figures.decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)
+    assert list(rounded.get_ydata()) == ends[:2]
+    assert list(chopped.get_ydata()) == ends[2:]
+    assert colour(rounded) == plotting.OBSERVED != colour(chopped)
+    assert colour(line) == plotting.BOUND
+    crossing = float(np.interp(0, -np.log10(line.get_ydata()), line.get_xdata()))
+    assert int(np.ceil(crossing)) == theory.required_precision(sum(counts[0][1]))
+    assert list(goal.get_ydata()) == [1, 1]
+    assert [list(mark.get_xdata()) for mark in marks] == [places for _, places in answers]
+    assert all(set(mark.get_ydata()) == {1} for mark in marks)
+    assert marks[0].get_markerfacecolor() == marks[1].get_markerfacecolor() == "none"
+    assert marks[2].get_marker() == "|"
+    assert legend_of(ax)[:3] == ["report, nearest", "report, chop", "printed"]
+    assert legend_of(ax)[-3:] == ["print", "formula", "seen"]
+
+
+def test_contraction(ax):
+    case = smallest.scalar(FloatFormat(2, 24), r="0.5", z="1")
+    model = LinearModel(case.Phi, case.H, case.Q, case.R, case.x, case.P)
+    found = bounded(model, np.arange(1.0, 9.0).reshape(8, 1) / 3, FloatFormat(2, 24), marks=range(1, 9))
+    points, line = figures.contraction(found, 0, ax, "x (m)")
+    error = np.abs(found.history.state[:, 0])
+    assert list(points.get_ydata()) == [e for e in error if e > 0]
+    assert np.array_equal(line.get_ydata(), found.state[:, 0])
+    assert points.get_linestyle() == "None"
+    assert (colour(points), colour(line)) == (plotting.OBSERVED, plotting.BOUND)
+    assert ax.get_ylabel() == "error of x (m)"
+
+
+def summary(**numbers):
+    names = ensembles.Summary._fields
+    filled = {name: "" if name in ("kind", "form") else 0 for name in names}
+    return ensembles.Summary(**{**filled, **numbers})
+
+
+def test_violations(ax):
+    found = [
+        summary(kind="a", form="report", trials=10, violations_105=10, violations_108=5, violations_125=0),
+        summary(kind="b", form="report", trials=30, violations_105=10, violations_108=5, violations_125=1),
+        summary(kind="a", form="ud", trials=20, violations_105=5, violations_108=0, violations_125=2),
+    ]
+    bars = figures.violations(found, ax)
+    assert [bar.get_height() for bar in bars] == pytest.approx([50, 25, 25, 0, 2.5, 10])
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["report", "UD"]
+    assert legend_of(ax) == ["(105)", "(108)", "(125)"]
+    assert ax.get_ylabel() == "filters that violate it (%)"

@@ -1,0 +1,79 @@
+"""gpbnb.kalman.printed: what (125) allows a run, against theory in exact numbers."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.bounds import column_sum_norm, max_norm, row_sum_norm
+from gpbnb.formats import FloatFormat
+from gpbnb.kalman import printed, theory
+from gpbnb.kalman.experiment import Kept, reference
+from gpbnb.kalman.model import LinearModel
+
+TWO = LinearModel(
+    Phi=[[["1", "0.5"], ["0", "0.9"]], [["1", "0.25"], ["0", "0.8"]]],
+    H=[["1", "-0.5"]],
+    Q=[["0.1", "0"], ["0", "0.2"]],
+    R=[["0.5"]],
+    x0=["1", "-2"],
+    P0=[["4", "1"], ["1", "3"]],
+)
+Z = np.array([[1.5], [-2.0], [4.0], [0.25], [-3.0]])
+FIVE = FloatFormat(10, 5)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return printed.terms(TWO, reference(TWO, Z, range(1, len(Z) + 1)))
+
+
+@pytest.fixture(scope="module")
+def steps():
+    x, P, result = TWO.x0, TWO.P0, []
+    for k, z in enumerate(Z):
+        step = theory.exact_step(TWO.Phi[k % 2], TWO.H[0], TWO.Q[0], TWO.R[0], x, P, z)
+        x, P = step.x, step.P
+        result.append((step, step.gain @ np.array([Fraction(each) for each in z])))
+    return result
+
+
+def test_the_terms_are_those_of_exact_steps(found, steps):
+    so_far = [steps[: k + 1] for k in range(len(steps))]
+    # A few operations of float64 after 31 digits.
+    close = {"rtol": 1e-13}
+    assert np.allclose(found.x, [float(max_norm(s.x)) for s, _ in steps], **close)
+    assert np.allclose(found.u, [float(max(max_norm(u) for _, u in part)) for part in so_far], **close)
+    loops = [[s.transition for s, _ in part] for part in so_far]
+    assert np.allclose(found.columns, [float(max(map(column_sum_norm, part))) for part in loops], **close)
+    assert np.allclose(found.rows, [float(max(map(row_sum_norm, part))) for part in loops], **close)
+    assert not np.allclose(found.columns, found.rows)
+    assert (found.n, found.m) == (2, 1)
+
+
+@pytest.mark.parametrize("faults", theory.MENDINGS.values())
+def test_the_kindest_bound(found, steps, faults):
+    for k in (1, 3, 5):
+        u = max(max_norm(u) for _, u in steps[:k])
+        counts = theory.coefficients(k, 2, 1, **faults)
+        expected = theory.state_bound(max_norm(steps[k - 1][0].x), u, FIVE.unit_roundoff, counts)
+        assert found.kindest(FIVE, k, **faults) == pytest.approx(float(expected), rel=1e-13)
+
+
+def test_beyond_the_last_step_its_sizes_are_kept(found):
+    first, second = theory.coefficients(1000, 2, 1)
+    expected = float(FIVE.unit_roundoff) * (first * found.x[-1] + second * found.u[-1])
+    assert found.kindest(FIVE, 1000) == pytest.approx(expected, rel=1e-15)
+
+
+def test_the_powers(found):
+    assert 10 ** found.powers() == pytest.approx(found.columns[-1] ** (len(Z) - 1), rel=1e-12)
+
+
+@pytest.mark.parametrize("marks", [(1, 3), (2, 3), ()])
+def test_steps_left_out_are_refused(marks):
+    true = reference(TWO, Z, marks) if marks else Kept((), *(np.empty((0, 1), dtype=object) for _ in range(3)))
+    with pytest.raises(ValueError, match=r"got the steps .*; needed 1, 2, 3"):
+        printed.terms(TWO, true)

@@ -1,0 +1,204 @@
+"""gpbnb.kalman.tables: what the chapter's tables say."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.kalman import ensembles, printed, smallest, tables, theory, year
+from gpbnb.kalman.experiment import Form
+from gpbnb.kalman.model import gravity_probe_b
+from gpbnb.kalman.precision import Requirement
+
+
+def cells(table):
+    assert len({len(row) for row in (table.header, *table.body)}) == 1
+    return [list(row) for row in table.body]
+
+
+def test_the_example_by_every_formula():
+    rows = cells(tables.example(*theory.EXAMPLE))
+    assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(theory.MENDINGS)
+    assert rows[0][1:] == ["first", r"$2.5860\times10^{8}$", r"$3.867\times10^{-9}$", "10", r"$2.9\times10^{-8}$"]
+    assert rows[1][1:] == ["second", r"$4.0775\times10^{14}$", r"$2.452\times10^{-15}$", "16", r"$4.5\times10^{-2}$"]
+    assert [row[4] for row in rows] == ["10", "16", "10", "16", "10", "16", "15", "22"]
+
+
+def test_the_slips():
+    rows = {row[0]: row[1:] for row in cells(tables.slips(*theory.EXAMPLE))}
+    assert list(rows) == [
+        "first coefficient",
+        "second coefficient",
+        "first beta",
+        "first digits",
+        "second beta",
+        "second digits",
+    ]
+    assert "84" in rows["first coefficient"][2]
+    assert r"\cdot84$" in rows["second coefficient"][2]
+    assert rows["first beta"] == [r"$.3775\times10^{-8}$", r"$3.867\times10^{-9}$", "one over the printed coefficient"]
+    assert rows["first digits"] == ["$9$", "10", "the printed β is that of 9.12 digits; it needs 10"]
+    assert rows["second digits"] == ["$17$", "16", "the printed β is that of 16.81 digits; it needs 17"]
+
+
+def test_slips_that_are_none_are_not_claimed():
+    rows = {row[0]: row[1:] for row in cells(tables.slips(1000, 3, 1))}
+    assert rows["second coefficient"][2] == "not found"
+
+
+def test_what_one_grants():
+    rows = cells(tables.goals(*theory.EXAMPLE, Fraction(1), Fraction(6606)))
+    assert [row[3:] for row in rows] == [["10", "28"], ["13", "41"], ["16", "49"], ["20", "62"]]
+    assert rows[1][1:3] == [r"$1.5\times10^{-4}$", "$1.0$"]
+
+
+def test_violations():
+    rows = cells(tables.violations([FloatFormat(10, 4), FloatFormat(10, 4, Rounding.CHOP)]))
+    assert rows[0] == ["4 decimal digits", "first", "333", "0.00222", "125"]
+    assert rows[1] == ["4 decimal digits", "second", "333", "222", r"$1.25\times10^{7}$"]
+    assert rows[2][0] == "4 decimal digits, chopped"
+
+
+def test_the_order():
+    assert cells(tables.order()) == [
+        ["first", "(100) → (99) → (101) → (98)"],
+        ["second", "none: (99) waits for (101), and (101) for (99)"],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("value", "figures", "text"),
+    [(82, 2, r"$8.2\times10^{1}$"), (Fraction(1, 3), 3, r"$3.33\times10^{-1}$"), (1, 2, "$1.0$")],
+)
+def test_numbers(value, figures, text):
+    assert tables.scientific(value, figures) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "figures", "text"),
+    [
+        (0.0, 2, "0"),
+        (131.2, 2, "130"),
+        (0.00021, 2, "0.00021"),
+        (-0.831, 2, "-0.83"),
+        (999999.0, 2, r"$1.0\times10^{6}$"),
+        (12500000.0, 3, r"$1.25\times10^{7}$"),
+        (-1.13e-8, 2, r"$-1.1\times10^{-8}$"),
+        (float("inf"), 2, "inf"),
+    ],
+)
+def test_short_numbers(value, figures, text):
+    assert tables.short(value, figures) == text
+
+
+def test_the_mildest_noise():
+    fmt = FloatFormat(2, 5)
+    rows = cells(tables.mildest([fmt]))
+    first, second = (smallest.mildest(fmt, form) for form in (False, True))
+    assert [row[:2] for row in rows] == [["5 bits", "first"], ["5 bits", "second"]]
+    assert rows[0][2] == f"{float(first['covariance']):.3g}"
+    assert rows[0][3] == "none"
+    assert rows[1][2:] == [f"{float(second[name]):.3g}" for name in ("covariance", "gain", "state")]
+
+
+def test_the_states():
+    rows = cells(tables.states(gravity_probe_b()))
+    assert rows[2] == ["drift rate 2", "mas/yr", "1", "10000", "0.0001"]
+    assert rows[4] == ["pointing α2", "mas", "0.9", "20", "8.72"]
+    assert len(rows) == 10
+
+
+USUAL = year.MODELS[0]
+
+
+def run(**changes):
+    values = {
+        "case": year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT),
+        "steps": np.array([1, 3]),
+        "drift": np.array([[9.0, 9.0], [-2.0, 1.0]]),
+        "rate": np.array([[9.0, 9.0], [0.25, -0.5]]),
+        "state": np.array([9.0, 2.0]),
+        "gain": np.array([9.0, 0.125]),
+        "covariance": np.array([9.0, 1e-6]),
+        "least_eigenvalue": np.array([9.0, -0.5]),
+        "indefinite": None,
+        "stopped": None,
+        "seconds": 1.0,
+    }
+    return year.Year(**{**values, **changes})
+
+
+def test_year_ends():
+    table = tables.year_ends([run(), run(indefinite=2)])
+    assert table.header[:4] == ("arithmetic", "form", "drift (mas)", "rate (mas/yr)")
+    rows = cells(table)
+    assert rows[0] == ["24 bits", "report", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
+    assert rows[1][-1] == "-0.5, a variance lost at step 2"
+    other = run(case=run().case._replace(model=year.MODELS[1]))
+    table = tables.year_ends([run(), other])
+    assert table.header[0] == "model"
+    assert [row[0] for row in cells(table)] == list(year.MODELS[:2])
+    with pytest.raises(ValueError, match="got the reference"):
+        tables.year_ends([run(case=run().case.reference)])
+
+
+def test_slack():
+    k, beta = 3, float(FloatFormat(2, 24).unit_roundoff)
+    terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
+    zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
+    bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
+    row = cells(tables.slack([run()], [bounds], terms))[0]
+    first, second = theory.coefficients(k, 10, 2)
+    assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
+    assert row[-1] == "1.25000"
+    with pytest.raises(ValueError, match="needed one to step 3"):
+        tables.slack(
+            [run(steps=np.array([1, 3]))],
+            [year.Bounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],
+            terms,
+        )
+
+
+def summary(**numbers):
+    filled = {name: "" if name in ("kind", "form") else 0 for name in ensembles.Summary._fields}
+    return ensembles.Summary(**{**filled, **numbers})
+
+
+def test_trials():
+    found = [
+        summary(
+            kind="a",
+            trials=10,
+            violations_105=10,
+            worst_105=3.0,
+            worst_125=0.5,
+            state=0.25,
+            gain=0.5,
+            compared=1,
+            typical=0.25,
+        ),
+        summary(kind="b", trials=30, violations_105=1, worst_105=7.0, worst_125=0.1, covariance=0.75),
+        summary(
+            kind="a", trials=10, violations_125=1, worst_125=2.0, contraction_violations=1, compared=3, typical=1 / 64
+        ),
+    ]
+    rows = cells(tables.trials(found))
+    assert rows == [
+        ["a", "20", "50.0 %, 3", "0.0 %, 0", "5.0 %, 2", "1, 0.500", "32"],
+        ["b", "30", "3.3 %, 7", "0.0 %, 0", "0.0 %, 0.1", "0, 0.750", ""],
+        ["all", "50", "22.0 %, 7", "0.0 %, 0", "2.0 %, 2", "1, 0.750", "32"],
+    ]
+
+
+def test_requirements():
+    answers = [
+        ("one", Requirement(FloatFormat(2, 9), "bound", 5, ((8, 2.0), (9, 0.5)))),
+        ("two", Requirement(None, "emulation", 5, ((8, 2.0),))),
+    ]
+    assert cells(tables.requirements(answers)) == [
+        ["one", "bound", "5", "9 bits", "0.5"],
+        ["two", "emulation", "5", "none", ""],
+    ]
