@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.kalman.experiment import Form, Simulation, bounded, emulate, reference
+from gpbnb.kalman.experiment import Form, Simulation, bounded, emulate, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 
@@ -33,7 +32,7 @@ def test_the_smallest_precision_meets_the_goal_and_one_less_does_not(base, round
     assert found.fmt.rounding is rounding
     t = found.fmt.precision
     ratios = dict(found.tried)
-    assert list(ratios) == list(range(2, t + 2))
+    assert list(ratios) == sorted(ratios)
     assert ratios[t] <= 1
     assert ratios[t + 1] <= 1
     assert ratios[t - 1] > 1
@@ -53,13 +52,76 @@ def test_errors_of_storing_the_model_count():
     assert error(found.fmt).max() <= 3e-3
 
 
+def upward(model, z, goal, base, **options):
+    """The slow way: every precision from 2 up, until two in succession meet the goal."""
+    form, rounding = options.get("form", Form.USUAL), options.get("rounding", Rounding.NEAREST)
+    marks = log_spaced(len(z), 16)
+    true, met = reference(model, z, marks), []
+    for precision in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
+        fmt = FloatFormat(base, precision, rounding)
+        try:
+            if options.get("basis") == "bound":
+                errors, lost = bounded(model, z, fmt, form, marks).state, False
+            else:
+                history = emulate(model, z, fmt, form, marks, true)
+                errors, lost = history.state, history.indefinite or history.stopped
+        except ValueError:
+            errors, lost = None, True
+        met.append(not lost and bool((np.abs(errors) <= goal).all()))
+        if met[-2:] == [True, True]:
+            return precision - 1, met
+    return (precision if met[-1] else None), met
+
+
+MODELS = {
+    "damped": (MODEL, Z),
+    "tracker": (
+        LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], [["1e-4", 0], [0, "1e-2"]], [[4]], [0, 0], 100 * np.eye(2)),
+    )
+    * 2,
+    "units far apart": (
+        LinearModel([[1, 0], ["1e-3", 1]], [[0, 1]], [["1e-6", 0], [0, 0]], [["1e-4"]], [1, 1], [["1e6", 0], [0, 1]]),
+    )
+    * 2,
+}
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+@pytest.mark.parametrize(
+    ("base", "options"),
+    [
+        (2, {}),
+        (2, {"rounding": Rounding.CHOP}),
+        (2, {"form": Form.UD}),
+        (2, {"basis": "bound"}),
+        (10, {"form": Form.REPORT}),
+        (16, {"form": Form.JOSEPH, "basis": "bound"}),
+    ],
+)
+def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
+    model, z = MODELS[name]
+    if z is model:
+        z = Simulation(model, tuple(model.x0.astype(float)), 0, resolution=2.0**-30).measurements(40)
+    for goal in (1e-1, 1e-4, 1e-7):
+        found = required_precision(model, len(z), goal, base, z=z, **options)
+        precision, met = upward(model, z, goal, base, **options)
+        assert (found.fmt.precision if found.fmt else None) == precision
+        assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
+        assert len(found.tried) <= 8  # of up to 52
+
+
 def test_a_lucky_precision_does_not_count():
-    """One that meets the goal while the next does not is passed over."""
+    """One that meets the goal while the next does not is passed over, and whatever bisection met on its way, so is
+    every answer that the next precision does not confirm."""
+    passed = 0
     for goal in np.geomspace(1e-6, 1e-2, 30):
-        tried = required_precision(MODEL, 4, goal, 2, z=Z[:4]).tried
-        meets = [ratio <= 1 for _, ratio in tried]
-        assert meets[-2:] == [True, True]
-        assert not any(a and b for a, b in pairwise(meets[:-1]))
+        found = required_precision(MODEL, 4, goal, 2, z=Z[:4])
+        t, tried = found.fmt.precision, dict(found.tried)
+        assert tried[t] <= 1
+        assert tried[t + 1] <= 1
+        assert tried[t - 1] > 1
+        passed += t > 3 and tried.get(t - 2, 2) <= 1
+    assert passed
 
 
 def test_the_bound_asks_for_more_digits_and_holds():
@@ -71,7 +133,6 @@ def test_the_bound_asks_for_more_digits_and_holds():
     assert found.state.max() <= goal
     assert np.abs(found.history.state).max() <= found.state.max()
     assert "(bound, 60 steps)" in str(by_bound)
-    assert math.isinf(by_bound.tried[0][1])
 
 
 def test_a_goal_for_each_state():
@@ -96,9 +157,12 @@ def test_no_precision_may_be_enough():
 def test_a_run_that_loses_its_covariance_does_not_meet_a_goal():
     """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
     told = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
-    tried = required_precision(told, 3, 10.0, 10, form=Form.REPORT).tried
-    assert [math.isinf(ratio) for _, ratio in tried[:5]] == [True] * 5
-    assert tried[-1][1] <= 1
+    found = required_precision(told, 3, 10.0, 10, form=Form.REPORT)
+    t = found.fmt.precision
+    assert t > 5
+    assert [math.isinf(ratio) for precision, ratio in found.tried if precision < t] == [True] * len(
+        [precision for precision, _ in found.tried if precision < t]
+    )
 
 
 def test_its_own_measurements_are_seeded():
@@ -116,7 +180,8 @@ def test_its_own_measurements_are_seeded():
         ({"base": 3}, "got base 3; needed one with compiled loops"),
         ({"basis": "hope"}, 'got basis \'hope\'; needed "emulation" or "bound"'),
         ({"steps": 0}, "got 0 steps; needed at least 1"),
-        ({"z": Z[:5]}, "got 5 measurements; needed one for each of the 60 steps"),
+        ({"z": Z[:5]}, r"got 5 measurements of shape \(1,\); needed one for each of the 60 steps, of shape \(1,\)"),
+        ({"z": Z[:, 0], "basis": "bound"}, r"got 60 measurements of shape \(\); needed one for each of the 60 steps"),
     ],
 )
 def test_what_is_refused(arguments, message):

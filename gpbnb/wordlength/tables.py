@@ -1,0 +1,87 @@
+"""Tables of the chapter on wordlength."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
+from gpbnb.kalman.precision import Requirement
+from gpbnb.kalman.tables import arithmetic, short
+from gpbnb.tables import Table, digits
+from gpbnb.wordlength.examples import NORMAL, STANDARD
+from gpbnb.wordlength.study import Deafness, Inverse, Span
+
+
+def bits(answer: Requirement) -> str:
+    """The precision of an answer in a cell, or that there is none."""
+    return str(answer.fmt.precision) if answer.fmt else "none"
+
+
+def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
+    """Answers side by side: a line a name, a column a question.
+
+    Raises
+    ------
+    ValueError : lines that do not answer the same questions.
+    """
+    questions = {tuple(question for question, _ in line) for line in found.values()}
+    if len(questions) != 1:
+        raise ValueError(f"got lines of {len(questions)} kinds; needed the same questions in each")
+    body = tuple((name, *(bits(answer) for _, answer in line)) for name, line in found.items())
+    return Table(f"{len(body)} lines of answers", ("bits by", *questions.pop()), body)
+
+
+def deaf(found: Sequence[Deafness], goal: float) -> Table:
+    """What a format makes of a small process noise."""
+    body = tuple(
+        (arithmetic(each.fmt), short(each.ratio, 3), short(each.largest_error), short(each.largest_error / goal))
+        for each in found
+    )
+    return Table(
+        f"{len(body)} formats", ("arithmetic", "variance, computed / true", "largest error", "error / goal"), body
+    )
+
+
+def spans(found: Sequence[Span]) -> Table:
+    """Powers of two of a filter's numbers, and which standard formats hold them as normal numbers."""
+    body = []
+    for each in found:
+        held = [name for name, (low, high) in NORMAL.items() if low <= each.least and each.largest <= high]
+        body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(held) or "none"))
+    return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "held by"), tuple(body))
+
+
+def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
+    """Bits of an integrator whose rounding is a tenth of its discretization error; and what the rate of `fmt` may be."""
+    body = []
+    for name, duration in durations.items():
+        needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding]
+        rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
+        body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
+    kind = digits(fmt)
+    header = ("duration", "bits, rounded", "bits, chopped", f"best rate of {kind}, Hz", "its additions lost at, Hz")
+    return Table(f"{len(body)} durations", header, tuple(body))
+
+
+def inverses(found: Sequence[Inverse]) -> Table:
+    """Bits that inverses need, by the rule of thumb and proved."""
+    body = tuple((each.name, short(each.condition), str(each.expected), str(each.proved)) for each in found)
+    return Table(
+        f"{len(body)} inverses", ("matrix", "condition $\\kappa_1$", "bits, rule of thumb", "bits, proved"), body
+    )
+
+
+def standard(answer: Requirement) -> str:
+    """Name of the smallest standard format whose precision is enough.
+
+    Raises
+    ------
+    ValueError : none is.
+    """
+    for name, fmt in STANDARD.items():
+        if answer.fmt and answer.fmt.base == 2 and answer.fmt.precision <= fmt.precision:
+            return name
+    raise ValueError(
+        f"got {answer}; needed a binary precision of at most {max(f.precision for f in STANDARD.values())}"
+    )
