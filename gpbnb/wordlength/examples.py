@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.bounds import exact
 from gpbnb.formats import FloatFormat
 from gpbnb.kalman.experiment import Simulation
 from gpbnb.kalman.model import LinearModel
@@ -38,12 +39,12 @@ def tilt(wander: str = "1e-10") -> LinearModel:
     wander : variance by which the bias moves in a step, (°/s)².
     """
     return LinearModel(
-        Phi=[["1", "0.01", "0"], ["0", "0.98", "0"], ["0", "0", "1"]],
-        H=[["0", "1", "1"], ["1", "0", "0"]],
-        Q=[["0", "0", "0"], ["0", "4", "0"], ["0", "0", wander]],
-        R=[["0.0025", "0"], ["0", "4"]],
-        x0=["0", "0", "0"],
-        P0=[["100", "0", "0"], ["0", "400", "0"], ["0", "0", "1"]],
+        Phi=exact([["1", "0.01", "0"], ["0", "0.98", "0"], ["0", "0", "1"]]),
+        H=exact([["0", "1", "1"], ["1", "0", "0"]]),
+        Q=exact([["0", "0", "0"], ["0", "4", "0"], ["0", "0", wander]]),
+        R=exact([["0.0025", "0"], ["0", "4"]]),
+        x0=exact(["0", "0", "0"]),
+        P0=exact([["100", "0", "0"], ["0", "400", "0"], ["0", "0", "1"]]),
         name="tilt filter",
     )
 
@@ -61,13 +62,26 @@ def tracker(origin: str = "0") -> LinearModel:
     origin : where it starts, m from the zero of its coordinates.
     """
     return LinearModel(
-        Phi=[["1", "0.1"], ["0", "1"]],
-        H=[["1", "0"]],
-        Q=[["1/30000", "1/2000"], ["1/2000", "1/100"]],
-        R=[["4"]],
-        x0=[origin, "0"],
-        P0=[["100", "0"], ["0", "100"]],
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=exact([["1", "0"]]),
+        Q=exact([["1/30000", "1/2000"], ["1/2000", "1/100"]]),
+        R=exact([["4"]]),
+        x0=exact([origin, "0"]),
+        P0=exact([["100", "0"], ["0", "100"]]),
         name=f"tracker, {origin} m from its zero",
+    )
+
+
+def precise() -> LinearModel:
+    """A tracker whose sensor is far better than what is known at first: variances of 1e-12 and 1e4; n = 2, m = 1."""
+    return LinearModel(
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=exact([["1", "0.5"]]),
+        Q=exact([["1/30000", "1/2000"], ["1/2000", "1/100"]]),
+        R=exact([["1e-12"]]),
+        x0=exact(["0", "0"]),
+        P0=exact([["1e4", "0"], ["0", "1e4"]]),
+        name="precise sensor",
     )
 
 

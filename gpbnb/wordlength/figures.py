@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -18,6 +19,7 @@ _MARKERS = "os^Dv"
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
     "bound": ("|", BOUND, BOUND),
+    "theory": ("D", STRICT, STRICT),
     "printed": ("o", BOUND, "none"),
     "mended": ("s", STRICT, "none"),
 }
@@ -34,13 +36,15 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
             artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
             x, y = (fmt.precision, 1.0) if upright else (0.0, fmt.precision)
             transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
-            place = {"ha": "center", "va": "bottom"} if upright else {"ha": "left", "va": "bottom"}
-            artists.append(ax.text(x, y, name, color=REFERENCE, fontsize=8.5, transform=transform, **place))
+            side: Any = "center" if upright else "left"
+            artists.append(
+                ax.text(x, y, name, color=REFERENCE, fontsize=8.5, transform=transform, ha=side, va="bottom")
+            )
     return artists
 
 
 def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
-    """Error over goal (points) and bound over goal (lines) against the bits, a colour a form; infinities are left out."""
+    """Error (points) and bound (lines) over the goal against the bits, a colour a form; infinities are left out."""
     artists: list[Artist] = []
     for (name, curve), colour, marker in zip(emulated.items(), _COLOURS, _MARKERS, strict=False):
         points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,10 +14,10 @@ from numpy.typing import NDArray
 
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.inversion.bounds import rationals, smallest_precision, true_inverse
-from gpbnb.kalman.experiment import Form, emulate, log_spaced, reference
+from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision
-from gpbnb.kalman.theory import coefficients
+from gpbnb.kalman.theory import coefficients, companion_bound
 from gpbnb.kalman.theory import required_precision as digits_of_125
 from gpbnb.kalman.year import Year
 
@@ -43,7 +45,13 @@ def growth(
     ----------
     options : form, basis, base and rounding of that function.
     """
-    return tuple(required_precision(model, k, goal, z=z[:k], **options) for k in steps)
+    return tuple(required_precision(_first(model, k), k, goal, z=z[:k], **options) for k in steps)
+
+
+def _first(model: LinearModel, steps: int) -> LinearModel:
+    """The same for so many steps, without what a longer cycle has later, which would be rounded and checked in vain."""
+    cut = {letter: getattr(model, letter)[:steps] for letter in ("Phi", "H", "Q", "R")}
+    return replace(model, **cut)
 
 
 def years_needed(runs: Sequence[Year], goal: float) -> tuple[tuple[int, int], ...]:
@@ -86,32 +94,71 @@ def spans(model: LinearModel, z: NDArray[Any]) -> tuple[Span, ...]:
 
 
 class Deafness(NamedTuple):
-    """What a filter's last covariance has become in a format: of one state, over what it should be."""
+    """What few digits do to one state: its last variance over the true one; the share of the last steps in which its
+    estimate did not move at all; and the largest error of the first state.
+    """
 
     fmt: FloatFormat
-    ratio: float
-    largest_error: float
+    variance: float
+    still: float
+    error: float
 
 
 def deafness(
-    model: LinearModel, z: NDArray[Any], state: int, formats: Sequence[FloatFormat], form: Form = Form.USUAL
-) -> tuple[float, tuple[Deafness, ...]]:
-    r"""Variance of a state at the end in some formats, over the true one, and the largest error of the first state.
+    model: LinearModel,
+    z: NDArray[Any],
+    state: int,
+    formats: Sequence[FloatFormat],
+    form: Form = Form.USUAL,
+    last: int = 200,
+) -> tuple[Deafness, ...]:
+    """Watch a state that hardly moves, in some formats; errors as of :func:`gpbnb.kalman.precision.survey`.
+
+    Parameters
+    ----------
+    state : its index. last : how many steps at the end are watched one by one.
+    """
+    marks = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
+    true, found = reference(model, z, marks), []
+    for fmt in formats:
+        run = Run(model, fmt, form, marks)
+        run.take(fmt.array(z))
+        history, kept = compare_runs(run, true), run.kept()
+        variance = float(kept.P[-1, state, state] / true.P[len(kept.P) - 1, state, state])
+        still = sum(a == b for a, b in pairwise(kept.x[-last - 1 :, state])) / last
+        found.append(Deafness(fmt, variance, still, float(np.abs(history.state[:, 0]).max())))
+    return tuple(found)
+
+
+def hidden_bits(model: LinearModel, z: NDArray[Any], state: int) -> float:
+    r""":math:`\log_2 P_{ii}/Q_{ii}` after the last step: with fewer bits than about that, adding Q changes nothing."""
+    kept = reference(model, z, (len(z),))
+    return math.log2(float(kept.P[-1, state, state]) / float(model.Q[0, state, state]))
+
+
+def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
+    """The largest entry of the estimates after the steps that :func:`log_spaced` marks."""
+    return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
+
+
+def companion(
+    model: LinearModel, z: NDArray[Any], fmt: FloatFormat, form: Form = Form.USUAL
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bound a run by its distance from the same filter in double-double and the contraction bound of that one.
+
+    Model and measurements are those that the format stores.
 
     Returns
     -------
-    bits : :math:`\log_2 P_{ii}/Q_{ii}` at the end: with fewer digits than that, adding Q changes nothing.
-    found : for each format.
+    error, bound : (n,), the largest of each state at the steps that :func:`log_spaced` marks.
     """
-    marks = log_spaced(len(z), 16)
-    true = reference(model, z, marks)
-    variance = float(true.P[-1, state, state])
-    found = []
-    for fmt in formats:
-        history = emulate(model, z, fmt, form, marks, true)
-        ratio = 1 + float(history.covariance[-1, state, state]) / variance
-        found.append(Deafness(fmt, ratio, float(np.abs(history.state[:, 0]).max())))
-    return math.log2(variance / float(model.Q[0, state, state])), tuple(found)
+    stored, measured, marks = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
+    run, beside = Run(stored, fmt, form, marks), Followed(stored, None, Form.USUAL, marks)
+    run.take(measured)
+    beside.take(measured.to_fractions())
+    history = compare_runs(run, beside.kept())
+    bound = companion_bound(history.state, beside.bounds[0][: len(history.steps)])
+    return np.abs(history.state).max(axis=0), bound.max(axis=0)
 
 
 class Inverse(NamedTuple):
@@ -119,18 +166,27 @@ class Inverse(NamedTuple):
 
     name: str
     condition: float
+    scaled: float
     expected: int
     proved: int
 
 
 def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = Rounding.NEAREST) -> Inverse:
-    r"""Bits by the rule of thumb :math:`\beta\,\kappa_1(A)\le` goal, and proved by
-    :func:`gpbnb.inversion.bounds.smallest_precision`.
+    r"""Bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` goal, and proved.
+
+    D scales by powers of two to a diagonal near 1, as a choice of units would; elimination rounds the same with and
+    without. What is proved is of :func:`gpbnb.inversion.bounds.smallest_precision`.
+
+    Parameters
+    ----------
+    matrix : (n, n), exact, symmetric positive definite.
     """
-    condition = _column_sum(rationals(matrix)) * _column_sum(true_inverse(matrix))
-    expected = digits_of_125(condition, Fraction(goal), 2, rounding)
+    scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
+    scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
+    conditions = [_column_sum(rationals(a)) * _column_sum(true_inverse(a)) for a in (matrix, scaled)]
+    expected = digits_of_125(conditions[1], Fraction(goal), 2, rounding)
     proved = smallest_precision(matrix, goal, 2, rounding).fmt.precision
-    return Inverse(name, float(condition), expected, proved)
+    return Inverse(name, float(conditions[0]), float(conditions[1]), expected, proved)
 
 
 def _column_sum(matrix: Any) -> Fraction:

@@ -33,14 +33,13 @@ def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
 
 
 def deaf(found: Sequence[Deafness], goal: float) -> Table:
-    """What a format makes of a small process noise."""
+    """What few digits do to a state that hardly moves."""
     body = tuple(
-        (arithmetic(each.fmt), short(each.ratio, 3), short(each.largest_error), short(each.largest_error / goal))
+        (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.still:.0f} %", short(each.error / goal))
         for each in found
     )
-    return Table(
-        f"{len(body)} formats", ("arithmetic", "variance, computed / true", "largest error", "error / goal"), body
-    )
+    header = ("arithmetic", "variance, computed / true", "steps without a move", "error / goal")
+    return Table(f"{len(body)} formats", header, body)
 
 
 def spans(found: Sequence[Span]) -> Table:
@@ -53,7 +52,7 @@ def spans(found: Sequence[Span]) -> Table:
 
 
 def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
-    """Bits of an integrator whose rounding is a tenth of its discretization error; and what the rate of `fmt` may be."""
+    """Bits with which rounding is a tenth of the discretization error, and the rates that a format allows."""
     body = []
     for name, duration in durations.items():
         needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding]
@@ -66,10 +65,11 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
 
 def inverses(found: Sequence[Inverse]) -> Table:
     """Bits that inverses need, by the rule of thumb and proved."""
-    body = tuple((each.name, short(each.condition), str(each.expected), str(each.proved)) for each in found)
-    return Table(
-        f"{len(body)} inverses", ("matrix", "condition $\\kappa_1$", "bits, rule of thumb", "bits, proved"), body
+    body = tuple(
+        (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found
     )
+    header = ("matrix", "$\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
+    return Table(f"{len(body)} inverses", header, body)
 
 
 def standard(answer: Requirement) -> str:
