@@ -34,9 +34,9 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
         if low <= fmt.precision <= high:
             draw = ax.axvline if upright else ax.axhline
             artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
-            x, y = (fmt.precision, 1.0) if upright else (0.0, fmt.precision)
+            x, y = (fmt.precision, 1.0) if upright else (1.0, fmt.precision)
             transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
-            side: Any = "center" if upright else "left"
+            side: Any = "center" if upright else "right"
             artists.append(
                 ax.text(x, y, name, color=REFERENCE, fontsize=8.5, transform=transform, ha=side, va="bottom")
             )

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.bounds import exact
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.inversion.bounds import rationals, smallest_precision, true_inverse
 from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
@@ -192,3 +193,28 @@ def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = R
 def _column_sum(matrix: Any) -> Fraction:
     columns = matrix.transpose().tolist()
     return max(sum((abs(Fraction(int(e.p), int(e.q))) for e in column), Fraction(0)) for column in columns)
+
+
+def in_units(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
+    """The same filter with states in other units.
+
+    Parameters
+    ----------
+    sizes : (n,), exact: how many of the new units an old one is.
+
+    Raises
+    ------
+    ValueError : not one positive number a state.
+    """
+    given = exact(sizes)
+    if given.shape != (model.n,) or not (given > 0).all():
+        raise ValueError(f"got sizes {list(sizes)}; needed {model.n} positive numbers, one a state")
+    square = np.multiply.outer(given, given)
+    return replace(
+        model,
+        Phi=model.Phi * np.multiply.outer(given, 1 / given),
+        H=model.H / given,
+        Q=model.Q * square,
+        x0=model.x0 * given,
+        P0=model.P0 * square,
+    )

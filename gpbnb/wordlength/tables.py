@@ -9,7 +9,7 @@ from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.tables import arithmetic, short
 from gpbnb.tables import Table, digits
-from gpbnb.wordlength.examples import NORMAL, STANDARD
+from gpbnb.wordlength.examples import NORMAL
 from gpbnb.wordlength.study import Deafness, Inverse, Span
 
 
@@ -70,18 +70,3 @@ def inverses(found: Sequence[Inverse]) -> Table:
     )
     header = ("matrix", "$\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
     return Table(f"{len(body)} inverses", header, body)
-
-
-def standard(answer: Requirement) -> str:
-    """Name of the smallest standard format whose precision is enough.
-
-    Raises
-    ------
-    ValueError : none is.
-    """
-    for name, fmt in STANDARD.items():
-        if answer.fmt and answer.fmt.base == 2 and answer.fmt.precision <= fmt.precision:
-            return name
-    raise ValueError(
-        f"got {answer}; needed a binary precision of at most {max(f.precision for f in STANDARD.values())}"
-    )

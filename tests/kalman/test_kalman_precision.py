@@ -122,7 +122,9 @@ def test_a_lucky_precision_does_not_count(monkeypatch):
         monkeypatch.setattr(
             precision,
             "_over_goal",
-            lambda m, z, fmt, *rest: 0.5 if fmt.precision in lucky or fmt.precision >= threshold else 2.0,
+            lambda m, z, fmt, *rest, least=threshold, by_luck=lucky: (
+                0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0
+            ),
         )
         found = required_precision(MODEL, 4, 1.0, 2, z=Z[:4])
         expected = min(53 if threshold > 53 else threshold - (threshold - 1 in lucky), 53)
@@ -152,7 +154,7 @@ def test_a_goal_for_each_state():
     assert np.abs(error(first))[:, 0].max() < 3e-6
     assert required_precision(MODEL, STEPS, (1e-6, 1e-2), 2, z=Z).fmt == first
     # An infinite bound of a state that does not matter is no number of any kind.
-    tried = required_precision(MODEL, STEPS, (1e-6, math.inf), 2, basis="bound", z=Z).tried
+    tried = precision.survey(MODEL, Z, (1e-6, math.inf), range(2, 30), basis="bound")
     assert math.isinf(tried[0][1])
     assert not any(math.isnan(ratio) for _, ratio in tried)
 
