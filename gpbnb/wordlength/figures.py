@@ -15,7 +15,7 @@ from gpbnb.wordlength.examples import STANDARD
 
 _COLOURS = (OBSERVED, *OBSERVED_OTHERS)
 _MARKERS = "os^Dv"
-#: How each kind of answer is drawn: an emulation observes, a bound bounds, a printed formula is an open marker.
+#: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
     "bound": ("|", BOUND, BOUND),

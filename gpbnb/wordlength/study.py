@@ -83,7 +83,7 @@ class Span(NamedTuple):
 
 
 def spans(model: LinearModel, z: NDArray[Any]) -> tuple[Span, ...]:
-    """Of a filter's model, estimates, gains and covariances, after the steps that :func:`log_spaced` marks."""
+    """Of a filter's model, estimates, gains and covariances, after the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks."""
     kept = reference(model, z, log_spaced(len(z), 16))
     told = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
     numbers = {"model": told, "estimate": kept.x, "gain": kept.K, "covariance": kept.P}
@@ -138,7 +138,7 @@ def hidden_bits(model: LinearModel, z: NDArray[Any], state: int) -> float:
 
 
 def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
-    """The largest entry of the estimates after the steps that :func:`log_spaced` marks."""
+    """The largest entry of the estimates after the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks."""
     return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
 
 
@@ -151,7 +151,7 @@ def companion(
 
     Returns
     -------
-    error, bound : (n,), the largest of each state at the steps that :func:`log_spaced` marks.
+    error, bound : (n,), the largest of each state at the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks.
     """
     stored, measured, marks = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
     run, beside = Run(stored, fmt, form, marks), Followed(stored, None, Form.USUAL, marks)
