@@ -83,7 +83,7 @@ class Span(NamedTuple):
 
 
 def spans(model: LinearModel, z: NDArray[Any]) -> tuple[Span, ...]:
-    """Of a filter's model, estimates, gains and covariances, after the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks."""
+    """Of a filter's model, and its estimates, gains and covariances after sixteen steps a decade."""
     kept = reference(model, z, log_spaced(len(z), 16))
     told = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
     numbers = {"model": told, "estimate": kept.x, "gain": kept.K, "covariance": kept.P}
