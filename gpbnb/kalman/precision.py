@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb._kernels.carriers import LARGEST_PRECISION
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.kalman.experiment import Form, Simulation, bounded, emulate, log_spaced, reference
+from gpbnb.kalman.experiment import Followed, Form, Kept, Simulation, emulate, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 
 Basis = Literal["emulation", "bound"]
@@ -56,10 +58,14 @@ def required_precision(
     basis: Basis = "emulation",
     z: Any = None,
     seed: int = 0,
+    progress: bool = False,
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a goal.
 
-    Precisions are tried upwards. One counts if the next meets the goal as well, so that no lucky one does.
+    Found by bisection, which takes for granted that a precision that misses the goal is not below one that counts. One
+    counts if the next meets the goal as well, so that no lucky one does. Whatever is taken for granted, the answer and
+    the next one were run and meet the goal, and unless the answer is 2 digits, the one before it was run and does not
+    count.
 
     Parameters
     ----------
@@ -72,6 +78,7 @@ def required_precision(
         asks for more digits.
     z : (steps, m), measurements; by default simulated by the model, from its first estimate.
     seed : of the simulation.
+    progress : show a bar, a tick a precision.
 
     Raises
     ------
@@ -81,7 +88,6 @@ def required_precision(
     goals = np.broadcast_to(np.asarray(goal, dtype=np.float64), (model.n,))
     if not (goals > 0).all() or not np.isfinite(goals).any():
         raise ValueError(f"got goal {goal}; needed an error above 0 for each of the {model.n} states, one finite")
-    asked = np.isfinite(goals)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "bound"')
     if base not in LARGEST_PRECISION:
@@ -90,25 +96,72 @@ def required_precision(
         raise ValueError(f"got {steps} steps; needed at least 1")
     if z is None:
         z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
-    if len(z) != steps:
-        raise ValueError(f"got {len(z)} measurements; needed one for each of the {steps} steps")
-    marks = log_spaced(steps, 16)
-    true = reference(model, np.asarray(z), marks) if basis == "emulation" else None
-    tried: list[tuple[int, float]] = []
-    for precision in range(2, LARGEST_PRECISION[base] + 1):
-        fmt = FloatFormat(base, precision, rounding)
-        try:
-            if true is not None:
-                history = emulate(model, z, fmt, form, marks, true)
-                error: NDArray[np.float64] = history.state
-                lost = history.indefinite is not None or history.stopped is not None
-            else:
-                error, lost = bounded(model, z, fmt, form, marks).state, False
-        except ValueError:  # a covariance is not definite in so few digits
-            error, lost = np.empty((0, model.n)), True
-        ratio = math.inf if lost or not len(error) else float((np.abs(error[:, asked]) / goals[asked]).max())
-        tried.append((precision, ratio))
-        if ratio <= 1 and len(tried) > 1 and tried[-2][1] <= 1:
-            return Requirement(FloatFormat(base, precision - 1, rounding), basis, steps, tuple(tried))
-    best = tried[-1][1] <= 1
-    return Requirement(FloatFormat(base, tried[-1][0], rounding) if best else None, basis, steps, tuple(tried))
+    measured, marks = np.asarray(z), log_spaced(steps, 16)
+    if measured.shape != (steps, model.m):
+        raise ValueError(
+            f"got {len(measured)} measurements of shape {measured.shape[1:]}; needed one for each of the {steps} "
+            f"steps, of shape ({model.m},)"
+        )
+    true = reference(model, measured, marks) if basis == "emulation" else None
+    most, tried = LARGEST_PRECISION[base], dict[int, float]()
+    with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
+
+        def meets(precision: int) -> bool:
+            if precision not in tried:
+                fmt = FloatFormat(base, precision, rounding)
+                tried[precision] = _over_goal(model, measured, fmt, form, marks, true, goals)
+                bar.update()
+            return tried[precision] <= 1
+
+        answer = 2 + bisect_left(range(2, most), True, key=meets)
+        while answer < most and not (meets(answer) and meets(answer + 1)):
+            answer += 1
+        found = FloatFormat(base, answer, rounding) if meets(answer) else None
+    return Requirement(found, basis, steps, tuple(sorted(tried.items())))
+
+
+def survey(
+    model: LinearModel,
+    z: Any,
+    goal: float | Sequence[float],
+    precisions: Sequence[int],
+    base: int = 2,
+    rounding: Rounding = Rounding.NEAREST,
+    form: Form = Form.USUAL,
+    basis: Basis = "emulation",
+) -> tuple[tuple[int, float], ...]:
+    """Run a filter in each of some precisions; arguments as of :func:`required_precision`.
+
+    Returns
+    -------
+    tried : precision, and largest error or bound over goal, as in :class:`Requirement`.
+    """
+    measured, goals = np.asarray(z), np.broadcast_to(np.asarray(goal, dtype=np.float64), (model.n,))
+    marks = log_spaced(len(measured), 16)
+    true = reference(model, measured, marks) if basis == "emulation" else None
+    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
+    return tuple((fmt.precision, _over_goal(model, measured, fmt, form, marks, true, goals)) for fmt in formats)
+
+
+def _over_goal(
+    model: LinearModel,
+    z: NDArray[Any],
+    fmt: FloatFormat,
+    form: Form,
+    marks: Sequence[int],
+    true: Kept | None,
+    goals: NDArray[np.float64],
+) -> float:
+    """Largest error over goal against `true`, or without it, largest bound over goal; infinite if a run fails."""
+    asked = np.isfinite(goals)
+    try:
+        if true is None:
+            followed = Followed(model, fmt, form, marks)
+            followed.take(fmt.array(z))
+            lost, error = followed.stopped is not None, followed.bounds[0]
+        else:
+            history = emulate(model, z, fmt, form, marks, true)
+            lost, error = history.indefinite is not None or history.stopped is not None, history.state
+    except ValueError:  # a covariance is not definite in so few digits
+        return math.inf
+    return math.inf if lost else float((np.abs(error[:, asked]) / goals[asked]).max())

@@ -1,0 +1,101 @@
+"""Problems of other fields, as a reader may have them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds import exact
+from gpbnb.formats import FloatFormat
+from gpbnb.kalman.experiment import Simulation
+from gpbnb.kalman.model import LinearModel
+
+#: The states of :func:`tilt`, and their units.
+TILT_STATES = (("tilt", "°"), ("rate", "°/s"), ("gyro bias", "°/s"))
+
+#: Formats that processors compute in, by the name of their standard.
+STANDARD = {
+    "binary16": FloatFormat(2, 11),
+    "binary32": FloatFormat(2, 24),
+    "binary64": FloatFormat(2, 53),
+}
+
+#: Least and largest powers of two of their normal numbers; IEEE 754-2019, table 3.5.
+NORMAL = {"binary16": (-14, 15), "binary32": (-126, 127), "binary64": (-1022, 1023)}
+
+
+def tilt(wander: str = "1e-10") -> LinearModel:
+    """A tilt filter of a balancing robot or a camera, 100 steps a second: n = 3, m = 2.
+
+    It merges a gyroscope, which shows rate plus bias with 0.05 °/s rms, and an accelerometer, which shows the tilt with
+    2° rms.
+
+    Parameters
+    ----------
+    wander : variance by which the bias moves in a step, (°/s)².
+    """
+    return LinearModel(
+        Phi=exact([["1", "0.01", "0"], ["0", "0.98", "0"], ["0", "0", "1"]]),
+        H=exact([["0", "1", "1"], ["1", "0", "0"]]),
+        Q=exact([["0", "0", "0"], ["0", "4", "0"], ["0", "0", wander]]),
+        R=exact([["0.0025", "0"], ["0", "4"]]),
+        x0=exact(["0", "0", "0"]),
+        P0=exact([["100", "0", "0"], ["0", "400", "0"], ["0", "0", "1"]]),
+        name="tilt filter",
+    )
+
+
+def tilt_measurements(steps: int, seed: int = 0) -> NDArray[np.float64]:
+    """Measurements of the tilt filter that begins 3° and 0.5 °/s off, in steps of 1/4096; (steps, 2)."""
+    return Simulation(tilt(), (3.0, -5.0, 0.5), seed, resolution=2.0**-12).measurements(steps)
+
+
+def tracker(origin: str = "0") -> LinearModel:
+    """A tracker of position (m) and velocity (m/s), ten measurements a second: n = 2, m = 1.
+
+    Parameters
+    ----------
+    origin : where it starts, m from the zero of its coordinates.
+    """
+    return LinearModel(
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=exact([["1", "0"]]),
+        Q=exact([["1/30000", "1/2000"], ["1/2000", "1/100"]]),
+        R=exact([["4"]]),
+        x0=exact([origin, "0"]),
+        P0=exact([["100", "0"], ["0", "100"]]),
+        name=f"tracker, {origin} m from its zero",
+    )
+
+
+def precise() -> LinearModel:
+    """A tracker whose sensor is far better than what is known at first: variances of 1e-12 and 1e4; n = 2, m = 1."""
+    return LinearModel(
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=exact([["1", "0.5"]]),
+        Q=exact([["1/30000", "1/2000"], ["1/2000", "1/100"]]),
+        R=exact([["1e-12"]]),
+        x0=exact(["0", "0"]),
+        P0=exact([["1e4", "0"], ["0", "1e4"]]),
+        name="precise sensor",
+    )
+
+
+def normal_matrix(degree: int, times: Sequence[int]) -> NDArray[Any]:
+    r"""Exact normal matrix :math:`A^TA`, :math:`A_{ij} = t_i^j`, of a polynomial fit; (degree + 1, degree + 1).
+
+    Raises
+    ------
+    ValueError : fewer different times than coefficients, so that the matrix is singular.
+    """
+    if degree < 0 or len(set(times)) <= degree:
+        raise ValueError(
+            f"got degree {degree} and {len(set(times))} different times; needed at least {degree + 1} different times "
+            "and a degree of 0 or more"
+        )
+    powers = np.array([[Fraction(t) ** j for j in range(degree + 1)] for t in times], dtype=object)
+    return np.asarray(powers.T @ powers)

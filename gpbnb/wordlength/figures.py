@@ -1,0 +1,108 @@
+"""Figures of the chapter on wordlength: results in, artists out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.wordlength.examples import STANDARD
+
+_COLOURS = (OBSERVED, *OBSERVED_OTHERS)
+_MARKERS = "os^Dv"
+#: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).
+KINDS = {
+    "emulation": ("o", OBSERVED, OBSERVED),
+    "bound": ("|", BOUND, BOUND),
+    "theory": ("D", STRICT, STRICT),
+    "printed": ("o", BOUND, "none"),
+    "mended": ("s", STRICT, "none"),
+}
+Curve = Sequence[tuple[int, float]]
+
+
+def standards(ax: Axes, upright: bool = True) -> list[Artist]:
+    """Lines at the precisions of IEEE's formats that lie within the axis; named at its end."""
+    artists: list[Artist] = []
+    low, high = ax.get_xlim() if upright else ax.get_ylim()
+    for name, fmt in STANDARD.items():
+        if low <= fmt.precision <= high:
+            draw = ax.axvline if upright else ax.axhline
+            artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
+            x, y = (fmt.precision, 1.0) if upright else (1.0, fmt.precision)
+            transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
+            side: Any = "center" if upright else "right"
+            artists.append(
+                ax.text(x, y, name, color=REFERENCE, fontsize=8.5, transform=transform, ha=side, va="bottom")
+            )
+    return artists
+
+
+def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
+    """Error (points) and bound (lines) over the goal against the bits, a colour a form; infinities are left out."""
+    artists: list[Artist] = []
+    for (name, curve), colour, marker in zip(emulated.items(), _COLOURS, _MARKERS, strict=False):
+        points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]
+        artists += ax.plot(*zip(*points, strict=True), marker, color=colour, label=name)
+        lines = [(t, ratio) for t, ratio in bounded.get(name, ()) if ratio < math.inf]
+        if lines:
+            artists += ax.plot(*zip(*lines, strict=True), "-", color=colour, label=f"{name}, bound")
+    artists.append(ax.axhline(1, color=REFERENCE, ls="--", label="goal"))
+    ax.set_yscale("log")
+    artists += standards(ax)
+    legend(ax, fontsize=8.5)
+    label(ax, "bits", "error or bound, over the goal")
+    return artists
+
+
+def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) -> list[Artist]:
+    """Bits (points: observed; lines: bounds and formulas) against the number of steps."""
+    artists: list[Artist] = []
+    for (name, curve), colour, marker in zip(points.items(), _COLOURS, _MARKERS, strict=False):
+        artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
+    for (name, curve), style in zip(lines.items(), ("-", "--", "-.", ":"), strict=False):
+        artists += ax.plot(*zip(*curve, strict=True), style, color=BOUND, label=name)
+    ax.set_xscale("log")
+    artists += standards(ax, upright=False)
+    legend(ax, fontsize=8.5)
+    label(ax, "steps $k$", "bits for the goal")
+    return artists
+
+
+def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
+    """Bits of many problems, a line a problem, by kind of answer.
+
+    Parameters
+    ----------
+    found : by problem, then by kind, one of :data:`KINDS`.
+
+    Raises
+    ------
+    ValueError : another kind.
+    """
+    unknown = {kind for each in found.values() for kind in each} - set(KINDS)
+    if unknown:
+        raise ValueError(f"got the kinds {sorted(unknown)}; needed some of {', '.join(KINDS)}")
+    artists: list[Artist] = []
+    names = list(found)
+    for name, each in found.items():
+        y = names.index(name)
+        artists += ax.plot([min(each.values()), max(each.values())], [y, y], color="#D0D0D0", zorder=1)
+    for kind, (marker, edge, face) in KINDS.items():
+        places = [(each[kind], names.index(name)) for name, each in found.items() if kind in each]
+        if places:
+            style = {"ms": 13, "mew": 2.5} if marker == "|" else {"ms": 8}
+            line = ax.plot(*zip(*places, strict=True), marker, mec=edge, mfc=face, ls="none", label=kind, **style)
+            artists += line
+    ax.set_yticks(np.arange(len(names)), names)
+    ax.set_ylim(len(names) - 0.4, -0.6)
+    ax.set_xlim(left=0)
+    artists += standards(ax)
+    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    ax.set_xlabel("bits")
+    return artists

@@ -1,0 +1,220 @@
+"""What decides a wordlength, measured: the steps, the range of the numbers, what an addition loses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds import exact
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.inversion.bounds import rationals, smallest_precision, true_inverse
+from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.precision import Requirement, required_precision
+from gpbnb.kalman.theory import coefficients, companion_bound
+from gpbnb.kalman.theory import required_precision as digits_of_125
+from gpbnb.kalman.year import Year
+
+
+def printed_precision(k: int, n: int, m: int, goal: Fraction, size: Fraction, base: int = 2, **faults: bool) -> int:
+    r"""Digits that (125) asks for when :math:`\|x_k\| = B` = size, for an error of `goal`.
+
+    Parameters
+    ----------
+    goal, size : in one unit. faults : of :func:`gpbnb.kalman.theory.coefficients`, which mend (125).
+
+    References
+    ----------
+    hung1984, ch. II, eq. (125) and the example of section 12.
+    """
+    return digits_of_125(sum(coefficients(k, n, m, **faults)), goal / size, base)
+
+
+def growth(
+    model: LinearModel, z: NDArray[Any], goal: float | Sequence[float], steps: Sequence[int], **options: Any
+) -> tuple[Requirement, ...]:
+    """What :func:`gpbnb.kalman.precision.required_precision` answers for the first few steps, and for more of them.
+
+    Parameters
+    ----------
+    options : form, basis, base and rounding of that function.
+    """
+    return tuple(required_precision(_first(model, k), k, goal, z=z[:k], **options) for k in steps)
+
+
+def _first(model: LinearModel, steps: int) -> LinearModel:
+    """The same for so many steps, without what a longer cycle has later, which would be rounded and checked in vain."""
+    cut = {letter: getattr(model, letter)[:steps] for letter in ("Phi", "H", "Q", "R")}
+    return replace(model, **cut)
+
+
+def years_needed(runs: Sequence[Year], goal: float) -> tuple[tuple[int, int], ...]:
+    """Steps, and the fewest digits of the runs with which drift (mas) and rate (mas/yr) stay within `goal` until then.
+
+    Raises
+    ------
+    ValueError : runs of several bases, roundings or forms, whose digits are not to be compared.
+    """
+    kinds = {(run.case.model, run.case.base, run.case.rounding, run.case.form) for run in runs}
+    if len(kinds) != 1:
+        raise ValueError(f"got runs of {len(kinds)} kinds; needed one model, base, rounding and form")
+    found: dict[int, int] = {}
+    for run in runs:
+        errors = np.maximum.accumulate(np.abs(np.hstack([run.drift, run.rate])).max(axis=1))
+        for step, error in zip(run.steps.tolist(), errors.tolist(), strict=True):
+            if error <= goal:
+                found[step] = min(found.get(step, run.case.precision), run.case.precision)
+    return tuple(sorted(found.items()))
+
+
+class Span(NamedTuple):
+    """Powers of two between which the magnitudes of numbers lie, zeros aside."""
+
+    name: str
+    least: int
+    largest: int
+
+
+def spans(model: LinearModel, z: NDArray[Any]) -> tuple[Span, ...]:
+    """Of a filter's model, and its estimates, gains and covariances after sixteen steps a decade."""
+    kept = reference(model, z, log_spaced(len(z), 16))
+    told = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
+    numbers = {"model": told, "estimate": kept.x, "gain": kept.K, "covariance": kept.P}
+    result = []
+    for name, values in numbers.items():
+        powers = [math.frexp(abs(float(value)))[1] - 1 for value in values.ravel() if value]
+        result.append(Span(name, min(powers), max(powers)))
+    return tuple(result)
+
+
+class Deafness(NamedTuple):
+    """What few digits do to one state: its last variance over the true one; the share of the last steps in which its
+    estimate did not move at all; and the largest error of the first state.
+    """
+
+    fmt: FloatFormat
+    variance: float
+    still: float
+    error: float
+
+
+def deafness(
+    model: LinearModel,
+    z: NDArray[Any],
+    state: int,
+    formats: Sequence[FloatFormat],
+    form: Form = Form.USUAL,
+    last: int = 200,
+) -> tuple[Deafness, ...]:
+    """Watch a state that hardly moves, in some formats; errors as of :func:`gpbnb.kalman.precision.survey`.
+
+    Parameters
+    ----------
+    state : its index. last : how many steps at the end are watched one by one.
+    """
+    marks = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
+    true, found = reference(model, z, marks), []
+    for fmt in formats:
+        run = Run(model, fmt, form, marks)
+        run.take(fmt.array(z))
+        history, kept = compare_runs(run, true), run.kept()
+        variance = float(kept.P[-1, state, state] / true.P[len(kept.P) - 1, state, state])
+        still = sum(a == b for a, b in pairwise(kept.x[-last - 1 :, state])) / last
+        found.append(Deafness(fmt, variance, still, float(np.abs(history.state[:, 0]).max())))
+    return tuple(found)
+
+
+def hidden_bits(model: LinearModel, z: NDArray[Any], state: int) -> float:
+    r""":math:`\log_2 P_{ii}/Q_{ii}` after the last step: with fewer bits than about that, adding Q changes nothing."""
+    kept = reference(model, z, (len(z),))
+    return math.log2(float(kept.P[-1, state, state]) / float(model.Q[0, state, state]))
+
+
+def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
+    """The largest entry of the estimates after the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks."""
+    return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
+
+
+def companion(
+    model: LinearModel, z: NDArray[Any], fmt: FloatFormat, form: Form = Form.USUAL
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bound a run by its distance from the same filter in double-double and the contraction bound of that one.
+
+    Model and measurements are those that the format stores.
+
+    Returns
+    -------
+    error, bound : (n,), the largest of each state at the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks.
+    """
+    stored, measured, marks = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
+    run, beside = Run(stored, fmt, form, marks), Followed(stored, None, Form.USUAL, marks)
+    run.take(measured)
+    beside.take(measured.to_fractions())
+    history = compare_runs(run, beside.kept())
+    bound = companion_bound(history.state, beside.bounds[0][: len(history.steps)])
+    return np.abs(history.state).max(axis=0), bound.max(axis=0)
+
+
+class Inverse(NamedTuple):
+    """Bits that the inverse of a matrix needs, and what its condition lets one expect."""
+
+    name: str
+    condition: float
+    scaled: float
+    expected: int
+    proved: int
+
+
+def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = Rounding.NEAREST) -> Inverse:
+    r"""Bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` goal, and proved.
+
+    D scales by powers of two to a diagonal near 1, as a choice of units would; elimination rounds the same with and
+    without. What is proved is of :func:`gpbnb.inversion.bounds.smallest_precision`.
+
+    Parameters
+    ----------
+    matrix : (n, n), exact, symmetric positive definite.
+    """
+    scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
+    scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
+    conditions = [_column_sum(rationals(a)) * _column_sum(true_inverse(a)) for a in (matrix, scaled)]
+    expected = digits_of_125(conditions[1], Fraction(goal), 2, rounding)
+    proved = smallest_precision(matrix, goal, 2, rounding).fmt.precision
+    return Inverse(name, float(conditions[0]), float(conditions[1]), expected, proved)
+
+
+def _column_sum(matrix: Any) -> Fraction:
+    columns = matrix.transpose().tolist()
+    return max(sum((abs(Fraction(int(e.p), int(e.q))) for e in column), Fraction(0)) for column in columns)
+
+
+def in_units(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
+    """The same filter with states in other units.
+
+    Parameters
+    ----------
+    sizes : (n,), exact: how many of the new units an old one is.
+
+    Raises
+    ------
+    ValueError : not one positive number a state.
+    """
+    given = exact(sizes)
+    if given.shape != (model.n,) or not (given > 0).all():
+        raise ValueError(f"got sizes {list(sizes)}; needed {model.n} positive numbers, one a state")
+    square = np.multiply.outer(given, given)
+    return replace(
+        model,
+        Phi=model.Phi * np.multiply.outer(given, 1 / given),
+        H=model.H / given,
+        Q=model.Q * square,
+        x0=model.x0 * given,
+        P0=model.P0 * square,
+    )

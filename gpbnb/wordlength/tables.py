@@ -1,0 +1,72 @@
+"""Tables of the chapter on wordlength."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
+from gpbnb.kalman.precision import Requirement
+from gpbnb.kalman.tables import arithmetic, short
+from gpbnb.tables import Table, digits
+from gpbnb.wordlength.examples import NORMAL
+from gpbnb.wordlength.study import Deafness, Inverse, Span
+
+
+def bits(answer: Requirement) -> str:
+    """The precision of an answer in a cell, or that there is none."""
+    return str(answer.fmt.precision) if answer.fmt else "none"
+
+
+def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
+    """Answers side by side: a line a name, a column a question.
+
+    Raises
+    ------
+    ValueError : lines that do not answer the same questions.
+    """
+    questions = {tuple(question for question, _ in line) for line in found.values()}
+    if len(questions) != 1:
+        raise ValueError(f"got lines of {len(questions)} kinds; needed the same questions in each")
+    body = tuple((name, *(bits(answer) for _, answer in line)) for name, line in found.items())
+    return Table(f"{len(body)} lines of answers", ("bits by", *questions.pop()), body)
+
+
+def deaf(found: Sequence[Deafness], goal: float) -> Table:
+    """What few digits do to a state that hardly moves."""
+    body = tuple(
+        (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.still:.0f} %", short(each.error / goal))
+        for each in found
+    )
+    header = ("arithmetic", "variance, computed / true", "steps without a move", "error / goal")
+    return Table(f"{len(body)} formats", header, body)
+
+
+def spans(found: Sequence[Span]) -> Table:
+    """Powers of two of a filter's numbers, and which standard formats hold them as normal numbers."""
+    body = []
+    for each in found:
+        held = [name for name, (low, high) in NORMAL.items() if low <= each.least and each.largest <= high]
+        body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(held) or "none"))
+    return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "held by"), tuple(body))
+
+
+def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
+    """Bits with which rounding is a tenth of the discretization error, and the rates that a format allows."""
+    body = []
+    for name, duration in durations.items():
+        needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding]
+        rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
+        body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
+    kind = digits(fmt)
+    header = ("duration", "bits, rounded", "bits, chopped", f"best rate of {kind}, Hz", "its additions lost at, Hz")
+    return Table(f"{len(body)} durations", header, tuple(body))
+
+
+def inverses(found: Sequence[Inverse]) -> Table:
+    """Bits that inverses need, by the rule of thumb and proved."""
+    body = tuple(
+        (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found
+    )
+    header = ("matrix", "$\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
+    return Table(f"{len(body)} inverses", header, body)
