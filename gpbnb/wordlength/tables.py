@@ -68,5 +68,5 @@ def inverses(found: Sequence[Inverse]) -> Table:
     body = tuple(
         (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found
     )
-    header = ("matrix", "$\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
+    header = ("matrix", "condition $\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
     return Table(f"{len(body)} inverses", header, body)
