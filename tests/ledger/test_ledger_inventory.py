@@ -77,7 +77,7 @@ def sections(entries):
 def test_quotes_are_what_the_inventory_has():
     assert quote("hung1984.I.contract") == "the study was supported under contract NA58-34426"
     assert all(quote(entry.id) == entry.printed for entry in INVENTORY[::100])
-    with pytest.raises(KeyError, match="no entry 'hung1984.I.none' in the inventory"):
+    with pytest.raises(KeyError, match=r"no entry 'hung1984\.I\.none' in the inventory"):
         quote("hung1984.I.none")
 
 
