@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 from datetime import date
 from fractions import Fraction
+from functools import reduce
+from operator import mul
 
 import numpy as np
 
@@ -23,6 +26,8 @@ CHAPTER = "chapter *Error budget*"
 PRINTED_TOTAL = 1.253
 PRINTED_SOURCES = 44
 PRINTED_EACH = 0.15
+TITLE_PAGE = "NAS8-34426"
+"""The contract, on the title page of hung1984 and in hung1982, ch. I."""
 
 
 # -- hung1984, ch. I ------------------------------------------------------------------------------
@@ -53,9 +58,21 @@ def revised_sum() -> bool:
 
 def revised_product() -> bool:
     """Whether (20) of 1984, n + m + 1, differs from the count of roundings of a product of n over m, unlike 1982."""
-    n, m = 2, 1
-    operations = (n - 1) + m
-    return operations == n + m - 1 and operations != n + m + 1
+    n, m = 3, 2
+    count = (reduce(mul, [Roundings()] * n) / reduce(mul, [Roundings()] * m)).count
+    return count == n + m - 1 and count != n + m + 1
+
+
+@dataclass(frozen=True)
+class Roundings:
+    """A factor that stands for all numbers: it counts the products and quotients that led to it."""
+
+    count: int = 0
+
+    def __mul__(self, other: Roundings) -> Roundings:
+        return Roundings(self.count + other.count + 1)
+
+    __truediv__ = __mul__
 
 
 def revised_chain() -> bool:
@@ -88,10 +105,9 @@ def period_1984() -> Finding:
 
 @CHECKS.add("hung1984.I.contract")
 def contract() -> Finding:
-    here, title = "NA58-34426", "NAS8-34426"
     return compare(
-        here == title,
-        title,
+        TITLE_PAGE in ledger.quote("hung1984.I.contract"),
+        TITLE_PAGE,
         Verdict.TYPO,
         otherwise_note="the title page and hung1982 have an S, where this page, or its scan, has a 5",
     )
@@ -123,10 +139,10 @@ def design_goal() -> Finding:
 @CHECKS.add("hung1982.I.chapter-reference")
 def chapter_reference() -> Finding:
     entries = [entry for entry in ledger.load_inventory() if entry.document == "hung1982"]
-    where = {entry.chapter for entry in entries if entry.item == "six frames"}
+    (where,) = {entry.chapter for entry in entries if entry.item == "six frames"}
     return compare(
-        where == {"VI"},
-        f"the measurement geometry is chapter {', '.join(sorted(where))}",
+        ledger.quote("hung1982.I.chapter-reference").endswith(f"Chapter {where}"),
+        f"the measurement geometry is chapter {where}",
         Verdict.TYPO,
         otherwise_note="two letters changed places; there is no chapter VI",
     )

@@ -265,8 +265,7 @@ def rate() -> Finding:
 
 @CHECKS.add(*eq("16"))
 def products() -> Finding:
-    x1, x2, x3 = (sp.Symbol(name) for name in ("x_1n", "x_2n", "x_3"))
-    new = x3 + (x1 + X1) * T / 2
+    (x1, x2, new), x3 = derivation.after(), X3
     printed = (
         (new * x1, x3 * x1 + x1**2 * T / 2 + X1 * x1 * T / 2),
         (new * x2, x3 * x2 + x1 * x2 * T / 2 + X1 * x2 * T / 2),

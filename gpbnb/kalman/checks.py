@@ -16,6 +16,7 @@ from gpbnb.findings import Check, Checks, Finding, Verdict, answer, compare, unv
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman import derivation, experiment, smallest, theory, year
 from gpbnb.kalman.tables import scientific
+from gpbnb.ledger.inventory import quote
 
 CHECKS = Checks()
 
@@ -202,13 +203,10 @@ def prediction_recalled() -> Finding:
     return compare(predicted(0), r"the covariance of $\Phi_{k-1}x_{k-1}+w_{k-1}$")
 
 
-SUBSCRIPT = "p"
-
-
 @CHECKS.add("hung1984.II.eq101")
 def covariance() -> Finding:
     return compare(
-        SUBSCRIPT == "k" and optimal()["(101)"],
+        "K_kH_k" in quote("hung1984.II.eq101") and optimal()["(101)"],
         "with $K_k$ it is the covariance of the optimal estimate, in exact arithmetic",
         Verdict.TYPO if optimal()["(101)"] else Verdict.WRONG,
         otherwise_note="$K_p$ for $K_k$, which stands where (101) is recalled",
@@ -645,13 +643,13 @@ def criterion() -> Finding:
     )
 
 
-NAME = "GP-β"
-
-
 @CHECKS.add("hung1984.II.s12.example-ocr-gp-beta")
 def name_of_the_experiment() -> Finding:
     return compare(
-        NAME == "GP-B", "GP-B", Verdict.OCR, otherwise_note="the scan reads B as β here, and β as B in (122)"
+        "GP-B" in quote("hung1984.II.s12.example-ocr-gp-beta"),
+        "GP-B",
+        Verdict.OCR,
+        otherwise_note="the scan reads B as β here, and β as B in (122)",
     )
 
 

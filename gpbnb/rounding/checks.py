@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
@@ -14,6 +15,7 @@ from gpbnb.bounds import column_sum_norm, exact, max_norm
 from gpbnb.derivation import first_order
 from gpbnb.findings import Checks, Finding, Verdict, answer, compare, unverifiable
 from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.ledger.inventory import quote
 from gpbnb.rounding import derivation, experiment, theory
 
 CHECKS = Checks()
@@ -856,7 +858,8 @@ def chain_error() -> Finding:
 
 @CHECKS.add("hung1982.III.s9-2.cross-reference-to-28")
 def reference_28() -> Finding:
-    cited, meant = (CHECKS.get(f"hung1982.III.eq{number}") for number in (38, 28))
+    (number,) = re.findall(r"\((\d+)\)", quote("hung1982.III.s9-2.cross-reference-to-28"))
+    cited, meant = CHECKS.get(f"hung1982.III.eq{number}"), CHECKS.get("hung1982.III.eq28")
     return compare(
         cited is matmul_bound,
         "the bound of a matrix product is (28); (38) is an equation of section 10",

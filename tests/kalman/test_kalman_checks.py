@@ -199,7 +199,7 @@ def test_a_check_that_agrees_can_disagree(patch, name, change):
 AGREE = [
     ("model_equations", replace(checks, "DIMENSIONS", (3, 1))),
     ("prediction", replace(checks, "predicted", always(True))),
-    ("covariance", replace(checks, "SUBSCRIPT", "k")),
+    ("covariance", replace(checks, "quote", always("$P_k=P_{kp}-K_kH_kP_{kp}$"))),
     *(
         (name, no_excess)
         for name in (
@@ -244,7 +244,7 @@ AGREE = [
     ("first_digits", replace(theory, "coefficients", always(theory.Coefficients(10**8, 1)))),
     ("second_digits", replace(theory, "coefficients", always(theory.Coefficients(1, 12949 * 10**12)))),
     ("criterion", replace(checks, "GOAL", 6606)),
-    ("name_of_the_experiment", replace(checks, "NAME", "GP-B")),
+    ("name_of_the_experiment", replace(checks, "quote", always("one year GP-B operation"))),
 ]
 
 

@@ -372,6 +372,7 @@ AGREE = [
     ("chain_shortcut", chains_never_cancel),
     ("chain_error", chains_never_cancel),
     ("reference_28", replace(checks, "CHECKS", {"hung1982.III.eq38": FUNCTIONS["matmul_bound"]})),
+    ("reference_28", replace(checks, "quote", always("the result of (28) implies"))),
     ("examples", replace(theory, "printed_example_bound", theory.example_bound)),
 ]
 
