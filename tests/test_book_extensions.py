@@ -153,7 +153,7 @@ LINKS = (
 
 def test_links_lead_within_where_all_pages_are_one(tmp_path):
     document = tree(LINKS)
-    ledger.mend_links(app(tmp_path, "singlehtml"), document, "book/errata")
+    book.mend_links(app(tmp_path, "singlehtml"), document, "book/errata")
     (raw,) = document.findall(nodes.raw)
     mended = (
         '<a href="#document-book/rounding">r</a> <a href="#hung1984.II.eq20">e</a> <a href="https://a.org/x.html">o</a>'
@@ -163,6 +163,53 @@ def test_links_lead_within_where_all_pages_are_one(tmp_path):
 
 def test_links_stay_where_pages_are_many(tmp_path):
     document = tree(LINKS)
-    ledger.mend_links(app(tmp_path), document, "book/errata")
+    book.mend_links(app(tmp_path), document, "book/errata")
     (raw,) = document.findall(nodes.raw)
     assert raw.astext() == LINKS
+
+
+@pytest.mark.parametrize(
+    ("typed", "written"),
+    [
+        ("2.6490e+08", "2.6490\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10^8"),
+        ("-1e-08", "-1\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10^−8"),
+        ("1e", "1e"),
+    ],
+)
+def test_powers_of_ten_are_written_as_such(typed, written):
+    document = new_document("page")
+    document += nodes.paragraph("", "", nodes.inline("", typed, classes=["pasted-text"]), nodes.Text(" 1e-08"))
+    book.write_powers(None, document, "book/page")
+    shown = "".join(
+        f"^{part.astext()}" if isinstance(part.parent, nodes.superscript) else part.astext()
+        for part in document.findall(nodes.Text)
+    )
+    assert shown == f"{written} 1e-08"
+
+
+def table(*rows):
+    """A table as MyST makes it of Markdown, the first row its head."""
+    group = nodes.tgroup("", *(nodes.colspec() for _ in rows[0]), cols=len(rows[0]))
+    made = [nodes.row("", *(nodes.entry("", nodes.paragraph("", cell)) for cell in row)) for row in rows]
+    group += [nodes.thead("", made[0]), nodes.tbody("", *made[1:])]
+    return nodes.table("", group)
+
+
+def test_a_chapters_part_of_the_ledger_has_the_columns_of_the_whole():
+    document = new_document("page")
+    document += [table(ledger.HEADER, ("(20)", "wrong", "a", "b", "why")), table(("Item", "x"), ("1", "2"))]
+    ledger.join_columns(None, document)
+    (box,) = document.findall(nodes.container)
+    assert box["classes"] == ["ledger"]
+    head, row = box.findall(nodes.row)
+    assert [cell.astext() for cell in head] == ["Item", "Verdict", "Printed, recomputed, and note"]
+    assert [cell.astext() for cell in row[:2]] == ["(20)", "wrong"]
+    assert [(part.astext(), part["classes"]) for part in row[2]] == [
+        ("a", ["printed"]),
+        ("b", ["recomputed"]),
+        ("why", ["note"]),
+    ]
+    (group,) = box.findall(nodes.tgroup)
+    assert group["cols"] == len(list(group.findall(nodes.colspec))) == 3
+    assert "ledger-table" in group.parent["classes"]
+    assert [cell.astext() for cell in document[1].findall(nodes.entry)] == ["Item", "x", "1", "2"]
