@@ -43,7 +43,7 @@ def test_verdicts(rows):
         "wrong": 1,
         "inconsistent": 2,
         "ocr": 1,
-        "unverifiable": 5,
+        "unverifiable": 6,
         "open": 2,
     }
 
