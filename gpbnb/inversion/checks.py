@@ -1145,7 +1145,14 @@ def weights() -> Finding:
     )
 
 
-@CHECKS.add("hung1982.III.eq85", "hung1984.II.eq86", "hung1984.II.eq87", "hung1984.II.eq88", "hung1982.III.eq86-88")
+@CHECKS.add(
+    "hung1984.II.s11-2.claim-generalization",
+    "hung1982.III.eq85",
+    "hung1984.II.eq86",
+    "hung1984.II.eq87",
+    "hung1984.II.eq88",
+    "hung1982.III.eq86-88",
+)
 def weights_counted() -> Finding:
     def pairs(sample: Sample) -> Iterable[tuple[Any, Any]]:
         stages, rights, x = sample.reduction

@@ -304,7 +304,20 @@ def five_sources() -> Finding:
     return compare(
         min(map(abs, found.values())) > 0,
         "; ".join(f"{name}: {value:.3g}" for name, value in found.items()) + " (mas a year)",
-        note="the scan prints $1/T$ for the $1/f$ noise of the third; unequal gains of the readouts are a sixth source",
+        note="the $1/T$ of the third is $1/f$; unequal gains of the readouts are a sixth source",
+    )
+
+
+@CHECKS.add(entry("s2.1-over-t"))
+def one_over_t() -> Finding:
+    long, short = (float(theory.flicker_density(LEVEL, 1 / period)) for period in (PERIOD, PERIOD / 2))
+    _, slope = noise()
+    return compare(
+        math.isclose(long / short, 1 / 2),
+        f"half the roll period divides the density of $1/f$ noise at the roll frequency by {long / short:g}; noise as "
+        "$1/T$ would be doubled",
+        Verdict.TYPO if abs(slope.value + 1) < 3 * slope.error else Verdict.WRONG,
+        otherwise_note="T for f, by the author or the scan; $1/f$ in all other places",
     )
 
 

@@ -23,7 +23,7 @@ def rows():
 
 def test_every_entry_of_the_chapter_has_a_check_here():
     assert set(checks.CHECKS) == {entry.id for entry in ENTRIES}
-    assert len(ENTRIES) == 62
+    assert len(ENTRIES) == 63
 
 
 def test_verdicts(rows):
@@ -31,7 +31,7 @@ def test_verdicts(rows):
     assert [row.entry.id for row in rows if row.error is not None] == []
     assert Counter(row.outcome for row in rows) == {
         "verified": 47,
-        "typo": 6,
+        "typo": 7,
         "wrong": 3,
         "unverifiable": 4,
         "answered": 2,
@@ -47,6 +47,7 @@ def test_which_are_not_right_as_printed(rows):
     assert found[Verdict.WRONG] == ids("s3.no-direct-error", "s4.sample-2-negligible", "s5.ramp-psd")
     assert found[Verdict.TYPO] == ids(
         "eq3",
+        "s2.1-over-t",
         "s3.cos-5-deg",
         "s4.sample-1-s-to-0",
         "s4.sample-2-delta-omega",
@@ -153,6 +154,11 @@ def test_noise_as_strong_at_the_roll_frequency_would_be_found_out(monkeypatch, d
 def test_a_signal_to_noise_ratio_of_another_law_would_be_found_out(monkeypatch):
     monkeypatch.setattr(theory, "roll_phase", lambda n, period: 0.0 * n)  # noise and signal weaken alike
     assert verdict_of("s3.signal-to-noise") is Verdict.WRONG
+
+
+def test_noise_of_the_other_law_would_be_found_right(monkeypatch):
+    monkeypatch.setattr(theory, "flicker_density", lambda level, f: level * f)
+    assert verdict_of("s2.1-over-t") is Verdict.VERIFIED
 
 
 def test_a_loss_that_does_not_depend_on_the_frequency_would_be_found_out(monkeypatch):
