@@ -33,6 +33,15 @@ TITLE_PAGE = "NAS8-34426"
 # -- hung1984, ch. I ------------------------------------------------------------------------------
 
 
+@CHECKS.add("hung1984.I.contents")
+def contents() -> Finding:
+    entries = [entry for entry in ledger.load_inventory() if entry.document == "hung1984"]
+    return unverifiable(
+        f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries))}",
+        "the scan has no page numbers and no distribution list",
+    )
+
+
 @CHECKS.add("hung1984.I.two-tasks")
 def two_tasks() -> Finding:
     mended, spoiled, kept = revised_sum(), revised_product(), revised_chain()

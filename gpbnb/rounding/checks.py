@@ -92,13 +92,18 @@ def splits(x: str) -> list[tuple[Fraction, Fraction]]:
 # -- section 1 ------------------------------------------------------------------------------------
 
 
-@CHECKS.add(*both("s1.approach"))
-def approach() -> Finding:
-    fmt = FloatFormat(2, 11)
+def beyond_the_law() -> tuple[float, float]:
+    """Share of sums of a thousand terms that break a law meant to fail in 1 %: of varied terms, and of equal ones."""
     varied, constant = (
-        experiment.growth(fmt, kind, (1000,), 30, np.random.default_rng(1)).beyond_probabilistic()[0]
+        experiment.growth(FloatFormat(2, 11), kind, (1000,), 30, np.random.default_rng(1)).beyond_probabilistic()[0]
         for kind in ("like signs", "constant")
     )
+    return float(varied), float(constant)
+
+
+@CHECKS.add(*both("s1.approach"), "hung1984.II.s1.claim-not-easy")
+def approach() -> Finding:
+    varied, constant = beyond_the_law()
     strict = tallies("dot")["strict"]
     return compare(
         bool(constant > 0.01 and strict.violations == 0 and strict.median < 0.1),
@@ -116,6 +121,66 @@ def only_rounding() -> Finding:
     )
 
 
+@CHECKS.add("hung1984.II.s1.claim-background", "hung1984.II.s1.claim-main-activity")
+def background() -> Finding:
+    return unverifiable("", "a statement about the literature, or about the data reduction, without a source")
+
+
+@CHECKS.add("hung1984.II.s1.claim-rounding-or-chopping")
+def rounding_or_chopping() -> Finding:
+    def holds(x: Fraction) -> bool:
+        u, v, e = FOUR.split(x)
+        inward = u * Fraction(10) ** e
+        outward = inward + (0 if v == 0 else Fraction(10) ** (e - 4) * (1 if u > 0 else -1))
+        errors = [abs(y / x - 1) for y in (inward, outward)]
+        return min(errors) <= FOUR.unit_roundoff and max(errors) <= FOUR_CHOPPED.unit_roundoff
+
+    agrees, text = all_samples(holds)
+    return compare(
+        agrees,
+        f"the nearer neighbour is within $\\beta$, the other within $\\beta_c$: {text}",
+        note="there are other rules, such as ties to even, always up, or at random; as each takes a neighbour, (8) or "
+        "(13) is true of it",
+    )
+
+
+#: Gyros of the experiment.
+GYROS = 4
+
+
+def scatter(n: int) -> float:
+    """Standard deviation of the sample standard deviation of n normal deviates, over the true one."""
+    mean = math.sqrt(2 / (n - 1)) * math.exp(math.lgamma(n / 2) - math.lgamma((n - 1) / 2))
+    return math.sqrt(1 - mean**2)
+
+
+@CHECKS.add("hung1984.II.s1.claim-small-sample")
+def small_sample() -> Finding:
+    spread, mean = scatter(GYROS), 1 / math.sqrt(GYROS)
+    return compare(
+        min(spread, mean) > 0.25,
+        f"of {GYROS} normal deviates the standard deviation scatters by {spread:.0%} of the true one and the mean by "
+        f"{mean:.0%}; of a thousand by {scatter(1000):.1%} and {1 / math.sqrt(1000):.1%}",
+        note="true, but no reason against statistics: a law that gives a probability of failure needs no sample of "
+        "gyros, it is about the many roundings of one run",
+    )
+
+
+@CHECKS.add("hung1984.II.s1.claim-more-reliable")
+def more_reliable() -> Finding:
+    _, constant = beyond_the_law()
+    strict = [tallies(trial)["strict"] for trial in ("sum", "product", "dot", "chain")]
+    violations, trials = (sum(getattr(each, name) for each in strict) for name in ("violations", "trials"))
+    printed = tallies("chain")["(31)"]
+    return compare(
+        violations == 0 and constant > 0.01,
+        f"the strict bounds of sums, products, inner products and chains fail in {violations} of {trials} trials; a "
+        f"law that should fail in 1 % fails in {constant:.0%} of sums of equal terms",
+        note=f"of bounds that are proved; the printed (31) fails in {printed.violations} of {printed.trials}, and this "
+        "report builds on it",
+    )
+
+
 # -- section 2: splitting and rounding ------------------------------------------------------------
 
 
@@ -127,6 +192,23 @@ def representation() -> Finding:
 
     agrees, text = all_samples(holds)
     return compare(agrees, text.replace("t=4", "t=12"), note="zero has no such form with $d_1 \\ne 0$")
+
+
+#: The square of the number that is to have infinitely many digits.
+RADICAND = 2
+
+
+@CHECKS.add("hung1984.II.s2.claim-infinite-digits")
+def infinite_digits() -> Finding:
+    places, bases = range(40), (2, 10, 16)
+    finite = [
+        (b, k) for b in bases for k in places if math.isqrt(RADICAND * b ** (2 * k)) ** 2 == RADICAND * b ** (2 * k)
+    ]
+    return compare(
+        not finite and not sp.sqrt(RADICAND).is_rational,
+        f"a number of finitely many digits is rational, and $\\sqrt{{{RADICAND}}}$ is not; no number of less than "
+        f"{len(places)} places in base {', '.join(map(str, bases))} has the square {RADICAND}",
+    )
 
 
 @CHECKS.add("hung1984.II.eq2")
@@ -194,7 +276,7 @@ def carry() -> Finding:
     )
 
 
-@CHECKS.add(*both("eq3"))
+@CHECKS.add(*both("eq3"), "hung1984.II.s2.claim-conventional")
 def rounding_rule() -> Finding:
     def holds(x: Fraction) -> bool:
         u, v, e = FOUR.split(x)
@@ -202,7 +284,10 @@ def rounding_rule() -> Finding:
         rounded = u * Fraction(10) ** e + (step if 2 * v >= 1 else -step if 2 * v <= -1 else 0)
         return FOUR.round(x) == rounded and 2 * abs(rounded - x) <= step
 
-    return compare(*all_samples(holds))
+    return compare(
+        *all_samples(holds),
+        note="a tie goes away from zero; IEEE 754 of 1985 sends it to the even neighbour, with the same (5)",
+    )
 
 
 @CHECKS.add(*both("s2.claim-u-v-same-sign"))
@@ -268,6 +353,28 @@ def errors_defined() -> Finding:
 @CHECKS.add("hung1984.II.eq5")
 def absolute_bound() -> Finding:
     return compare(*all_samples(lambda x: abs(FOUR.round(x) - x) <= Fraction(10) ** (FOUR.split(x)[2] - 4) / 2))
+
+
+def forms_of_1(x: Fraction) -> list[tuple[Fraction, int]]:
+    """Some mantissas and exponents with which (1) can write a number: its first digit may be 0."""
+    _, _, e = FOUR.split(x)
+    return [(x / Fraction(10) ** k, k) for k in range(e, e + 3)]
+
+
+@CHECKS.add("hung1984.II.s3.cross-reference-to-1")
+def reference_1() -> Finding:
+    x = Fraction("765.4")
+    forms = forms_of_1(x)
+    by_1 = [abs(x) >= Fraction(10) ** (e - 1) for _, e in forms]
+    by_2 = [abs(x) >= Fraction(10) ** (e - 1) for u, e in forms if abs(u) >= Fraction(1, 10)]
+    u, e = forms[-1]
+    return compare(
+        all(by_1),
+        f"by (1) alone 765.4 is also ${float(u):g}\\times10^{{{e}}}$, and less than $10^{{e-1}}$ in "
+        f"{by_1.count(False)} of {len(forms)} forms; in {by_2.count(False)} with $|u|\\ge1/b$, which stands below (2)",
+        Verdict.TYPO if by_2 and all(by_2) else Verdict.WRONG,
+        otherwise_note="(2) is meant: (1) has no $u$, and does not say that $d_1\\ne0$",
+    )
 
 
 @CHECKS.add(*both("s3.claim-before-6"))
@@ -507,12 +614,13 @@ def as_1984() -> Finding:
 # -- section 6: sums and products -----------------------------------------------------------------
 
 
-@CHECKS.add("hung1984.II.s6.unnumbered-4-term-sum")
+@CHECKS.add("hung1984.II.s6.order-of-4-terms", "hung1984.II.s6.unnumbered-4-term-sum")
 def four_terms() -> Finding:
     total, x, (e1, e2, e3) = derivation.rounded_sum(4)
     printed = ((x[0] + x[1]) * (1 + e1) + x[2]) * (1 + e2) + x[3]
+    second = (x[0] + x[1]) * (1 + e1) * (1 + e2) * (1 + e3) + x[2] * (1 + e2) * (1 + e3) + x[3] * (1 + e3)
     linear = (x[0] + x[1]) * (e1 + e2 + e3) + x[2] * (e2 + e3) + x[3] * e3
-    same = sp.expand(total - printed * (1 + e3)) == 0
+    same = sp.expand(total - printed * (1 + e3)) == 0 and sp.expand(total - second) == 0
     return compare(bool(same and sp.expand(first_order(total, (e1, e2, e3)) - linear) == 0), "the same, by expansion")
 
 
@@ -816,7 +924,7 @@ def matmul_bound() -> Finding:
     )
 
 
-@CHECKS.add(*both("eq29"))
+@CHECKS.add(*both("eq29"), "hung1984.II.s9-2.partial-products")
 def chain_defined() -> Finding:
     fmt = FloatFormat(10, 12)
     matrices = [fmt.array([[1, 2]]), fmt.array([[3], [4]]), fmt.array([[5, 6, 7]])]

@@ -36,7 +36,7 @@ def rows():
 
 def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
     assert set(checks.CHECKS) == set(PRINTED)
-    assert len(PRINTED) == 168
+    assert len(PRINTED) == 181
 
 
 def test_each_numbered_equation_has_its_entry():
@@ -60,7 +60,7 @@ def test_verdicts_by_document(rows):
         document: Counter(row.outcome for row in rows if row.entry.document == document)
         for document in ("hung1984", "hung1982")
     }
-    assert counts["hung1984"] == {"verified": 70, "typo": 17, "wrong": 23}
+    assert counts["hung1984"] == {"verified": 80, "typo": 19, "wrong": 23, "ocr": 1}
     assert counts["hung1982"] == {"verified": 30, "typo": 8, "wrong": 16, "inconsistent": 2, "ocr": 2}
 
 
@@ -181,6 +181,7 @@ def all_is_zero(patch):
 
 INVERSE_OF = checks.inverse_of
 INV, SOLVE, REDUCE, RUN, CLAIMS = linalg.inv, linalg.solve, procedure.reduce, procedure.run, example.claims
+TRIANGULARIZE = procedure.triangularize
 
 
 def nothing_is_reduced(patch):
@@ -239,11 +240,15 @@ DISAGREE = [
     ("relative_error_1982", scaled("printed_first_relative_bound", TENTH)),
     ("relative_error_1982", derivation_fails("first_approach_norms")),
     ("special_case", replace(theory, "printed_first_relative_bound", lambda a, r, d=None: 1 if d is None else 2)),
+    ("two_parts", replace(linalg, "inv", lambda a, pivot=False: INV(a + a, pivot))),
     ("first_multiplier", scaled("lower_factor", 2)),
     ("reduced_entry", nothing_is_zero),
     ("one_entry", nothing_is_zero),
     ("one_entry", derivation_fails("one_step")),
     ("one_entry", replace(derivation, "printed_entry_error", lambda: derivation.EPSILON)),
+    ("blocks", replace(theory, "trailing", lambda a, k, columns=True: a)),
+    ("blocks", replace(checks, "BLOCKS", {**checks.BLOCKS, 2: checks.BLOCKS[1]})),
+    ("blocks", nothing_is_reduced),
     ("available", replace(checks.Sample, "step_errors", huge_errors)),
     ("right_side_step_1982", nothing_is_zero),
     ("after_the_first_step", nothing_is_reduced),
@@ -260,6 +265,8 @@ DISAGREE = [
     ("backward", scaled("strict_perturbation_bounds", HUNDREDTH)),
     ("before_68_1982", replace(derivation, "line_before_68", lambda brackets=True: derivation.A)),
     ("perturbed_solution", derivation_fails("perturbed_system")),
+    ("only_back_substitution", replace(procedure, "transform", lambda triangular, right: (right + right,))),
+    ("only_back_substitution", replace(procedure, "triangularize", lambda a, pivot=False: TRIANGULARIZE(a + a, pivot))),
     ("triangular_system", nothing_is_zero),
     ("last_row", nothing_is_zero),
     ("second_row", LEFTOVER),
@@ -371,6 +378,7 @@ AGREE = [
     ("triangular_matrix", nothing_is_reduced),
     ("before_68", replace(derivation, "line_before_68", lambda brackets=True: derivation.A * 0)),
     ("computed_inverse", replace(checks, "inverse_of", lambda a: checks.samples()[0].reduction.solution)),
+    ("first_row_with_hats", all_is_zero),
     ("second_equation", replace(derivation, "leftover", lambda number, hats=True: 0)),
     ("assembled", replace(checks, "_assembled", always(True))),
     ("factored_three", replace(checks, "_factored", always(True))),
@@ -383,6 +391,8 @@ AGREE = [
     ),
     ("two_sets", replace(checks, "_adds", always(True))),
     ("error_norm", replace(checks, "COUNTEREXAMPLES", {"(96)": ([[2, 1], [1, 3]], checks.FOUR, False)})),
+    ("letter_e", replace(checks, "of_example", lambda: (checks.samples()[0], 0.0))),
+    ("number_of_the_chart", replace(ledger, "load_inventory", lambda: [e for e in INVENTORY if e.chapter == "II"])),
     ("relative_error_norm", replace(checks, "column_sum_norm", always(Fraction(1)))),
     ("flow_chart_1982", ALREADY_TRIANGULAR),
     ("proposed_three", reproduced("bound")),
@@ -441,6 +451,10 @@ def test_half_of_it_is_not_enough(patch, name, change):
         ("right_side_norm", scaled("printed_right_side_norms", HUNDREDTH), Verdict.WRONG),
         ("before_68", replace(derivation, "line_before_68", lambda brackets=True: derivation.A), Verdict.WRONG),
         ("computed_inverse", replace(theory, "bound", always(Fraction(0))), Verdict.WRONG),
+        ("first_row_with_hats", nothing_is_zero, Verdict.WRONG),
+        ("first_row_with_hats", both_of(disagrees("first_row")), Verdict.WRONG),
+        ("letter_e", scaled("printed_bracket", HUNDREDTH), Verdict.WRONG),
+        ("number_of_the_chart", replace(ledger, "load_inventory", lambda: []), Verdict.INCONSISTENT),
         ("second_equation", LEFTOVER, Verdict.WRONG),
         ("assembled", replace(checks, "_assembled", always(False)), Verdict.WRONG),
         ("factored_three", replace(checks, "_factored", always(False)), Verdict.WRONG),
