@@ -12,7 +12,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb import linalg
+from gpbnb import ledger, linalg
 from gpbnb.bounds import column_sum_norm, exact
 from gpbnb.findings import Checks, Finding, Verdict, compare, unverifiable
 from gpbnb.floatarray import FloatArray
@@ -372,6 +372,21 @@ def practicality() -> Finding:
     )
 
 
+@CHECKS.add(*both("s11.claim-two-parts"))
+def two_parts() -> Finding:
+    def holds(sample: Sample) -> bool:
+        inverse = linalg.inv(sample.matrix, sample.pivot)
+        return bool((inverse == procedure.reduce(sample.matrix, sample.pivot).solution).all())
+
+    count = sum(map(holds, samples()))
+    return compare(
+        count == len(samples()),
+        f"triangularization, the same steps on the columns of the identity, and back substitution give all digits of "
+        f"the inverse in {count} of {len(samples())} cases",
+        note="the right sides, which are transformed in between, are counted to the first part",
+    )
+
+
 # -- section 11.1: one step -----------------------------------------------------------------------
 
 
@@ -455,10 +470,17 @@ def reduced_entry() -> Finding:
     "hung1984.II.s11-1.a-33-2",
 )
 def one_entry() -> Finding:
-    found = derivation.entry()
-    one = derivation.entry_error().subs(dict.fromkeys(found.errors, derivation.EPSILON))
+    found, eps = derivation.entry(), derivation.EPSILON
+    one = derivation.entry_error().subs(dict.fromkeys(found.errors, eps))
+    lines = (
+        found.old * (1 + eps) - found.product * (1 + 3 * eps),
+        (found.old - found.product) + found.old * eps - found.product * 3 * eps,
+        found.new + derivation.printed_entry_error(),
+    )
     return compare(
-        zero(one - derivation.printed_entry_error()) and _step(derivation.one_step, 0),
+        zero(one - derivation.printed_entry_error())
+        and _step(derivation.one_step, 0)
+        and all(zero(line - lines[0]) for line in lines[1:]),
         "the same, to first order, with one $\\epsilon$ for division, product and sum",
         note="with an error for each, $\\epsilon_3a(1)-(\\epsilon_1+\\epsilon_2)(a(0)-a(1))$",
     )
@@ -479,6 +501,33 @@ def errors_of_the_first_step_1982() -> Finding:
         "$3\\epsilon\\,a_{ij}(1)-2\\epsilon\\,a_{ij}(0)$, as its own (48) has it",
         Verdict.TYPO if meant else Verdict.WRONG,
         otherwise_note="the second (1) is a slip for (0), mended in hung1984; the formula meant has the fault of (48)",
+    )
+
+
+#: Where the blocks of the two steps of a 3 × 3 matrix have entries, and those of its right side, as printed.
+BLOCKS = {
+    1: ([[0, 0, 0], [0, 1, 1], [0, 1, 1]], [[0], [1], [1]]),
+    2: ([[0, 0, 0], [0, 0, 0], [0, 0, 1]], [[0], [0], [1]]),
+}
+
+
+@CHECKS.add(
+    *(f"hung1984.II.s11-1.{name}-definition" for name in ("a-1", "b-1", "a-2", "b-2")), "hung1982.III.s11-1.blocks"
+)
+def blocks() -> Finding:
+    sample, _ = of_example()
+    stages, rights = sample.reduction.stages, sample.general
+    agree = True
+    for k, (of_matrix, of_right) in BLOCKS.items():
+        for i in (k - 1, k):
+            agree &= bool((theory.trailing(stages[i], k) == stages[i] * exact(of_matrix)).all())
+            agree &= bool((theory.trailing(rights[i], k, columns=False) == rights[i] * exact(of_right)).all())
+        changed = np.asarray(stages[k] != stages[k - 1])
+        agree &= bool((changed == (exact(of_matrix) != 0))[:, k:].all() and not changed[:, : k - 1].any())
+    return compare(
+        agree,
+        "in the example of 11.4 each step changes these entries and no others, but for the column it clears",
+        note="definitions; $\\hat A_1(0)$ has a hat and its entries none, by (55) the same",
     )
 
 
@@ -536,11 +585,12 @@ def right_side_step() -> Finding:
     eps = derivation.EPSILON
     last = (bi - q * b1) * (1 + 3 * eps) - 2 * eps * bi
     printed, meant = (bi * (1 + eps) - q * factor * (1 + 3 * eps) for factor in (bi, b1))
+    second = (bi - q * b1) + eps * bi - 3 * eps * q * b1
     return compare(
         zero(printed - last),
         "with $b_1(0)$ in the product the last form follows, with $b_i(0)$ it does not",
-        Verdict.TYPO if zero(meant - last) else Verdict.WRONG,
-        otherwise_note="$b_i(0)$ for $b_1(0)$ in the product; hung1982 has it right",
+        Verdict.TYPO if zero(meant - last) and zero(second - last) else Verdict.WRONG,
+        otherwise_note="$b_i(0)$ for $b_1(0)$ in the product, in two lines; hung1982 has it right",
     )
 
 
@@ -891,12 +941,36 @@ def computed_inverse() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq69", "hung1984.II.eq70", "hung1984.II.eq71")
+@CHECKS.add(*both("s11-2.claim-only-back-substitution"))
+def only_back_substitution() -> Finding:
+    def holds(sample: Sample) -> bool:
+        upper = procedure.triangularize(sample.matrix, sample.pivot).upper
+        again = procedure.triangularize(upper)
+        right = sample.matrix.format.array(np.arange(2, 2 + len(upper)))
+        unchanged = all(bool((stage == upper).all()) for stage in again.stages)
+        return unchanged and bool((procedure.transform(again, right[:, np.newaxis])[-1][:, 0] == right).all())
+
+    count = sum(map(holds, samples()))
+    return compare(
+        count == len(samples()), f"elimination leaves {count} of {len(samples())} triangular systems as they are"
+    )
+
+
+@CHECKS.add(
+    "hung1984.II.eq69",
+    "hung1984.II.eq70",
+    "hung1984.II.eq71",
+    "hung1984.II.s11-2.x-3-line",
+    "hung1984.II.s11-2.x-2-line",
+    "hung1982.III.s11-2.x-3-x-2-lines",
+)
 def triangular_system() -> Finding:
     a, x, b, computed = derivation.triangle()
     true = a.LUsolve(sp.Matrix(b))
+    lines = (b[2] / a[2, 2] - x[2], (b[1] - a[1, 2] * x[2]) / a[1, 1] - x[1])
     return compare(
         zero(true - sp.Matrix(x))
+        and all(map(zero, lines))
         and all(zero(y.subs(derivation.EPSILON, 0) - t) for y, t in zip(computed, x, strict=True)),
         "rows (a) to (c), solved from below, give the solution where nothing is rounded",
         note="definitions",
@@ -915,9 +989,15 @@ def last_row() -> Finding:
 
 @CHECKS.add("hung1984.II.eq75", "hung1984.II.eq76")
 def second_row() -> Finding:
-    _, (_, x2, _), _, (_, y2, _) = derivation.triangle()
+    a, (_, x2, x3), b, (_, y2, y3) = derivation.triangle()
+    eps = derivation.EPSILON
+    of_75 = [(b[1] - a[1, 2] * third) * (1 + 2 * eps) / a[1, 1] for third in (y3 * (1 + eps), x3 * (1 + 2 * eps))]
+    of_76 = y2 - (2 * eps * b[1] - 4 * eps * a[1, 2] * x3) / a[1, 1]
     return compare(
-        zero(derivation.linear(y2 - x2) - derivation.printed_75()) and derivation.leftover(76) == 0,
+        zero(derivation.linear(y2 - x2) - derivation.printed_75())
+        and derivation.leftover(76) == 0
+        and all(zero(derivation.linear(line - y2)) for line in of_75)
+        and zero(derivation.linear(of_76 - x2)),
         "the same, to first order",
         note="with one $\\epsilon$: as a size, the two terms of (75) add up",
     )
@@ -944,7 +1024,21 @@ def second_equation_1982() -> Finding:
     return compare(derivation.leftover(77) == 0, "the same, to first order")
 
 
-@CHECKS.add("hung1984.II.s11-2.x-1-line", "hung1984.II.s11-2.x-1-line.2", "hung1984.II.s11-2.x-1-expanded")
+@CHECKS.add("hung1984.II.s11-2.x-1-line")
+def first_row_with_hats() -> Finding:
+    a, (x1, x2, x3), b, (_, y2, y3) = derivation.triangle()
+    hats, plain = ((b[0] - a[0, 1] * second - a[0, 2] * third) / a[0, 0] for second, third in ((y2, y3), (x2, x3)))
+    left = sp.simplify(derivation.linear(hats - x1))
+    return compare(
+        zero(left),
+        f"without hats it is (71a), exactly; with them it differs from $x_1$ by ${sp.latex(sp.factor(left))}$",
+        Verdict.TYPO if zero(plain - x1) and bool(first_row().agrees) else Verdict.WRONG,
+        otherwise_note="the hats belong to the next line, what is computed; where $x_2$ is taken from (71b), above "
+        "(75), there is none",
+    )
+
+
+@CHECKS.add("hung1984.II.s11-2.x-1-line.2", "hung1984.II.s11-2.x-1-expanded")
 def first_row() -> Finding:
     a, (x1, _, _), _, (y1, _, _) = derivation.triangle()
     b1, s2, s3 = sp.symbols("b s_2 s_3")
@@ -960,7 +1054,7 @@ def first_row() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq78", "hung1984.II.eq79")
+@CHECKS.add(*both("s11-2.claim-approximations"), "hung1984.II.eq78", "hung1984.II.eq79")
 def first_equation() -> Finding:
     return compare(
         derivation.leftover(78) == 0 and derivation.leftover(79) == 0,
@@ -1064,7 +1158,14 @@ def weights() -> Finding:
     )
 
 
-@CHECKS.add("hung1982.III.eq85", "hung1984.II.eq86", "hung1984.II.eq87", "hung1984.II.eq88", "hung1982.III.eq86-88")
+@CHECKS.add(
+    *both("s11-2.claim-generalization"),
+    "hung1982.III.eq85",
+    "hung1984.II.eq86",
+    "hung1984.II.eq87",
+    "hung1984.II.eq88",
+    "hung1982.III.eq86-88",
+)
 def weights_counted() -> Finding:
     def pairs(sample: Sample) -> Iterable[tuple[Any, Any]]:
         stages, rights, x = sample.reduction
@@ -1171,7 +1272,7 @@ def columns_again() -> Finding:
     return compare(bool(columns_of_the_inverse().agrees), "the columns of the inverse, as in (33)", note="a definition")
 
 
-@CHECKS.add("hung1984.II.eq94", "hung1982.III.eq93-94", "hung1984.II.eq95")
+@CHECKS.add("hung1984.II.eq94", "hung1982.III.eq93-94", *both("s11-3.claim-similar-to-68"), "hung1984.II.eq95")
 def resultant_error() -> Finding:
     return compare(
         derivation.perturbed_system().holds and _step(derivation.two_systems, 4),
@@ -1215,6 +1316,27 @@ def error_norm() -> Finding:
         otherwise_note="the inequality follows from (95), but not with an $E$ whose terms cancel because one "
         "$\\epsilon$ carries a sign; with sizes neither example exceeds it. $E$ is called $D$ in hung1982; both "
         "letters were taken",
+    )
+
+
+def terms_of_96() -> tuple[float, float, float]:
+    """The norms of error, computed inverse and bracket of (95), in the example of 11.4."""
+    sample, error = of_example()
+    bracket = theory.printed_bracket(sample.reduction, sample.beta)
+    return error, float(column_sum_norm(sample.reduction.solution)), float(column_sum_norm(bracket))
+
+
+@CHECKS.add("hung1984.II.s11-3.claim-e-defined")
+def letter_e() -> Finding:
+    error, inverse, bracket = terms_of_96()
+    return compare(
+        error <= inverse * error,
+        f"the scan has one $E$ before, (36), the error itself: with it (96) would say that $\\|\\hat A^{{-1}}\\|$ is "
+        f"at least 1, and it is {inverse:.2f} in the example of 11.4; with the bracket of (95) it says "
+        f"{error:.1e} is at most {inverse * bracket:.1e}",
+        Verdict.OCR if error <= inverse * bracket else Verdict.WRONG,
+        otherwise_note="the bracket of (95) is meant, whose letter is not in this scan; that of hung1982 shows a D "
+        "below it. As printed, $E$ has two meanings",
     )
 
 
@@ -1296,6 +1418,29 @@ def flow_chart_1982() -> Finding:
         Verdict.INCONSISTENT if of_a == len(samples()) else Verdict.WRONG,
         otherwise_note="the box that generates $\\tilde A$ calls it the error in $A_T$ and contradicts (91), where "
         "it is one of $A$; else the boxes follow the equations",
+    )
+
+
+@CHECKS.add("hung1982.III.s11-3.claim-d-defined")
+def letter_d() -> Finding:
+    error, inverse, bracket = terms_of_96()
+    return compare(
+        error <= inverse * bracket < inverse * 3,
+        f"with the bracket of (95), (96) says for the example of 11.4 that {error:.1e} is at most "
+        f"{inverse * bracket:.1e}; with the $D$ below (27), whose norm is $n$, at most {inverse * 3:.2g}",
+        note="the letter has two more meanings, below (27) and in the examples of 9.2",
+    )
+
+
+@CHECKS.add("hung1984.II.s11-3.figure-number")
+def number_of_the_chart() -> Finding:
+    figures = [e for e in ledger.load_inventory() if e.document == "hung1984" and e.kind == "figure"]
+    chapters = list(dict.fromkeys(e.chapter for e in figures if e.item.startswith("Figure III-1")))
+    return compare(
+        len(chapters) == 1,
+        f"chapters {' and '.join(chapters)} have a Figure III-1",
+        Verdict.TYPO if "II" in chapters else Verdict.INCONSISTENT,
+        otherwise_note="Figure II-1 is meant: in hung1982, from which it was taken over, this was chapter III",
     )
 
 
@@ -1469,7 +1614,11 @@ def same_mantissa() -> Finding:
 def decreasing() -> Finding:
     found, text = _claim("decreases")
     columns = [[float(number) for number in column] for column in example.PRINTED.values()]
-    return compare(found.holds == found.readings and all(a > b > c for a, b, c in columns), text)
+    return compare(
+        found.holds == found.readings and all(a > b > c for a, b, c in columns),
+        text,
+        note="worklength is a slip for wordlength",
+    )
 
 
 @CHECKS.add("hung1982.III.s11-4.claims-on-table-i")

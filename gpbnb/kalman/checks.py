@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from gpbnb import ledger
 from gpbnb.bounds import column_sum_norm, exact, max_norm
 from gpbnb.findings import Check, Checks, Finding, Verdict, answer, compare, unverifiable
 from gpbnb.formats import FloatFormat, Rounding
@@ -154,7 +155,31 @@ def model_equations() -> Finding:
         conformable,
         f"with $n={n}$, $m={m}$, $w_kv_j$ is no product; $w_kv_j^T$ is one, and with it (98)-(101) are optimal",
         Verdict.TYPO if all(optimal().values()) else Verdict.WRONG,
-        otherwise_note="a transpose is missing in $E[w_kv_j]$",
+        otherwise_note="a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ are one letter, as are $v$ and $V$",
+    )
+
+
+@CHECKS.add("hung1984.II.s12.claim-asterisk")
+def asterisk() -> Finding:
+    case = smallest.scalar(FOUR)
+    true = theory.exact_step(*case)
+    x, _, _ = smallest.rounded_step(FOUR, case)
+    by_111 = true.transition @ case.x + true.gain @ case.z
+    return compare(
+        bool(np.all(x == by_111)),
+        f"a step of one state in four digits gives {float(x[0]):g}, (111) {float(by_111[0]):.4g}",
+        Verdict.TYPO if loops_close() else Verdict.WRONG,
+        otherwise_note="from (111) on $x$ is the exact estimate, as (118) says, and $\\hat x$ the rounded one",
+    )
+
+
+@CHECKS.add("hung1982.III.s12.claim-asterisk")
+def asterisk_1982() -> Finding:
+    with_x = asterisk().agrees
+    return compare(
+        with_x is False and loops_close(),
+        "a letter other than $x$ is needed, which from (111) on is the exact estimate",
+        note="read as $\\hat x$, for which the scan has a g below (66) and (68) too; hung1984 prints $x$",
     )
 
 
@@ -243,7 +268,8 @@ def rounded_covariance() -> Finding:
     return printed(
         "(104)",
         step_holds("report", 1),
-        "even with every term kept and signs free: the gain is taken to have no error, though it is computed, and "
+        "the hat of $P_{kp}$, missing in the first line, is there in the second. Even with every term kept and signs "
+        "free: the gain is taken to have no error, though it is computed, and "
         "$I-KH$ magnifies its error by $KP_{kp}/P_k$",
         " but for $-2n\\epsilon(I-KH)Q$, which is left out",
     )
@@ -520,7 +546,7 @@ def four_steps_bounded() -> Finding:
     return printed("(124)", step_holds("general", 9), _NO_BOUND)
 
 
-@CHECKS.add("hung1984.II.eq125", "hung1982.III.eq124-125")
+@CHECKS.add("hung1984.II.eq125", "hung1982.III.eq124-125", *both("s12.claim-main-result"))
 def main_result() -> Finding:
     k, n, m = theory.EXAMPLE
     counts = theory.coefficients(k, n, m)
@@ -533,7 +559,7 @@ def main_result() -> Finding:
     )
 
 
-@CHECKS.add(*both("s12.125-found-from-pattern"))
+@CHECKS.add(*both("s12.125-found-from-pattern"), *both("s12.claim-similar-derivation"))
 def pattern() -> Finding:
     return compare(
         derivation.general().holds,
@@ -554,6 +580,19 @@ def dependence() -> Finding:
         all(other > value() for other in others),
         f"it grows with each of the {len(others)}",
         note="the error depends on more: on how far $I-KH$ cancels, which none of them shows",
+    )
+
+
+WORD = "interactions"
+
+
+@CHECKS.add("hung1984.II.s12.word-interactions")
+def word() -> Finding:
+    return compare(
+        WORD == "iterations",
+        f"$k$ counts the iterations of the filter, {Fraction(YEAR, STEP)} in a year",
+        Verdict.TYPO,
+        otherwise_note="iterations are meant, and an iteration period of ten seconds",
     )
 
 
@@ -616,6 +655,17 @@ def second_coefficient() -> Finding:
         "the printed one is $k(3n+1)\\cdot0.5(k-1)\\cdot84$: times for plus, and 84 for 82"
         if found
         else "no slip was found that leads to the printed one",
+    )
+
+
+@CHECKS.add(*both("s12.example-formula-8"))
+def formula_8() -> Finding:
+    precisions = range(1, 41)
+    same = sum(FloatFormat(10, t).unit_roundoff == Fraction(1, 2) * Fraction(10) ** (1 - t) for t in precisions)
+    return compare(
+        same == len(precisions),
+        f"(8) with $b=10$: the same for {same} of {len(precisions)} precisions",
+        note="a computer of base 2 needs its own count: digits of other bases are worth different amounts",
     )
 
 
@@ -855,5 +905,49 @@ def remark_5() -> Finding:
 @CHECKS.add("hung1984.II.s14.references")
 def references() -> Finding:
     return unverifiable(
-        "", "six of the seven works cited are not among the documents; the seventh is the report of 1982"
+        "",
+        "six of the seven works cited are not among the documents, and the text refers to none of them; the seventh is "
+        "the report of 1982",
+    )
+
+
+def cited(number: int) -> str:
+    """A reference as it is printed."""
+    (entry,) = (e for e in ledger.load_inventory() if e.id == f"hung1984.II.s14.reference-{number}")
+    return entry.printed
+
+
+TITLES = {1: "Rounding Errors in Algebraic Processes", 5: "Introduction to Numerical Computations"}
+
+
+def title(number: int) -> Finding:
+    return compare(
+        f", {TITLES[number]}, " in cited(number),
+        f"the book is called {TITLES[number]}",
+        Verdict.TYPO,
+        otherwise_note="an s is missing",
+    )
+
+
+@CHECKS.add("hung1984.II.s14.reference-1")
+def reference_1() -> Finding:
+    return title(1)
+
+
+@CHECKS.add("hung1984.II.s14.reference-5")
+def reference_5() -> Finding:
+    return title(5)
+
+
+CONTRACT = "NAS8-34426"
+
+
+@CHECKS.add("hung1984.II.s14.reference-7")
+def reference_7() -> Finding:
+    return compare(
+        f"NASA Contract {CONTRACT}, " in cited(7),
+        CONTRACT,
+        Verdict.TYPO,
+        otherwise_note="a 5 for the S that the title page has, as in chapter I; by the author or the scan. The date is "
+        "a month after the end of the period that the report of 1982 covers",
     )

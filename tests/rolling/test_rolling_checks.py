@@ -10,7 +10,7 @@ import pytest
 from gpbnb import ledger
 from gpbnb.findings import Verdict
 from gpbnb.ledger.checking import load_checks
-from gpbnb.rolling import checks, experiment, theory
+from gpbnb.rolling import checks, derivation, experiment, theory
 
 INVENTORY = ledger.load_inventory()
 ENTRIES = ledger.select(INVENTORY, "hung1984", "III")
@@ -23,17 +23,17 @@ def rows():
 
 def test_every_entry_of_the_chapter_has_a_check_here():
     assert set(checks.CHECKS) == {entry.id for entry in ENTRIES}
-    assert len(ENTRIES) == 55
+    assert len(ENTRIES) == 63
 
 
 def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert [row.entry.id for row in rows if row.error is not None] == []
     assert Counter(row.outcome for row in rows) == {
-        "verified": 42,
-        "typo": 6,
+        "verified": 47,
+        "typo": 7,
         "wrong": 3,
-        "unverifiable": 2,
+        "unverifiable": 4,
         "answered": 2,
     }
 
@@ -47,6 +47,7 @@ def test_which_are_not_right_as_printed(rows):
     assert found[Verdict.WRONG] == ids("s3.no-direct-error", "s4.sample-2-negligible", "s5.ramp-psd")
     assert found[Verdict.TYPO] == ids(
         "eq3",
+        "s2.1-over-t",
         "s3.cos-5-deg",
         "s4.sample-1-s-to-0",
         "s4.sample-2-delta-omega",
@@ -54,7 +55,9 @@ def test_which_are_not_right_as_printed(rows):
         "s5.ramp-transform",
     )
     assert found[Verdict.ANSWERED] == ids("s2.error-sources-4-and-5", "s5.optimum-bandwidth")
-    assert found[Verdict.UNVERIFIABLE] == ids("s3.synchronisation-claim", "s6.references")
+    assert found[Verdict.UNVERIFIABLE] == ids(
+        "s1.before-noise", "s3.synchronisation-claim", "s4.monitored", "s6.references"
+    )
 
 
 def test_no_finding_is_without_a_note_where_it_differs(rows):
@@ -126,6 +129,41 @@ def test_wrong_matrices_would_be_found_out(monkeypatch):
     rotation = theory.rotation
     monkeypatch.setattr(theory, "rotation", lambda phase: rotation(-phase))
     assert verdict_of("eq7") is Verdict.WRONG
+
+
+def test_a_recursion_of_other_matrices_or_of_larger_errors_would_be_found_out(monkeypatch):
+    deroll = derivation.deroll
+    with monkeypatch.context() as patch:
+        patch.setattr(derivation, "deroll", lambda angle: deroll(angle**2))
+        assert verdict_of("s1.recursively-computed") is Verdict.WRONG
+    monkeypatch.setattr(theory, "recursion_bound", lambda n, beta: float(beta) / 10)
+    assert verdict_of("s1.recursively-computed") is Verdict.WRONG
+
+
+def test_carriers_of_another_form_would_be_found_out(monkeypatch):
+    monkeypatch.setattr(checks.sp, "cos", checks.sp.sin)
+    assert verdict_of("s1.carriers") is Verdict.WRONG
+
+
+@pytest.mark.parametrize("density", [lambda *a: 1.0, lambda level, f, interval=None: level * f])
+def test_noise_as_strong_at_the_roll_frequency_would_be_found_out(monkeypatch, density):
+    monkeypatch.setattr(theory, "flicker_density", density)
+    assert verdict_of("s1.much-less") is Verdict.WRONG
+
+
+def test_a_signal_to_noise_ratio_of_another_law_would_be_found_out(monkeypatch):
+    monkeypatch.setattr(theory, "roll_phase", lambda n, period: 0.0 * n)  # noise and signal weaken alike
+    assert verdict_of("s3.signal-to-noise") is Verdict.WRONG
+
+
+def test_noise_of_the_other_law_would_be_found_right(monkeypatch):
+    monkeypatch.setattr(theory, "flicker_density", lambda level, f: level * f)
+    assert verdict_of("s2.1-over-t") is Verdict.VERIFIED
+
+
+def test_a_loss_that_does_not_depend_on_the_frequency_would_be_found_out(monkeypatch):
+    monkeypatch.setattr(theory, "off_tuned_loss", lambda error: 0.5)
+    assert verdict_of("s4.various-degrees") is Verdict.WRONG
 
 
 def test_noise_of_another_slope_would_be_found_out(monkeypatch):
