@@ -769,8 +769,8 @@ def others_of_1982() -> Finding:
         all(found),
         "of section 12, (109)-(111) and (123) are right as in 1984" if all(found[2:]) else "some of 1984 fail",
         Verdict.WRONG,
-        otherwise_note="(102) and (106) fail as in 1984; those of section 12 are judged one by one under their numbers, "
-        "and the equations of sections 9-11 have their twins in hung1984",
+        otherwise_note="(102) and (106) fail as in 1984; all of section 12 are judged under their numbers, and "
+        "the equations of sections 9-11 have their twins in hung1984",
     )
 
 

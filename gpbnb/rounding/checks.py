@@ -334,8 +334,8 @@ def examples_3_1982() -> Finding:
         rounded and others and split_is("-765.4567", "-.765", "-.567e-1", 3),
         "; ".join(f"{pieces(x)}, $x_R=$ {power(FOUR.round(x))}" for x in printed),
         Verdict.TYPO if rounded and others else Verdict.WRONG,
-        otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line of (3c), in both reports, and back "
-        "in the next; $-.7685$ for the result is the scan's",
+        otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line of (3c), in both reports, and "
+        "back in the next; $-.7685$ for the result is the scan's",
     )
 
 

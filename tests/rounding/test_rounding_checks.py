@@ -79,6 +79,7 @@ def test_which_are_not_right_as_printed(rows):
         "hung1984.II.s1.claim-main-activity",
         "hung1984.II.s1.claim-only-rounding",
         "hung1982.III.s1.claim-only-rounding",
+        "hung1982.III.s1.claim-background",
         "hung1982.III.s1.claim-main-activity",
         "hung1984.II.eq27",
     }
