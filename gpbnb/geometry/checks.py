@@ -137,12 +137,12 @@ def absolute_frame() -> Finding:
     line = theory.line_fit_leak(year, 1)
     return compare(
         year + orbit < MAS,
-        f"starlight is aberrated: the line of sight swings by {year / ARCSEC:.1f} arcseconds in a year and by "
+        f"starlight is aberrated: the line of sight moves by up to {year / ARCSEC:.1f} arcseconds in a year and "
         f"{orbit / ARCSEC:.1f} in an orbit at 640 km; a straight line through a year of (7) would be off by up to "
         f"{line / ARCSEC:.0f} arcseconds a year",
         Verdict.INCONSISTENT,
-        otherwise_note="it cannot stand still and follow the line of sight. (1) has the star at (1, 0, 0) at all times, "
-        "so (7) gives the drift against the apparent star, and the report does not mention aberration; from the "
+        otherwise_note="it cannot stand still and follow the line of sight. (1) keeps the star at (1, 0, 0): "
+        "(7) gives the drift against the apparent star, and the report does not mention aberration; from the "
         "known velocities it can be taken out",
     )
 
