@@ -6,6 +6,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 import pybtex.plugin
+from docutils import nodes
 from pybtex.style.formatting.plain import Style as PlainStyle
 from pybtex.style.labels import BaseLabelStyle
 from sphinx.application import Sphinx
@@ -85,10 +86,20 @@ def hide_enum_arguments(app, what, name, obj, options, signature, returns):
     return None
 
 
+def write_powers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Write numbers that notebooks put into the text, such as 1.5e-08, as 1.5 × 10⁻⁸."""
+    for node in doctree.findall(lambda each: isinstance(each, nodes.inline) and "pasted-text" in each["classes"]):
+        text = node.astext()
+        if number := re.fullmatch(r"(-?[\d.]+)e([+-]\d+)", text):
+            power = nodes.superscript("", str(int(number[2])).replace("-", "−"))
+            node.children = [nodes.Text(f"{number[1]}\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10"), power]
+
+
 def setup(app: Sphinx) -> dict:
     pybtex.plugin.register_plugin("pybtex.style.formatting", "short_names", ShortNames)
     app.connect("autodoc-process-docstring", unfold_fields, priority=400)
     app.connect("autodoc-process-signature", hide_enum_arguments)
+    app.connect("doctree-resolved", write_powers)
     app.connect("build-finished", copy_mathjax)
     app.connect("build-finished", write_first_page, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

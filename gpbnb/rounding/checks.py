@@ -274,7 +274,7 @@ def carry() -> Finding:
     )
 
 
-@CHECKS.add(*both("eq3"))
+@CHECKS.add(*both("eq3"), "hung1984.II.s2.claim-conventional")
 def rounding_rule() -> Finding:
     def holds(x: Fraction) -> bool:
         u, v, e = FOUR.split(x)
@@ -282,7 +282,10 @@ def rounding_rule() -> Finding:
         rounded = u * Fraction(10) ** e + (step if 2 * v >= 1 else -step if 2 * v <= -1 else 0)
         return FOUR.round(x) == rounded and 2 * abs(rounded - x) <= step
 
-    return compare(*all_samples(holds))
+    return compare(
+        *all_samples(holds),
+        note="a tie goes away from zero; IEEE 754 of 1985 sends it to the even neighbour, with the same (5)",
+    )
 
 
 @CHECKS.add(*both("s2.claim-u-v-same-sign"))
