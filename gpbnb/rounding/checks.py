@@ -274,7 +274,7 @@ def carry() -> Finding:
     )
 
 
-@CHECKS.add(*both("eq3"), "hung1984.II.s2.claim-conventional")
+@CHECKS.add(*both("eq3"), *both("s2.claim-conventional"))
 def rounding_rule() -> Finding:
     def holds(x: Fraction) -> bool:
         u, v, e = FOUR.split(x)

@@ -67,11 +67,12 @@ def test_verdicts_by_document(rows):
         "answered": 2,
     }
     assert counts["hung1982"] == {
-        "verified": 7,
+        "verified": 11,
         "typo": 1,
-        "wrong": 23,
+        "wrong": 28,
         "inconsistent": 1,
-        "unverifiable": 1,
+        "ocr": 1,
+        "unverifiable": 2,
         "answered": 2,
         "open": 3,
     }
