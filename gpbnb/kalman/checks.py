@@ -472,7 +472,8 @@ def unrolled_1982() -> Finding:
     counted = inputs_of_124()
     return compare(
         unfolds(newest=False),
-        f"without $u_4$ it is not the estimate, with it it is; (124) has the roundings of {counted[0]} inputs",
+        f"without $u_4$ it is not the estimate, with it it is; (124) has the roundings of "
+        f"{counted[0] if counted else 'no number of'} inputs",
         Verdict.OCR if unfolds() and counted == [4] else Verdict.WRONG,
         otherwise_note="the last term is lost from the scan, not from the report: hung1984 has it, and (124), the same "
         "in both reports, counts it",
