@@ -36,7 +36,7 @@ def rows():
 
 def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
     assert set(checks.CHECKS) == set(PRINTED)
-    assert len(PRINTED) == 181
+    assert len(PRINTED) == 197
 
 
 def test_each_numbered_equation_has_its_entry():
@@ -61,7 +61,14 @@ def test_verdicts_by_document(rows):
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {"verified": 80, "typo": 19, "wrong": 23, "ocr": 1}
-    assert counts["hung1982"] == {"verified": 30, "typo": 8, "wrong": 16, "inconsistent": 2, "ocr": 2}
+    assert counts["hung1982"] == {
+        "verified": 45,
+        "typo": 8,
+        "wrong": 16,
+        "inconsistent": 2,
+        "ocr": 2,
+        "unverifiable": 1,
+    }
 
 
 def test_which_are_wrong(rows):
@@ -290,6 +297,8 @@ DISAGREE = [
     ("columns_again", disagrees("columns_of_the_inverse")),
     ("resultant_error", derivation_fails("two_systems")),
     ("resultant_error", derivation_fails("perturbed_system")),
+    ("letter_d", replace(checks, "terms_of_96", lambda: (2.0, 1.0, 1.0))),
+    ("letter_d", replace(checks, "terms_of_96", lambda: (1.0, 1.0, 4.0))),
     ("computation", replace(checks, "operations", lambda n: (n**3, n**2))),
     ("flow_chart", replace(procedure, "run", lambda a: changed(RUN(a), bound=0))),
     ("flow_chart", replace(procedure, "resultant_errors", lambda first, second: first)),
@@ -474,7 +483,8 @@ def test_a_slip_is_one_only_if_what_follows_is_right(patch, name, change, verdic
 
 
 def test_every_check_is_among_those_that_can_come_out_otherwise():
-    assert {name for name, _ in (*DISAGREE, *AGREE)} == set(FUNCTIONS)
+    lost = {"right_side_definition_1982"}  # from the scan
+    assert {name for name, _ in (*DISAGREE, *AGREE)} == set(FUNCTIONS) - lost
 
 
 def test_findings_are_the_same_again(rows):
