@@ -753,7 +753,7 @@ def year_again() -> bool:
 
 @cache
 def needed_precision(base: int) -> int | None:
-    """Fewest digits, of those stored, from which on the drift rates stay within the goal in all that is kept of a year."""
+    """Fewest digits, of those stored, from which on the drift rates, at all steps kept, stay within the goal."""
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
         usual = found.case._replace(precision=0) == year.Case(

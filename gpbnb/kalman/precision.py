@@ -193,7 +193,7 @@ def _over_goal(
     """Largest error over goal against `true`, or without it, largest bound over goal; or infinity, and why."""
     asked, measured = np.isfinite(goals), fmt.array(z)
     try:
-        run = Run(model, fmt, form, marks) if true else Followed(model, fmt, form, marks)
+        run = (Followed if true is None else Run)(model, fmt, form, marks)
     except ValueError as error:  # a covariance is not definite in so few digits
         return math.inf, str(error)
     run.take(measured)
@@ -201,7 +201,7 @@ def _over_goal(
         return math.inf, f"the run stopped at step {run.stopped}, by a division by zero or a number out of range"
     if isinstance(run, Followed):
         errors = run.bounds[0]
-    else:
+    elif true is not None:
         errors = compare_runs(run, true).state
         if run.indefinite is not None:
             lost = f"a computed variance was not positive at step {run.indefinite}"

@@ -73,7 +73,7 @@ def altimeter(more: str = "0") -> LinearModel:
     ----------
     more : what is added to the diagonal of Q.
     """
-    step, push = Fraction(1, 50), (Fraction(1, 5000), Fraction(1, 50), Fraction(0))
+    step, push = Fraction(1, 50), exact(["1/5000", "1/50", "0"])
     Q = np.multiply.outer(push, push) * Fraction("0.35") ** 2
     for i, wander in enumerate(("0", "0", "1e-8")):
         Q[i, i] += Fraction(wander) + Fraction(more)

@@ -207,8 +207,8 @@ def native(
     -------
     x : (steps, n), the estimate after each step; not finite where the range did not suffice.
     """
-    told = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
     with np.errstate(all="ignore"):
+        told = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
         return innovation(told, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
 
 

@@ -124,7 +124,7 @@ def test_a_lucky_precision_does_not_count(monkeypatch):
             precision,
             "_over_goal",
             lambda m, z, fmt, *rest, least=threshold, by_luck=lucky: (
-                0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0
+                (0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0, "")
             ),
         )
         found = required_precision(MODEL, 4, 1.0, 2, z=Z[:4])
