@@ -35,7 +35,8 @@ Two's is [there](two.md#the-ledger); this is [here](#the-ledger). [^a] To the [b
 [^a]: A note.
 
 ```{raw} html
-<p><a href="two.html#row.2">a row</a> <a href="one.html">one page, raw</a> <a href="two.html#the-ledger">two ledger, raw</a></p>
+<p><a href="two.html#row.2">a row</a> <a href="one.html">one page, raw</a>
+<a href="two.html#the-ledger">two ledger, raw</a></p>
 ```
 """,
     "two": """# Two
