@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.geometry import theory
 from gpbnb.geometry.experiment import Year
 from gpbnb.measurement import ARCSEC, MAS, deroll, roll, rotation, theta_of
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog
 
 Frames = Mapping[str, NDArray[np.float64]]
 FRAME_COLOURS = dict(
@@ -146,8 +146,7 @@ def losses(curves: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
         artists += ax.plot(sizes / ARCSEC, errors / MAS, marker, color=colour, label=shown, mfc="none")
         artists += ax.plot(sizes / ARCSEC, theory.small_angle_loss(name, sizes) / MAS, color=colour, lw=1)
     artists.append(ax.axhline(1, color=STRICT, ls=":", label="the goal, 1 mas"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax, loc="lower right")
     label(ax, "angle (arcsec)", r"error of $\varphi$ (mas)")
     return artists
