@@ -63,7 +63,7 @@ class Wordlength:
             raise ValueError(f"kind: got {self.kind!r}; needed 't = places', 't = places + 1' or 'fixed point'")
 
     def format(self, places: int) -> FloatFormat:
-        """The floating-point format; for fixed point, that of the unit error of numbers of size 1."""
+        """The floating-point format; for fixed point, that of the unit roundoff of numbers of size 1."""
         more = 1 if self.kind == "fixed point" else int(self.kind.partition("+")[2] or 0)
         return FloatFormat(10, places + more, self.rounding)
 
@@ -222,7 +222,7 @@ def bound_readings() -> tuple[Column, ...]:
     """Every reading of the column "By proposed method".
 
     Two wordlengths, rounded or chopped; the quantities from the computer of that wordlength or from one that has
-    :math:`10^{-50}` for unit error; every :func:`~gpbnb.inversion.procedure.readings` of the procedure in every norm;
+    :math:`10^{-50}` as unit roundoff; every :func:`~gpbnb.inversion.procedure.readings` of the procedure in every norm;
     absolute, (96), or relative, (97).
     """
     result = []

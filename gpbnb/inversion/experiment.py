@@ -314,7 +314,7 @@ _RATIOS = ("smallest", "smallest_regular", "median", "largest")
 #: A bound is tight if it is at most so many times the error.
 TIGHT = 1.1
 
-#: Condition number times unit error up to which first-order analysis can be expected to say something.
+#: Condition number times unit roundoff up to which first-order analysis can be expected to say something.
 REGULAR = 0.01
 
 

@@ -12,7 +12,7 @@ from gpbnb.kalman import theory, year
 
 
 def decimal_digits(fmt: FloatFormat) -> float:
-    """The t for which β = 0.5 × 10^(1-t), (8) of hung1984, ch. II, is the unit error of a format."""
+    """The t for which β = 0.5 × 10^(1-t), (8) of hung1984, ch. II, is the unit roundoff of a format."""
     return 1 - math.log10(2 * float(fmt.unit_roundoff))
 
 

@@ -147,6 +147,47 @@ def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
     return year_end(found.runs, ax, found.goal, lines, marked)
 
 
+def headline(found: Answers, ax: Axes) -> list[Artist]:
+    """The same as :func:`digits_needed` for somebody who has a minute: words beside what they name, and no forms."""
+    artists: list[Artist] = []
+    for rounding, colour, word in (
+        (Rounding.CHOP, OBSERVED_OTHERS[2], "emulated, chopped"),
+        (Rounding.NEAREST, OBSERVED, "emulated, rounded"),
+    ):
+        group = [run for run in found.runs if run.case.rounding is rounding]
+        points = [(decimal_digits(fmt), end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        artists += ax.plot(*zip(*points, strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
+    t = np.linspace(3.5, 23, 50)
+    for word, faults, style in (
+        ("(125) as printed", {}, "-"),
+        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"], "--"),
+    ):
+        each = theory.coefficients(*theory.EXAMPLE, **faults)
+        height = 0.5 * 10.0 ** (1 - t) * (each.first + each.second)
+        artists += ax.plot(t, height, color=BOUND, ls=style)
+        artists.append(_beside(ax, word, (t[12], height[12]), (6, 6), BOUND))
+    artists.append(ax.axhline(found.goal, color=REFERENCE, ls=":"))
+    artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.goal), (0, -14), REFERENCE))
+    artists += ax.plot(found.printed, [found.goal] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
+    artists += [_beside(ax, f"{place} printed", (place, found.goal), (6, 13), BOUND) for place in found.printed]
+    needed = found.observed[Rounding.NEAREST]
+    artists.append(ax.vlines(needed, 1e-11, found.goal, color=OBSERVED))
+    artists.append(_beside(ax, f"{needed:g} digits were enough", (needed, 1e-5), (-6, 0), OBSERVED, ha="right"))
+    ax.set_yscale("log")
+    ax.set_ylim(1e-11, 1e20)
+    ax.set_yticks(10.0 ** np.arange(-8, 20, 4))
+    ax.set_xticks(range(4, 24, 2))
+    legend(ax, loc="lower left")
+    label(ax, "decimal digits that the computer carries", "error after a year (mas, mas/yr)")
+    return artists
+
+
+def _beside(
+    ax: Axes, text: str, at: tuple[float, float], away: tuple[float, float], colour: str, ha: str = "left"
+) -> Artist:
+    return ax.annotate(text, at, away, textcoords="offset points", color=colour, ha=ha)
+
+
 def contraction(found: Bounded, state: int, ax: Axes, name: str) -> list[Artist]:
     """Error of one state (points) and its contraction bound (line) against the step."""
     steps, error = found.history.steps, np.abs(found.history.state[:, state])

@@ -157,8 +157,8 @@ def _check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None
 
 #: The states of :func:`gravity_probe_b`, and their units.
 STATES = (
-    ("drift ψ2", "mas"),
-    ("drift ψ3", "mas"),
+    ("drift φ2", "mas"),
+    ("drift φ3", "mas"),
     ("drift rate 2", "mas/yr"),
     ("drift rate 3", "mas/yr"),
     ("pointing α2", "mas"),
@@ -181,10 +181,10 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     To first order in the angles, (1) and (2) of hung1982, ch. IV, give what the gyro's readout and the telescope show
     along the z axis of the rolling spacecraft,
 
-    .. math:: z_r = \beta_2 + \gamma_2 + (\psi_2 + \alpha_2)\cos\omega t + (\psi_3 + \alpha_3)\sin\omega t,
+    .. math:: z_r = \beta_2 + \gamma_2 + (\varphi_2 + \alpha_2)\cos\omega t + (\varphi_3 + \alpha_3)\sin\omega t,
         \qquad z_t = \beta_2 + \alpha_2\cos\omega t + \alpha_3\sin\omega t,
 
-    with :math:`\psi = \theta - \alpha`, (7). To z_r the model adds a bias and, for the readout's scale factor, the
+    with :math:`\varphi = \theta - \alpha`, (7). To z_r the model adds a bias and, for the readout's scale factor, the
     known aberration of starlight by the orbit, 5.2 arcseconds in 97.5 minutes, which calibrated it in flight. What the
     reports do not print, all noise and time constants, is our choice. Directions are tabulated to six decimals.
 

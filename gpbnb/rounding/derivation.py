@@ -20,7 +20,7 @@ N, M, J, K = sp.symbols("n m j k", integer=True, positive=True)
 
 
 def one_rounding() -> Derivation:
-    """From (2) to the unit errors (8) and (13), and the sharper bound of rounding to nearest.
+    """From (2) to the unit roundoffs (8) and (13), and the sharper bound of rounding to nearest.
 
     With x = (u + v/b^t) b^e the relative error is largest where u is smallest, u = 1/b: there,
     rounding drops v < 1/2 or adds 1 - v <= 1/2; chopping drops v < 1.
@@ -35,7 +35,7 @@ def one_rounding() -> Derivation:
         (
             Step("(8): the bound (5) over the least $|x|$ of (6)", over(half, smallest), unit),
             Step("(13): the same for chopping", over(b ** (e - t), smallest), b ** (1 - t)),
-            Step("(14): chopping doubles the unit error, in any base", over(b ** (1 - t), unit), sp.Integer(2)),
+            Step("(14): chopping doubles the unit roundoff, in any base", over(b ** (1 - t), unit), sp.Integer(2)),
             Step(
                 "sharper than (8): an error of $b^{e-t}/2$ needs $|x| \\ge b^{e-1} + b^{e-t}/2$",
                 over(half, smallest + half),

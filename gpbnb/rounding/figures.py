@@ -21,7 +21,7 @@ def sawtooth(result: Sawtooth, ax: Axes) -> list[Artist]:
     fmt, beta = result.fmt, float(result.fmt.unit_roundoff)
     artists: list[Artist] = [*ax.plot(result.x, result.error, ".", ms=1.5, color=OBSERVED, label="error")]
     name = "(8)" if fmt.rounding is Rounding.NEAREST else "(13)"
-    artists.append(ax.axhline(beta, color=BOUND, label=f"unit error, {name}"))
+    artists.append(ax.axhline(beta, color=BOUND, label=f"unit roundoff, {name}"))
     if fmt.rounding is Rounding.NEAREST:
         sharp = beta / (1 + beta)
         artists.append(ax.axhline(sharp, color=STRICT, ls=":", label=r"sharp, $\beta/(1+\beta)$"))

@@ -45,3 +45,24 @@ def test_the_picture_shows_each_answer_on_the_goal():
         assert set(shown[name].get_ydata()) == {found.goal}
     assert list(shown["observed"].get_xdata()) == [found.observed[Rounding.NEAREST]]
     axes[0].figure.canvas.draw()
+
+
+def test_the_headline_says_beside_each_mark_what_it_is():
+    _, axes = plotting.figure()
+    ax, found = axes[0], answers.find()
+    figures.headline(found, ax)
+    words = {text.get_text(): text.xy for text in ax.texts}
+    for place in found.printed:
+        assert words[f"{place} printed"] == (place, found.goal)
+    assert words[f"{found.observed[Rounding.NEAREST]:g} digits were enough"][0] == found.observed[Rounding.NEAREST]
+    drawn = {line.get_label(): line for line in ax.lines}
+    shown = sum(len(drawn[f"emulated, {word}"].get_xdata()) for word in ("chopped", "rounded"))
+    assert shown == sum(run.case.fmt is not None for run in found.runs)
+    for name, faults in (
+        ("(125) as printed", {}),
+        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"]),
+    ):
+        each = theory.coefficients(*theory.EXAMPLE, **faults)
+        t, height = words[name]
+        assert height == pytest.approx(0.5 * 10 ** (1 - t) * (each.first + each.second), rel=1e-12)
+    ax.figure.canvas.draw()

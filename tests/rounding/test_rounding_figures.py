@@ -40,11 +40,11 @@ def test_sawtooth(ax, rule):
     names = legend_of(ax)
     if rule is NEAREST:
         assert list(sharp[0].get_ydata()) == [beta / (1 + beta)] * 2
-        assert names[1] == "unit error, (8)"
+        assert names[1] == "unit roundoff, (8)"
         assert len(names) == 3
     else:
         assert not sharp
-        assert names == ["error", "unit error, (13)"]
+        assert names == ["error", "unit roundoff, (13)"]
     check_names(ax, "number $x$ (no unit)", "relative error")
     assert ax.get_title(loc="left") == f"{rule.value}, 2 decimal digits"
 
