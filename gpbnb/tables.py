@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from decimal import Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 if TYPE_CHECKING:
     from gpbnb.formats import FloatFormat
@@ -63,7 +62,7 @@ def short(value: float, figures: int = 2) -> str:
     if rounded == 0 or not math.isfinite(value):
         return f"{rounded:g}"
     if 1e-4 <= abs(rounded) < 1e6:
-        return np.format_float_positional(rounded, trim="-")
+        return f"{Decimal(repr(rounded)):f}".removesuffix(".0")
     return scientific(rounded, figures)
 
 
