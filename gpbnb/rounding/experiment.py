@@ -339,10 +339,11 @@ def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rn
     else:
         x = random_numbers(rng, fmt, (repeats, longest), kind)
     terms, unit = integers(x.to_fractions())
-    total, exact, size = x[:, 0], terms[:, 0], abs(terms[:, 0])
+    sizes: Any = abs(terms)
+    total, exact, size = x[:, 0], terms[:, 0], sizes[:, 0]
     errors = {}
     for j in range(1, longest):
-        total, exact, size = total + x[:, j], exact + terms[:, j], size + abs(terms[:, j])
+        total, exact, size = total + x[:, j], exact + terms[:, j], size + sizes[:, j]
         if j + 1 in lengths:
             errors[j + 1] = (total.to_fractions() / unit - exact) / (size * fmt.unit_roundoff)
     ordered = tuple(sorted(errors))
