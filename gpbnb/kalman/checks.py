@@ -845,14 +845,14 @@ def year_again() -> bool:
 
 @cache
 def needed_precision(base: int) -> int | None:
-    """Fewest digits, of those stored, from which on the drift rates stay within the goal for a year."""
+    """Fewest digits, of those stored, from which on the drift rates, at all steps kept, stay within the goal."""
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
         usual = found.case._replace(precision=0) == year.Case(
             year.MODELS[0], base, 0, Rounding.NEAREST, experiment.Form.REPORT
         )
         if usual:
-            if found.steps[-1] != theory.EXAMPLE[0] or np.abs(found.rate[-1]).max() > GOAL:
+            if found.steps[-1] != theory.EXAMPLE[0] or np.abs(found.rate).max() > GOAL:
                 break
             needed = found.case.precision
     return needed

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from gpbnb.formats import Rounding
 from gpbnb.kalman import theory
-from gpbnb.kalman.answers import Answers, decimal_digits, end
+from gpbnb.kalman.answers import Answers, decimal_digits, largest
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.experiment import Bounded, Form
 from gpbnb.kalman.year import Year
@@ -98,7 +98,7 @@ def year_end(
     counts: Sequence[tuple[str, theory.Coefficients]],
     answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
-    """Error of drift or rate at the end of a year against the digits, beside (125) and the answers to how many.
+    """Largest error of drift or rate in a year against the digits, beside (125) and the answers to how many.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def year_end(
     looks = [(form, rounding) for rounding in Rounding for form in Form]
     for form, rounding in looks:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        points = [(decimal_digits(fmt), largest(run)) for run in group if (fmt := run.case.fmt) is not None]
         if points:
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
             name = f"{form}, {rounding.value}"
@@ -128,7 +128,7 @@ def year_end(
         artists += ax.plot(list(places), [goal] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name)
     ax.set_yscale("log")
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "error after a year (mas, mas/yr)")
+    label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
     return artists
 
 
@@ -155,7 +155,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         (Rounding.NEAREST, OBSERVED, "emulated, rounded"),
     ):
         group = [run for run in found.runs if run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        points = [(decimal_digits(fmt), largest(run)) for run in group if (fmt := run.case.fmt) is not None]
         artists += ax.plot(*zip(*points, strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     t = np.linspace(3.5, 23, 50)
     for word, faults, style in (
@@ -178,7 +178,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     ax.set_yticks(10.0 ** np.arange(-8, 20, 4))
     ax.set_xticks(range(4, 24, 2))
     legend(ax, loc="lower left")
-    label(ax, "decimal digits that the computer carries", "error after a year (mas, mas/yr)")
+    label(ax, "decimal digits that the computer carries", "largest error in a year (mas, mas/yr)")
     return artists
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from gpbnb import plotting
@@ -17,11 +18,19 @@ def test_the_answers_are_those_of_the_example_and_of_the_years():
     assert found.printed == (9, 17)
     assert all(mended > formula for mended, formula in zip(found.mended, found.formula, strict=True))
     for rounding, digits in found.observed.items():
-        met = [run for run in found.runs if run.case.rounding is rounding and answers.end(run) <= 1]
+        met = [run for run in found.runs if run.case.rounding is rounding and answers.largest(run) <= 1]
         assert digits == min(answers.decimal_digits(run.case.fmt) for run in met)
         fewer = [r for r in found.runs if r.case.rounding is rounding and answers.decimal_digits(r.case.fmt) < digits]
         assert fewer
-        assert min(answers.end(run) for run in fewer) > 1
+        assert min(answers.largest(run) for run in fewer) > 1
+    assert found.observed[Rounding.NEAREST] == 10
+
+
+def test_what_counts_is_the_year_and_not_its_end_alone():
+    """Nine decimal digits end within the goal, and were beyond it before."""
+    (nine,) = (run for run in answers.find().runs if (run.case.base, run.case.precision) == (10, 9))
+    assert max(np.abs(nine.drift[-1]).max(), np.abs(nine.rate[-1]).max()) < 1 < answers.largest(nine)
+    assert answers.largest(nine) == np.abs(np.hstack([nine.drift, nine.rate])).max()
 
 
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
