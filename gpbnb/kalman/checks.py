@@ -11,7 +11,6 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb import ledger
 from gpbnb.bounds import column_sum_norm, exact, max_norm
 from gpbnb.findings import Check, Checks, Finding, Verdict, answer, both, compare, unverifiable
 from gpbnb.formats import FloatFormat, Rounding, prints_as
@@ -571,13 +570,10 @@ def dependence() -> Finding:
     )
 
 
-WORD = "interactions"
-
-
 @CHECKS.add("hung1984.II.s12.word-interactions")
 def word() -> Finding:
     return compare(
-        WORD == "iterations",
+        "iterations" in quote("hung1984.II.s12.word-interactions"),
         f"$k$ counts the iterations of the filter, {Fraction(YEAR, STEP)} in a year",
         Verdict.TYPO,
         otherwise_note="iterations are meant, and an iteration period of ten seconds",
@@ -899,18 +895,12 @@ def references() -> Finding:
     )
 
 
-def cited(number: int) -> str:
-    """A reference as it is printed."""
-    (entry,) = (e for e in ledger.load_inventory() if e.id == f"hung1984.II.s14.reference-{number}")
-    return entry.printed
-
-
 TITLES = {1: "Rounding Errors in Algebraic Processes", 5: "Introduction to Numerical Computations"}
 
 
 def title(number: int) -> Finding:
     return compare(
-        f", {TITLES[number]}, " in cited(number),
+        f", {TITLES[number]}, " in quote(f"hung1984.II.s14.reference-{number}"),
         f"the book is called {TITLES[number]}",
         Verdict.TYPO,
         otherwise_note="an s is missing",
@@ -933,7 +923,7 @@ CONTRACT = "NAS8-34426"
 @CHECKS.add("hung1984.II.s14.reference-7")
 def reference_7() -> Finding:
     return compare(
-        f"NASA Contract {CONTRACT}, " in cited(7),
+        f"NASA Contract {CONTRACT}, " in quote("hung1984.II.s14.reference-7"),
         CONTRACT,
         Verdict.TYPO,
         otherwise_note="a 5 for the S that the title page has, as in chapter I; by the author or the scan. The date is "

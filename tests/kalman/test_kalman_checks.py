@@ -230,7 +230,7 @@ AGREE = [
     ("second_digits", replace(theory, "coefficients", always(theory.Coefficients(1, 12949 * 10**12)))),
     ("criterion", replace(checks, "GOAL", 6606)),
     ("asterisk", replace(smallest, "rounded_step", lambda fmt, case: (STEP(*case).x, None, None))),
-    ("word", replace(checks, "WORD", "iterations")),
+    ("word", replace(checks, "quote", always("$k$, the number of iterations"))),
     ("reference_1", replace(checks, "TITLES", {1: "Rounding Errors in Algebraic Process"})),
     ("reference_5", replace(checks, "TITLES", {5: "Introduction to Numerical Computation"})),
     ("reference_7", replace(checks, "CONTRACT", "NA58-34426")),
