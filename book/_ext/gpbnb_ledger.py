@@ -1,5 +1,7 @@
 """The ledger in the book: labels of its rows for ``{ref}``, MathJax for its HTML, and one form for its tables."""
 
+import re
+
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
@@ -44,6 +46,12 @@ def join_notes(app: Sphinx, doctree: nodes.document) -> None:
                 found.children = [nodes.paragraph("", "Recomputed, and note")]
             else:
                 found.extend(note.children)
+        for text in list(group.findall(nodes.Text)):
+            # Stars in the notes are the ledger's own, which Markdown was not to read.
+            parts = re.split(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])", text.astext())
+            if len(parts) > 1 and not isinstance(text.parent, nodes.math):
+                marked = [nodes.emphasis("", p) if i % 2 else nodes.Text(p) for i, p in enumerate(parts)]
+                text.parent.replace(text, marked)
         table = group.parent
         table["classes"].append("ledger-table")
         table.replace_self(nodes.container("", table.deepcopy(), classes=["ledger"]))
