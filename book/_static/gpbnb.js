@@ -13,7 +13,7 @@ document.addEventListener("DOMContentLoaded", () => {
 const LONG = 9; // em
 const LONG_BRACKETS = 12; // em
 const OPENS = ":scope > mjx-c:is(.mjx-c28, .mjx-c5B, .mjx-c7B)";
-const CLOSES = ":scope > mjx-c:is(.mjx-c29, .mjx-c5D, .mjx-c7D)";
+const CLOSES = ":is(:scope, :scope:is(mjx-msup, mjx-msub, mjx-msubsup) > mjx-mo) > mjx-c:is(.mjx-c29, .mjx-c5D, .mjx-c7D)";
 const COMMA = ":scope > mjx-c:is(.mjx-c2C, .mjx-c3B)";
 
 function breakFormulas(boxes = document.querySelectorAll("article mjx-container")) {
@@ -68,6 +68,11 @@ function keepPunctuation(formula) {
   const signs = after?.nodeType === Node.TEXT_NODE && after.data.match(/^[,.;:!?)\]’”]+/)?.[0];
   if (!signs) return;
   after.splitText(signs.length);
+  const last = [...formula.querySelectorAll(".formula-piece")].at(-1);
+  if (last) {
+    last.append(after);
+    return;
+  }
   const kept = document.createElement("span");
   kept.className = "formula-kept";
   formula.before(kept);
