@@ -18,11 +18,11 @@ RESULTS = Path(__file__).parent / "results"
 
 
 def in_units(seconds: float) -> str:
-    """Three digits and a unit."""
+    """Three digits and a unit, which a narrow column must not part."""
     for unit, size in (("s", 1.0), ("ms", 1e-3)):
         if seconds >= size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds / 1e-6:.3g} µs"
+            return f"{seconds / size:.3g}\N{NO-BREAK SPACE}{unit}"
+    return f"{seconds / 1e-6:.3g}\N{NO-BREAK SPACE}µs"
 
 
 def cells(row: Row) -> tuple[str, ...]:

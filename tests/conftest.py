@@ -1,6 +1,23 @@
 from __future__ import annotations
 
 import matplotlib
+import pytest
 
 # Set here, not in the environment, which the kernels of the notebooks inherit: they draw inline.
 matplotlib.use("Agg")
+
+# Failed assertions of the helpers beside this file tell what came, as those of the tests do.
+pytest.register_assert_rewrite("faults", "steps")
+
+
+@pytest.fixture
+def ax():
+    """An empty panel of a figure."""
+    import matplotlib.pyplot as plt
+
+    from gpbnb import plotting
+
+    figure, axes = plotting.figure()
+    yield axes[0]
+    figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    plt.close("all")

@@ -1,4 +1,4 @@
-"""What the book needs of Sphinx beyond settings: MathJax from this machine, a first page, labels, docstrings."""
+"""What the book needs of Sphinx beyond settings: MathJax from this machine, a first page, labels, links, docstrings."""
 
 import re
 from enum import Enum
@@ -6,8 +6,10 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 import pybtex.plugin
+from docutils import nodes
 from pybtex.style.formatting.plain import Style as PlainStyle
 from pybtex.style.labels import BaseLabelStyle
+from sphinx.addnodes import start_of_file
 from sphinx.application import Sphinx
 from sphinx.util.fileutil import copy_asset
 
@@ -85,10 +87,72 @@ def hide_enum_arguments(app, what, name, obj, options, signature, returns):
     return None
 
 
+def write_powers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Write numbers that notebooks put into the text, such as 1.5e-08, as 1.5 × 10⁻⁸."""
+    for node in doctree.findall(lambda each: isinstance(each, nodes.inline) and "pasted-text" in each["classes"]):
+        text = node.astext()
+        if number := re.fullmatch(r"(-?[\d.]+)e([+-]\d+)", text):
+            power = nodes.superscript("", str(int(number[2])).replace("-", "−"))
+            node.children = [nodes.Text(f"{number[1]}\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10"), power]
+
+
+def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
+    """Where all pages are one, lead every link to its place within it.
+
+    Sphinx would lead those to a part of a page to ``book/index.html``, as seen from the folder above, and drop which
+    page was meant, though ids such as ``id3`` stand in several; HTML outputs name the pages as they were.
+    """
+    if app.builder.name != "singlehtml":
+        return
+    page_of: dict[nodes.Node, str] = {}
+    for part in doctree.findall(start_of_file):
+        page_of |= dict.fromkeys(part.findall(), part["docname"])
+    places: dict[tuple[str, str], nodes.Element] = {}
+    pages: dict[str, set[str]] = {}
+    for node in doctree.findall(nodes.Element):
+        for name in node.get("ids", ()):
+            page = page_of.get(node, docname)
+            places[page, name] = node
+            pages.setdefault(name, set()).add(page)
+
+    def within(page: str, name: str) -> str:
+        if page == docname and not name:
+            name = next(iter(doctree.findall(nodes.section)))["ids"][0]
+        if not name:
+            return f"document-{page}"
+        if len(pages.get(name, ())) < 2 or (page, name) not in places:
+            return name
+        alias = f"{page}-{name}"
+        if alias not in (ids := places[page, name]["ids"]):
+            ids.append(alias)
+        return alias
+
+    for node in list(doctree.findall(nodes.Element)):
+        page = page_of.get(node, docname)
+        if "refid" in node:
+            node["refid"] = within(page, node["refid"])
+        if node.get("backrefs"):
+            node["backrefs"] = [within(page, name) for name in node["backrefs"]]
+        if node.get("refuri", "").startswith("#document-"):
+            page, _, name = node["refuri"].removeprefix("#document-").partition("#")
+            node["refuri"] = "#" + within(page, name)
+    folder = Path(docname).parent
+    for node in doctree.findall(nodes.raw):
+        mended = re.sub(
+            r'href="(\w+)\.html(?:#([^"]+))?"',
+            lambda match: f'href="#{within((folder / match[1]).as_posix(), match[2] or "")}"',
+            node.astext(),
+        )
+        node.children = [nodes.Text(mended)]
+        node.rawsource = mended
+
+
 def setup(app: Sphinx) -> dict:
     pybtex.plugin.register_plugin("pybtex.style.formatting", "short_names", ShortNames)
     app.connect("autodoc-process-docstring", unfold_fields, priority=400)
     app.connect("autodoc-process-signature", hide_enum_arguments)
+    app.connect("doctree-resolved", write_powers)
+    app.connect("doctree-resolved", mend_links)
     app.connect("build-finished", copy_mathjax)
     app.connect("build-finished", write_first_page, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

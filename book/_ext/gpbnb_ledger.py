@@ -1,6 +1,4 @@
-"""Labels of the ledger's rows, so that any page can name one in ``{ref}``, and MathJax and links for its HTML."""
-
-import re
+"""The ledger in the book: labels of its rows for ``{ref}``, MathJax for its HTML, and one form for its tables."""
 
 from docutils import nodes
 from sphinx.application import Sphinx
@@ -9,6 +7,7 @@ from sphinx.environment import BuildEnvironment
 from gpbnb.ledger import load_inventory
 
 PAGE = "book/errata"
+HEADER = ["Item", "Verdict", "Printed", "Recomputed", "Note"]
 
 
 def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
@@ -28,22 +27,34 @@ def ask_for_mathjax(app: Sphinx, doctree: nodes.document) -> None:
         app.env.get_domain("math").data["has_equations"][app.env.docname] = True
 
 
-def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
-    """Where all pages are one, lead the links of HTML outputs to places within it."""
-    if app.builder.name != "singlehtml":
-        return
-    for node in doctree.findall(nodes.raw):
-        mended = re.sub(r'href="(\w+)\.html(?:#([^"]+))?"', _within, node.astext())
-        node.children = [nodes.Text(mended)]
-        node.rawsource = mended
-
-
-def _within(match: re.Match) -> str:
-    return f'href="#{match[2] or f"document-book/{match[1]}"}"'
+def join_columns(app: Sphinx, doctree: nodes.document) -> None:
+    """Give the chapters' tables of the ledger the three columns of the complete one: five do not fit the page."""
+    for group in list(doctree.findall(nodes.tgroup)):
+        head = next(group.findall(nodes.thead), None)
+        if head is None or [entry.astext() for entry in head.findall(nodes.entry)] != HEADER:
+            continue
+        for spec in [spec for spec in group if isinstance(spec, nodes.colspec)][3:]:
+            group.remove(spec)
+        group["cols"] = 3
+        next(group.findall(nodes.colspec))["stub"] = 1
+        for row in group.findall(nodes.row):
+            wide, *others = row[2:]
+            for cell in others:
+                row.remove(cell)
+            if row.parent is head:
+                wide.children = [nodes.paragraph("", "Printed, recomputed, and note")]
+                continue
+            for name, cell in zip(("printed", "recomputed", "note"), (wide, *others), strict=True):
+                for paragraph in cell:
+                    paragraph["classes"].append(name)
+            wide.extend(child for cell in others for child in cell.children)
+        table = group.parent.deepcopy()
+        table["classes"].append("ledger-table")
+        group.parent.replace_self(nodes.container("", table, classes=["ledger"]))
 
 
 def setup(app: Sphinx) -> dict:
     app.connect("doctree-read", ask_for_mathjax)
+    app.connect("doctree-read", join_columns)
     app.connect("env-updated", add_labels)
-    app.connect("doctree-resolved", mend_links)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -67,9 +67,9 @@ function setFormulas(rows, whenReady) {
     return formulas;
   };
   const reach = (formulas) => {
-    for (const box of formulas.map((formula) => formula.firstElementChild)) {
-      if (box && box.scrollWidth > box.clientWidth) box.tabIndex = 0;
-    }
+    const boxes = formulas.map((formula) => formula.firstElementChild).filter(Boolean);
+    breakFormulas(boxes);
+    for (const box of boxes) if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
   };
   let last = Promise.resolve();
   const watch = new IntersectionObserver(
@@ -84,6 +84,10 @@ function setFormulas(rows, whenReady) {
     if (!window.MathJax?.typesetPromise) return;
     whenReady();
     for (const row of waiting.keys()) watch.observe(row);
-    window.addEventListener("beforeprint", () => MathJax.typeset(take([...waiting.keys()])));
+    window.addEventListener("beforeprint", () => {
+      const formulas = take([...waiting.keys()]);
+      MathJax.typeset(formulas);
+      reach(formulas);
+    }, { capture: true }); // before their widths are asked for, see gpbnb.js
   });
 }

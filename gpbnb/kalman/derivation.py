@@ -143,18 +143,25 @@ def general() -> Derivation:
     c, d = TWICE
     start, inputs = count_start(c), count_input(c, d)
     first, second = printed_coefficients()
+    x_0, *each = (start.subs(K, 3), *(inputs.subs({K: 3, NTH: i}) for i in (1, 2, 3)))
+    differences = (3 * N + 1, 10 * N + 3 * M + 7, 17 * N + 6 * M + 13)
     return Derivation(
         (
             Step("what follows (118): $n+1$ more roundings of each loop", c, together(ONCE[0], N + 1)),
-            Step("(119), $x_0$", start.subs(K, 3), 3 * (7 * N + 3 * M + 6)),
-            Step("(119), $u_1$", inputs.subs({K: 3, NTH: 1}), 18 * N + 9 * M + 17),
-            Step("(119), $u_2$", inputs.subs({K: 3, NTH: 2}), 11 * N + 6 * M + 11),
-            Step("(119), $u_3$", inputs.subs({K: 3, NTH: 3}), 4 * N + 3 * M + 5),
-            Step("(119)-(121), $u_1$ by difference", (start - inputs).subs({K: 3, NTH: 1}), 3 * N + 1),
-            Step("(119)-(121), $u_2$ by difference", (start - inputs).subs({K: 3, NTH: 2}), 10 * N + 3 * M + 7),
-            Step("(119)-(121), $u_3$ by difference", (start - inputs).subs({K: 3, NTH: 3}), 17 * N + 6 * M + 13),
-            Step("(122), first line", second_coefficient(c, d).subs(K, 3), 30 * N + 9 * M + 21),
-            Step("(124): the second coefficient", second_coefficient(c, d).subs(K, 4), second.subs(K, 4)),
+            Step("(119), $x_0$", 3 * held(c), 3 * (7 * N + 3 * M + 6)),
+            Step("(119), $u_1$", together(2 * held(c), d), 18 * N + 9 * M + 17),
+            Step("(119), $u_2$", together(c, d), 11 * N + 6 * M + 11),
+            Step("(119), $u_3$", together(ONCE[1], 1), 4 * N + 3 * M + 5),
+            *(
+                Step(f"(119)-(121), $u_{i}$ by difference", together(x_0, sp.Mul(-1, u_i, evaluate=False)), difference)
+                for i, (u_i, difference) in enumerate(zip(each, differences, strict=True), 1)
+            ),
+            Step("(122), first line", together(*differences), 30 * N + 9 * M + 21),
+            Step(
+                "(124): the second coefficient",
+                second_coefficient(c, d).subs(K, 4),
+                together(4 * held(3 * N + 1), 6 * held(7 * N + 3 * M + 6)),
+            ),
             Step("(125), first coefficient, every $k$", start, first),
             Step("(125), second coefficient, every $k$", second_coefficient(c, d), second),
         )
@@ -195,7 +202,7 @@ def mended() -> Derivation:
             Step(
                 "and second: of third order in $k$",
                 sp.limit(second_coefficient(c, d, GROWTH) / K**3, K, sp.oo),
-                GROWTH / 6,
+                held(GROWTH) / 6,
             ),
         )
     )
@@ -214,17 +221,20 @@ def scalar_conditions() -> Derivation:
     kappa = sp.Symbol("kappa", nonnegative=True)
     n = m = 1
     allowed = n + m + 1
-    may = over((n + 1) + (n + m + 1) * kappa, 1 - kappa)
+
+    def may(kappa: sp.Expr) -> sp.Expr:
+        return over(together(n + 1, (n + m + 1) * held(kappa)), together(1, -kappa))
+
     return Derivation(
         (
             Step(
                 "where $\\kappa=\\frac16$, possible and allowed are equal",
-                may.subs(kappa, sp.Rational(1, 6)),
+                may(sp.Rational(1, 6)),
                 sp.Integer(allowed),
             ),
             Step(
                 "and not beyond: possible minus allowed, times $1-\\kappa$",
-                sp.expand((may.doit() - allowed) * (1 - kappa)).simplify(),
+                held(together(may(kappa), -allowed)) * held(1 - kappa),
                 6 * kappa - 1,
             ),
             Step(

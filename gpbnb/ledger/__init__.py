@@ -10,7 +10,7 @@
 """
 
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, rows, summary
-from gpbnb.ledger.inventory import Entry, load_inventory, select
+from gpbnb.ledger.inventory import Entry, load_inventory, quote, select
 from gpbnb.ledger.page import (
     CHAPTERS,
     Html,
@@ -41,6 +41,7 @@ __all__ = [
     "of_ids",
     "of_kind",
     "of_topic",
+    "quote",
     "rows",
     "searchable",
     "select",

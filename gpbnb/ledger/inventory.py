@@ -80,6 +80,19 @@ def load_inventory(source: Traversable | None = None) -> tuple[Entry, ...]:
     return tuple(entries)
 
 
+def quote(key: str) -> str:
+    """What the entry `key` of the package's inventory prints.
+
+    Raises
+    ------
+    KeyError : the inventory has no such id.
+    """
+    for entry in load_inventory():
+        if entry.id == key:
+            return entry.printed
+    raise KeyError(f"no entry {key!r} in the inventory; correct the id")
+
+
 def _entry(record: list[str]) -> Entry:
     if len(record) != len(HEADER):
         raise ValueError(f"{len(record)} fields; {len(HEADER)} are needed: quote a field that holds a comma")

@@ -237,8 +237,8 @@ def _part(document: str, chapter: str, rows: Sequence[Row], owner: dict[str, str
 
 
 def _table(classes: str, caption: str, lines: Sequence[str], left_undone: bool = False) -> str:
-    names = ("Left undone", "Our answer, and where") if left_undone else ("Printed", "Recomputed, and note")
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("Item", "Verdict", *names))
+    content = "Left undone, and our answer" if left_undone else "Printed, recomputed, and note"
+    head = "".join(f'<th scope="col">{name}</th>' for name in ("Item", "Verdict", content))
     return (
         f'<table class="{classes}">\n{caption}<thead><tr>{head}</tr></thead>\n'
         f"<tbody>\n{chr(10).join(lines)}\n</tbody>\n</table>\n"
@@ -246,16 +246,15 @@ def _table(classes: str, caption: str, lines: Sequence[str], left_undone: bool =
 
 
 def _line(start: str, item: str, row: Row, owner: dict[str, str]) -> str:
-    """Write a row; what was recomputed, the note, and the chapter unless the note names it, share a cell."""
+    """Write a row; what was printed, what was recomputed, and the note, with the chapter, share a wide cell."""
     found, note = (_text(row.finding.recomputed), _text(row.finding.note)) if row.finding else ("", "")
     topic = owner.get(row.entry.id, "")
     link = _chapter_link(CHAPTERS[topic]) if topic in CHAPTERS else ""
     if link not in note:
         note = f"{note} [{link}]" if note else f"[{link}]"
-    return (
-        f'{start}<th scope="row">{item}</th><td>{escape(_outcome(row))}</td><td>{_text(row.entry.printed)}</td>'
-        f"<td>{f'<p>{found}</p>' if found else ''}<p>{note}</p></td></tr>"
-    )
+    named = (("printed", _text(row.entry.printed)), ("recomputed", found), ("note", note))
+    content = "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
+    return f'{start}<th scope="row">{item}</th><td>{escape(_outcome(row))}</td><td>{content}</td></tr>'
 
 
 def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:

@@ -7,7 +7,7 @@ import sympy as sp
 from gpbnb.derivation import Derivation, Step, held
 
 T = sp.Symbol("T", positive=True)
-TIME, THETA, PSI = sp.symbols("t theta psi", real=True)
+TIME, THETA = sp.symbols("t theta", real=True)
 ROLL, OFF = sp.symbols("omega_r Delta", positive=True)
 SX, SY, N1, N2, SIGNAL, NOISE = sp.symbols("s_x s_y n_1 n_2 s n", real=True)
 
@@ -56,7 +56,7 @@ def two_dimensions() -> Derivation:
     phi = ROLL * TIME
     rolled = roll(phi) * sp.Matrix([SX, SY])
     measured = rolled + sp.Matrix([N1, N2])
-    ideal, off = deroll(phi) * measured, deroll(phi + PSI) * rolled
+    ideal, off = deroll(phi) * measured, deroll(phi + THETA) * rolled
     e = sp.Symbol("e", real=True)
     unequal = deroll(phi) * sp.diag(1 + e / 2, 1 - e / 2) * rolled
     return Derivation(
@@ -67,8 +67,8 @@ def two_dimensions() -> Derivation:
                 SX + (deroll(phi) * sp.Matrix([N1, N2]))[0],
             ),
             Step("(7), $s_4$", ideal[1], SY + (deroll(phi) * sp.Matrix([N1, N2]))[1]),
-            Step("a phase error, $s_3$: the other drift comes in", off[0], SX * sp.cos(PSI) - SY * sp.sin(PSI)),
-            Step("the same, $s_4$", off[1], SX * sp.sin(PSI) + SY * sp.cos(PSI)),
+            Step("a phase error, $s_3$: the other drift comes in", off[0], SX * sp.cos(THETA) - SY * sp.sin(THETA)),
+            Step("the same, $s_4$", off[1], SX * sp.sin(THETA) + SY * sp.cos(THETA)),
             Step(
                 "readouts of unequal gain, $1\\pm e/2$: the term at twice the roll frequency is back",
                 unequal[0],

@@ -8,6 +8,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
+import steps
 import sympy as sp
 
 from gpbnb.budget import derivation, experiment, theory
@@ -16,15 +17,16 @@ from gpbnb.budget.theory import Budget
 EXAMPLE = theory.read(files("gpbnb.budget") / "example.csv")
 
 
-@pytest.mark.parametrize(("name", "count"), [("equal_sources", 2), ("averages", 4)])
-def test_derivations(name, count):
-    steps = getattr(derivation, name)().steps
-    assert len(steps) == count
-    for step in steps:
-        assert step.holds
-        assert not replace(step, right=2 * step.right).holds
-        left, right = step.latex().split(r"\;=\;")
-        assert left.strip() != right.strip()
+DERIVATIONS = steps.collected(derivation.equal_sources, derivation.averages)
+
+
+@steps.each(DERIVATIONS)
+def test_each_step(step):
+    steps.check(step)
+
+
+def test_the_derivations_are_those_of_the_chapter():
+    assert steps.lengths(DERIVATIONS) == {"equal_sources": 2, "averages": 4}
 
 
 def test_the_factors_of_theory_are_those_of_the_derivation():

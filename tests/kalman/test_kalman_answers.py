@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from gpbnb import plotting
@@ -17,11 +18,19 @@ def test_the_answers_are_those_of_the_example_and_of_the_years():
     assert found.printed == (9, 17)
     assert all(mended > formula for mended, formula in zip(found.mended, found.formula, strict=True))
     for rounding, digits in found.observed.items():
-        met = [run for run in found.runs if run.case.rounding is rounding and answers.end(run) <= 1]
+        met = [run for run in found.runs if run.case.rounding is rounding and answers.largest(run) <= 1]
         assert digits == min(answers.decimal_digits(run.case.fmt) for run in met)
         fewer = [r for r in found.runs if r.case.rounding is rounding and answers.decimal_digits(r.case.fmt) < digits]
         assert fewer
-        assert min(answers.end(run) for run in fewer) > 1
+        assert min(answers.largest(run) for run in fewer) > 1
+    assert found.observed[Rounding.NEAREST] == 10
+
+
+def test_what_counts_is_the_year_and_not_its_end_alone():
+    """Nine decimal digits end within the goal, and were beyond it before."""
+    (nine,) = (run for run in answers.find().runs if (run.case.base, run.case.precision) == (10, 9))
+    assert max(np.abs(nine.drift[-1]).max(), np.abs(nine.rate[-1]).max()) < 1 < answers.largest(nine)
+    assert answers.largest(nine) == np.abs(np.hstack([nine.drift, nine.rate])).max()
 
 
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
@@ -45,3 +54,24 @@ def test_the_picture_shows_each_answer_on_the_goal():
         assert set(shown[name].get_ydata()) == {found.goal}
     assert list(shown["observed"].get_xdata()) == [found.observed[Rounding.NEAREST]]
     axes[0].figure.canvas.draw()
+
+
+def test_the_headline_says_beside_each_mark_what_it_is():
+    _, axes = plotting.figure()
+    ax, found = axes[0], answers.find()
+    figures.headline(found, ax)
+    words = {text.get_text(): text.xy for text in ax.texts}
+    for place in found.printed:
+        assert words[f"{place} printed"] == (place, found.goal)
+    assert words[f"{found.observed[Rounding.NEAREST]:g} digits were enough"][0] == found.observed[Rounding.NEAREST]
+    drawn = {line.get_label(): line for line in ax.lines}
+    shown = sum(len(drawn[f"emulated, {word}"].get_xdata()) for word in ("chopped", "rounded"))
+    assert shown == sum(run.case.fmt is not None for run in found.runs)
+    for name, faults in (
+        ("(125) as printed", {}),
+        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"]),
+    ):
+        each = theory.coefficients(*theory.EXAMPLE, **faults)
+        t, height = words[name]
+        assert height == pytest.approx(0.5 * 10 ** (1 - t) * (each.first + each.second), rel=1e-12)
+    ax.figure.canvas.draw()

@@ -2,56 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import pytest
+import steps
 import sympy as sp
 
-from gpbnb.bounds import exact
-from gpbnb.derivation import Derivation
+from gpbnb.bounds import exact, inverse_of
 from gpbnb.kalman import derivation, theory
 
-DERIVATIONS = {
-    function.__name__: function()
-    for function in (
-        derivation.report,
-        derivation.propagated,
-        derivation.general,
-        derivation.mended,
-        derivation.scalar_conditions,
-        derivation.smallest,
-        derivation.contraction,
-        derivation.recursion,
-    )
-}
-STEPS = [(name, i) for name, steps in DERIVATIONS.items() for i in range(len(steps.steps))]
-each_step = pytest.mark.parametrize(("name", "i"), STEPS)
+DERIVATIONS = steps.collected(
+    derivation.report,
+    derivation.propagated,
+    derivation.general,
+    derivation.mended,
+    derivation.scalar_conditions,
+    derivation.smallest,
+    derivation.contraction,
+    derivation.recursion,
+)
 
 
-@each_step
-def test_the_step_holds_and_is_typeset(name, i):
-    step = DERIVATIONS[name].steps[i]
-    assert step.holds
-    assert step.name.count("$") % 2 == 0
-    assert r"\;=\;" in step.latex()
+@steps.each(DERIVATIONS)
+def test_each_step(step):
+    steps.check(step)
 
 
-def test_all_hold():
-    assert all(steps.holds for steps in DERIVATIONS.values())
-    assert len(STEPS) == 42
+def test_the_derivations_are_those_of_the_chapter():
+    assert sum(steps.lengths(DERIVATIONS).values()) == 42
 
 
-@each_step
-def test_a_wrong_step_would_be_found_out(name, i):
-    steps = DERIVATIONS[name].steps
-    for wrong in (
-        replace(steps[i], right=steps[i].right + derivation.BETA),
-        replace(steps[i], right=2 * steps[i].right + 1),
-        replace(steps[i], rest=steps[i].rest + 1),
-    ):
-        assert not wrong.holds
-        assert not Derivation((*steps[:i], wrong, *steps[i + 1 :])).holds
+def test_the_rows_of_119_are_the_counts_of_every_k():
+    (c, d), values = derivation.TWICE, {derivation.K: 3}
+    counts = [derivation.count_start(c), *(derivation.count_input(c, d).subs(derivation.NTH, i) for i in (1, 2, 3))]
+    rows = DERIVATIONS["general"].steps[1:5]
+    assert [sp.expand(count.subs(values) - row.right) for count, row in zip(counts, rows, strict=True)] == [0] * 4
 
 
 def test_the_general_case_is_the_printed_one_and_no_other():
@@ -84,7 +67,7 @@ def test_the_identities_hold_for_exact_filters():
         )
         E, e = exact(rng.integers(-9, 10, (n, n))) / 1000, exact(rng.integers(-9, 10, n)) / 100
         true, run = theory.exact_step(Phi, H, Q, R, x, P, z), theory.exact_step(Phi, H, Q, R, x + e, P + E, z)
-        S = theory._inverse_of(run.innovation_covariance)
+        S = inverse_of(run.innovation_covariance)
         y = Phi.T @ H.T @ S @ run.innovation
         assert np.all(run.transition @ E @ true.transition.T == run.P - true.P)
         assert np.all(run.x - true.x == true.transition @ (e + E @ y))

@@ -5,7 +5,7 @@ import textwrap
 
 import pytest
 
-CHECKED = tuple(f"hung1984.I.{item}" for item in ("two-tasks", "1-f-study", "report-period", "contract"))
+CHECKED = tuple(f"hung1984.I.{item}" for item in ("two-tasks", "1-f-study", "report-period", "contract", "contents"))
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gpbnb.ledger import load_inventory, select
+from gpbnb.ledger import load_inventory, quote, select
 from gpbnb.ledger.inventory import HEADER, Entry
 
 HEAD = ",".join(HEADER)
@@ -72,6 +72,13 @@ def test_a_missing_file_is_an_oserror(tmp_path):
 
 def sections(entries):
     return list(dict.fromkeys((entry.document, entry.chapter, entry.section) for entry in entries))
+
+
+def test_quotes_are_what_the_inventory_has():
+    assert quote("hung1984.I.contract") == "the study was supported under contract NA58-34426"
+    assert all(quote(entry.id) == entry.printed for entry in INVENTORY[::100])
+    with pytest.raises(KeyError, match=r"no entry 'hung1984\.I\.none' in the inventory"):
+        quote("hung1984.I.none")
 
 
 def test_select_everything():

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from gpbnb import ledger
-from gpbnb.findings import Verdict, answer, compare, unverifiable
+from gpbnb.findings import Finding, Verdict, answer, compare, unverifiable
 from gpbnb.ledger import Row, load_inventory, page
 from gpbnb.ledger.inventory import DOCUMENTS, Entry
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FINDINGS = (
     compare(True, "yes"),
-    compare(False, r"$a<b$ & <c>", Verdict.WRONG, "see the chapter *Rounding bounds*; *not* x*y*z"),
+    compare(False, r"$a<b$ & <c>", Verdict.WRONG, "see the chapter *Rounding bounds*; *not* x*y*z, x*y* z"),
     compare(False, "one", Verdict.TYPO),
     unverifiable("", "no data"),
     answer(True, "$|x|$", "here"),
@@ -75,20 +75,27 @@ def test_tables_are_the_chapters_of_the_documents_with_their_rows():
         ids = re.findall(r'<tr id="([^"]+)"', table)
         expected = [e.id for e in INVENTORY if (e.document, e.chapter) == (document, chapter)]
         assert sorted(ids) == sorted(expected)
-        assert f": {len(ids)} entr" in re.search(r"<caption>(.*?)</caption>", table)[1]
+        place = document if chapter == "-" else f"{document}, ch. {chapter}"
+        caption = f"{place}: {len(ids)} {'entries' if len(ids) > 1 else 'entry'}"
+        assert re.search(r"<caption>(.*?)</caption>", table)[1] == caption
+        assert re.findall(r'<th scope="row"><a href="#([^"]+)">', table) == ids
         cells = Tags(table).cells
-        assert len(cells) == 4 * (len(ids) + 1)
+        assert len(cells) == 3 * (len(ids) + 1)
+
+
+def test_a_table_of_one_row_says_so():
+    assert "<caption>savage2016: 1 entry</caption>" in ledger.searchable([UNCHECKED]).html
 
 
 def test_printed_and_recomputed_reach_the_cells_as_math_and_prose():
     row = Row(Entry("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", r"$a<b$ & so on"), FINDINGS[1])
-    *_, item, verdict, printed, found = Tags(ledger.searchable([row]).html).cells
+    *_, item, verdict, found = Tags(ledger.searchable([row]).html).cells
     assert item == "eq (x)II.6, equation"
     assert verdict == "wrong"
-    assert printed == r"\(a<b\) & so on"
-    assert found == r"\(a<b\) & <c>see the chapter Rounding bounds; not x*y*z"
+    assert found == r"\(a<b\) & so on\(a<b\) & <c>see the chapter Rounding bounds; not x*y*z, x*y* z"
     html = ledger.searchable([row]).html
-    assert '<a href="rounding.html">Rounding bounds</a>; <em>not</em> x*y*z' in html
+    assert re.findall(r'<p class="(\w+)">', html) == ["printed", "recomputed", "note"]
+    assert '<a href="rounding.html">Rounding bounds</a>; <em>not</em> x*y*z, x*y* z' in html
     assert html.count('<span class="math notranslate nohighlight">') == 2
 
 
@@ -102,7 +109,7 @@ def test_all_math_of_the_ledger_is_marked_and_no_dollar_left():
 def test_a_row_without_a_check_is_shown_as_such():
     html = ledger.searchable([UNCHECKED]).html
     assert 'data-verdict="no check" data-chapter=""' in html
-    assert Tags(html).cells[-3:] == ["no check", "a", ""]
+    assert Tags(html).cells[-2:] == ["no check", "a"]
 
 
 def test_the_options_of_each_filter_count_its_rows():
@@ -136,10 +143,18 @@ def test_brief_and_links_lead_to_rows_of_the_complete_ledger():
     targets = [f"errata.html#{row.entry.id}" for row in some]
     brief = Tags(ledger.brief(some).html)
     assert [a["href"] for a in brief.all("a") if a["href"].startswith("errata")] == targets
-    assert [a["href"] for a in Tags(ledger.links(some).html).all("a")] == targets
-    assert brief.cells[2:4] == ["Printed", "Recomputed, and note"]
+    links = ledger.links(some)
+    assert [a["href"] for a in Tags(links.html).all("a")] == targets
+    parts = dict.fromkeys((row.entry.document, row.entry.chapter) for row in some)
+    assert re.findall(r"<li>(.*?): <a", links.html) == [f"{document}, ch. {chapter}" for document, chapter in parts]
+    assert re.findall(r"<li>(.*?): <a", ledger.links([UNCHECKED]).html) == ["savage2016"]
+    assert brief.cells[:3] == ["Item", "Verdict", "Printed, recomputed, and note"]
+    assert re.search(r"<br>(.*?)</th>", ledger.brief(some[:1]).html)[1] == "hung1984, I"
+    eq20 = next(row for row in ROWS if row.entry.id == "hung1984.II.eq20")
+    assert re.search(r"<br>(.*?)</th>", ledger.brief([eq20]).html)[1] == "hung1984, II.6"
     undone = ledger.brief(some, left_undone=True)
-    assert Tags(undone.html).cells[2:4] == ["Left undone", "Our answer, and where"]
+    assert Tags(undone.html).cells[2] == "Left undone, and our answer"
+    assert 'class="ledger-table ledger-undone"' in undone.html
     assert repr(undone).startswith("<6 entries: ")
 
 
@@ -149,6 +164,17 @@ def test_the_chapter_of_the_check_is_linked_once():
     assert ledger.brief([row]).html.count('href="rounding.html"') == 1
     other = next(r for r in ROWS if owner.get(r.entry.id) == "rounding" and r.outcome == "verified")
     assert ledger.brief([other]).html.count('href="rounding.html"') == 1
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_told_tells_where_print_and_recomputation_differ_and_of_nothing_else(verdict):
+    agrees = {Verdict.VERIFIED: True, Verdict.ANSWERED: True, Verdict.UNVERIFIABLE: None}.get(verdict, False)
+    row = Row(INVENTORY[0], Finding("found", agrees, verdict, "a note"))
+    if agrees is False and verdict is not Verdict.OPEN:
+        assert ledger.told([row], row.entry.id) == (row,)
+    else:
+        with pytest.raises(ValueError, match=f"is {verdict.value}, no error"):
+            ledger.told([row], row.entry.id)
 
 
 def test_told_refuses_what_is_no_error():
@@ -194,12 +220,25 @@ def test_of_kind_and_of_ids_run_the_checks_of_those_alone(monkeypatch):
         ledger.of_ids("hung1984.none")
 
 
+def test_entries_of_a_kind_come_in_reading_order(monkeypatch):
+    monkeypatch.setattr(page, "load_inventory", lambda: INVENTORY[::-1])
+    monkeypatch.setattr(page, "examine", lambda entries, checks: tuple(Row(e, FINDINGS[0]) for e in entries))
+    claims = ledger.of_kind("claim")
+    assert claims == ledger.checking.in_reading_order(claims)
+    assert [row.entry for row in claims] != [entry for entry in INVENTORY[::-1] if entry.kind == "claim"]
+
+
 def test_a_check_that_raises_is_not_passed_over(monkeypatch):
-    broken = ValueError("broken")
-    monkeypatch.setattr(page, "examine", lambda entries, checks: tuple(Row(e, None, broken) for e in entries))
-    with pytest.raises(ExceptionGroup, match="checks of 2 entries failed") as caught:
-        ledger.of_ids("hung1984.II.eq8", "hung1982.III.eq18")
-    assert caught.value.exceptions == (broken,)
+    broken, other = ValueError("broken"), KeyError("other")
+    errors = (broken, other, broken, None)
+
+    def examine(entries, checks):
+        return tuple(Row(e, None if error else FINDINGS[0], error) for e, error in zip(entries, errors, strict=True))
+
+    monkeypatch.setattr(page, "examine", examine)
+    with pytest.raises(ExceptionGroup, match="checks of 3 entries failed") as caught:
+        ledger.of_ids("hung1984.II.eq8", "hung1982.III.eq18", "hung1984.II.eq9", "hung1984.II.eq20")
+    assert caught.value.exceptions == (broken, other)
 
 
 @pytest.mark.parametrize("by", ["document", "chapter", "kind"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html.parser import HTMLParser
 from urllib.parse import unquote, urljoin, urlsplit
 
@@ -32,6 +33,11 @@ def test_no_formula_or_table_is_left_as_typed(page):
         " e.querySelectorAll('pre, code, dt, script, mjx-container').forEach(x => x.remove()); return e.textContent }"
     )
     assert [line for line in text.splitlines() if "$" in line or "| --" in line or "| —" in line] == []
+
+
+def test_no_number_in_the_text_has_a_power_of_ten_as_typed(page):
+    numbers = page.locator(".pasted-text").all_text_contents()
+    assert [number for number in numbers if re.search(r"\de[+-]\d", number)] == []
 
 
 def test_every_picture_loads_and_has_alt_text(page):

@@ -1,0 +1,57 @@
+"""What is asked of the steps of every derivation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import pytest
+import sympy as sp
+
+from gpbnb.derivation import Derivation, Step
+
+AMOUNT = sp.Symbol("amount", positive=True)
+
+
+def collected(*functions: Callable[[], Derivation]) -> dict[str, Derivation]:
+    """Derivations by their names."""
+    return {function.__name__: function() for function in functions}
+
+
+def each(derivations: dict[str, Derivation]) -> pytest.MarkDecorator:
+    """A test for each `step` of some derivations."""
+    steps = [
+        pytest.param(step, id=f"{name}-{i}")
+        for name, found in derivations.items()
+        for i, step in enumerate(found.steps)
+    ]
+    return pytest.mark.parametrize("step", steps)
+
+
+def lengths(derivations: dict[str, Derivation]) -> dict[str, int]:
+    """The numbers of steps."""
+    return {name: len(found.steps) for name, found in derivations.items()}
+
+
+def wrong_ones(step: Step) -> Iterator[Step]:
+    """The step with other right sides and rests, under which it must not hold."""
+    yield replace(step, right=step.right + AMOUNT)
+    yield replace(step, right=2 * step.right if step.right != 0 else sp.S.One)
+    yield replace(step, rest=step.rest + 1)
+    yield replace(step, right=step.right + AMOUNT, rest=step.rest - AMOUNT)
+
+
+def check(step: Step, alike: bool = False) -> None:
+    """The step holds, would not hold if it were wrong, and is typeset; its sides look alike where it is said, alone."""
+    assert step.holds
+    assert step.name
+    assert step.name.count("$") % 2 == 0
+    for wrong in wrong_ones(step):
+        assert not wrong.holds
+    latex = step.latex()
+    left, right = latex.split(r"\;=\;")
+    assert (left.strip() == right.strip()) == alike
+    assert not re.search(r"[-+]\s*[-+]|\bnan\b|None|\?|\$", latex)
+    for opening, closing in (("{", "}"), (r"\left", r"\right")):
+        assert latex.count(opening) == latex.count(closing)

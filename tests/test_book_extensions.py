@@ -1,0 +1,215 @@
+"""book/_ext: what the book adds to Sphinx, piece by piece; tests/pages sees the whole."""
+
+from __future__ import annotations
+
+import importlib.util
+from enum import Enum
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from docutils import nodes
+from docutils.utils import new_document
+
+from gpbnb.ledger import load_inventory
+
+FOLDER = Path(__file__).resolve().parents[1] / "book" / "_ext"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+book, ledger = load("gpbnb_book"), load("gpbnb_ledger")
+
+
+# -- docstrings, labels, first page, MathJax -----------------------------------------------------------
+
+
+def unfolded(*lines):
+    found = list(lines)
+    book.unfold_fields(None, "function", "f", None, None, found)
+    return found
+
+
+@pytest.mark.parametrize("section", ["Parameters", "Returns", "Raises", "Attributes"])
+def test_a_field_in_one_line_becomes_two(section):
+    rule = "-" * len(section)
+    found = unfolded("About : f.", "", section, rule, "x, *args : the numbers: all", "    and more : of it", "")
+    assert found == ["About : f.", "", section, rule, "x, *args", "    the numbers: all", "    and more : of it", ""]
+
+
+def test_other_sections_stay_as_they_are():
+    lines = (
+        "Parameters",
+        "----------",
+        "x : one",
+        "References",
+        "----------",
+        "Higham : 2002",
+        "Notes",
+        "-----",
+        "a : b",
+    )
+    assert unfolded(*lines) == [*lines[:2], "x", "    one", *lines[3:]]
+
+
+def test_only_an_enum_hides_its_arguments():
+    colour = Enum("colour", ["RED"])
+    assert book.hide_enum_arguments(None, "class", "colour", colour, None, "(value)", None) == ("", None)
+    assert book.hide_enum_arguments(None, "class", "int", int, None, "(x)", None) is None
+    assert book.hide_enum_arguments(None, "function", "f", len, None, "(x)", None) is None
+
+
+def test_an_entry_is_labelled_with_its_key():
+    entries = [SimpleNamespace(key=key) for key in ("hung1984", "Higham2002")]
+    assert list(book.KeyLabels().format_labels(entries)) == ["hung1984", "Higham2002"]
+    assert book.ShortNames.default_label_style is book.KeyLabels
+
+
+def app(folder, builder="html"):
+    return SimpleNamespace(
+        outdir=str(folder),
+        builder=SimpleNamespace(name=builder, get_target_uri=lambda page: f"{page}.html"),
+        config=SimpleNamespace(root_doc="book/index", html_title="The title"),
+    )
+
+
+def test_the_first_page_leads_to_the_root(tmp_path):
+    book.write_first_page(app(tmp_path), None)
+    text = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert 'http-equiv="refresh" content="0; url=book/index.html"' in text
+    assert '<a href="book/index.html">' in text
+    assert text.count("The title") == 2
+
+
+def test_mathjax_comes_along_whole_and_no_more(tmp_path):
+    book.copy_mathjax(app(tmp_path), None)
+    target = tmp_path / "_static" / "mathjax"
+    for part in book.MATHJAX_PARTS:
+        assert (target / part).exists(), part
+    assert any((target / "output/chtml/fonts").rglob("*.woff*"))
+    assert {path.name for path in (target / "sre/mathmaps").iterdir()} == {"base.json", "en.json"}
+    assert not (target / "tex-svg.js").exists()
+
+
+def test_a_failed_build_is_left_alone(tmp_path):
+    book.write_first_page(app(tmp_path), ValueError("failed"))
+    book.copy_mathjax(app(tmp_path), ValueError("failed"))
+    assert list(tmp_path.iterdir()) == []
+
+
+# -- the ledger's rows as labels, its formulas and links -----------------------------------------------
+
+
+def environment(*pages):
+    standard = SimpleNamespace(labels={}, anonlabels={})
+    return SimpleNamespace(found_docs=set(pages), get_domain={"std": standard}.__getitem__, standard=standard)
+
+
+def test_each_entry_has_a_label():
+    env = environment(ledger.PAGE, "book/index")
+    ledger.add_labels(None, env)
+    inventory = load_inventory()
+    assert env.standard.labels.keys() == env.standard.anonlabels.keys() == {entry.id.lower() for entry in inventory}
+    for entry in inventory:
+        assert env.standard.anonlabels[entry.id.lower()] == (ledger.PAGE, entry.id)
+        assert env.standard.labels[entry.id.lower()][:2] == (ledger.PAGE, entry.id)
+    assert env.standard.labels["hung1984.ii.eq20"][2] == "hung1984, II, eq (20)"
+    assert env.standard.labels["savage2016.main.eq8"][2] == "savage2016, eq (8)"
+
+
+def test_without_its_page_the_ledger_has_no_labels():
+    env = environment("book/index")
+    ledger.add_labels(None, env)
+    assert env.standard.labels == env.standard.anonlabels == {}
+
+
+def tree(html):
+    document = new_document("page")
+    document += [nodes.paragraph("", "class"), nodes.raw(html, html, format="html")]
+    return document
+
+
+@pytest.mark.parametrize(
+    ("html", "wanted"),
+    [('<span class="math notranslate">\\(x\\)</span>', {"book/errata": True}), ("<table></table>", {})],
+)
+def test_mathjax_is_asked_for_where_html_has_formulas(html, wanted):
+    data = {"has_equations": {}}
+    math = SimpleNamespace(data=data)
+    env = SimpleNamespace(docname="book/errata", get_domain={"math": math}.__getitem__)
+    ledger.ask_for_mathjax(SimpleNamespace(env=env), tree(html))
+    assert data["has_equations"] == wanted
+
+
+LINKS = (
+    '<a href="rounding.html">r</a> <a href="errata.html#hung1984.II.eq20">e</a> <a href="https://a.org/x.html">o</a>'
+)
+
+
+def test_links_lead_within_where_all_pages_are_one(tmp_path):
+    document = tree(LINKS)
+    book.mend_links(app(tmp_path, "singlehtml"), document, "book/errata")
+    (raw,) = document.findall(nodes.raw)
+    mended = (
+        '<a href="#document-book/rounding">r</a> <a href="#hung1984.II.eq20">e</a> <a href="https://a.org/x.html">o</a>'
+    )
+    assert raw.astext() == raw.rawsource == mended
+
+
+def test_links_stay_where_pages_are_many(tmp_path):
+    document = tree(LINKS)
+    book.mend_links(app(tmp_path), document, "book/errata")
+    (raw,) = document.findall(nodes.raw)
+    assert raw.astext() == LINKS
+
+
+@pytest.mark.parametrize(
+    ("typed", "written"),
+    [
+        ("2.6490e+08", "2.6490\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10^8"),
+        ("-1e-08", "-1\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10^−8"),
+        ("1e", "1e"),
+    ],
+)
+def test_powers_of_ten_are_written_as_such(typed, written):
+    document = new_document("page")
+    document += nodes.paragraph("", "", nodes.inline("", typed, classes=["pasted-text"]), nodes.Text(" 1e-08"))
+    book.write_powers(None, document, "book/page")
+    shown = "".join(
+        f"^{part.astext()}" if isinstance(part.parent, nodes.superscript) else part.astext()
+        for part in document.findall(nodes.Text)
+    )
+    assert shown == f"{written} 1e-08"
+
+
+def table(*rows):
+    """A table as MyST makes it of Markdown, the first row its head."""
+    group = nodes.tgroup("", *(nodes.colspec() for _ in rows[0]), cols=len(rows[0]))
+    made = [nodes.row("", *(nodes.entry("", nodes.paragraph("", cell)) for cell in row)) for row in rows]
+    group += [nodes.thead("", made[0]), nodes.tbody("", *made[1:])]
+    return nodes.table("", group)
+
+
+def test_a_chapters_part_of_the_ledger_has_the_columns_of_the_whole():
+    document = new_document("page")
+    document += [table(ledger.HEADER, ("(20)", "wrong", "a", "b", "why")), table(("Item", "x"), ("1", "2"))]
+    ledger.join_columns(None, document)
+    (box,) = document.findall(nodes.container)
+    assert box["classes"] == ["ledger"]
+    head, row = box.findall(nodes.row)
+    assert [cell.astext() for cell in head] == ["Item", "Verdict", "Printed, recomputed, and note"]
+    assert [cell.astext() for cell in row[:2]] == ["(20)", "wrong"]
+    assert [(part.astext(), part["classes"]) for part in row[2]] == [
+        ("a", ["printed"]),
+        ("b", ["recomputed"]),
+        ("why", ["note"]),
+    ]
+    (group,) = box.findall(nodes.tgroup)
+    assert group["cols"] == len(list(group.findall(nodes.colspec))) == 3
+    assert "ledger-table" in group.parent["classes"]
+    assert [cell.astext() for cell in document[1].findall(nodes.entry)] == ["Item", "x", "1", "2"]
