@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gpbnb.measurement import ARCSEC, apply, deroll, rotation
+from gpbnb.measurement import ARCSEC, YEAR, apply, deroll, rotation
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -17,8 +17,6 @@ GEODETIC = 6.6 * ARCSEC
 """Drift in the plane of the orbit, of the size that was predicted for Gravity Probe B; radians a year."""
 MOTIONAL = 0.04 * ARCSEC
 """Drift across the plane of the orbit; radians a year."""
-YEAR = 365 * 86400.0
-"""Seconds of the year that hung1984 takes."""
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 GM = 3.986004e14

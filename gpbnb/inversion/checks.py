@@ -14,11 +14,11 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from gpbnb import ledger, linalg
-from gpbnb.bounds import column_sum_norm, exact
-from gpbnb.findings import Checks, Finding, Verdict, compare, unverifiable
+from gpbnb.bounds import column_sum_norm, exact, inverse_of
+from gpbnb.findings import Checks, Finding, Verdict, both, compare, unverifiable
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.inversion import bounds, derivation, example, experiment, procedure, theory
+from gpbnb.inversion import derivation, example, experiment, procedure, theory
 from gpbnb.inversion.theory import Reduction
 from gpbnb.ledger.inventory import load_inventory, quote
 
@@ -26,11 +26,6 @@ CHECKS = Checks()
 
 FOUR = FloatFormat(10, 4)
 Matrix = NDArray[Any]
-
-
-def both(place: str) -> tuple[str, str]:
-    """Ids of an entry that both reports have."""
-    return f"hung1984.II.{place}", f"hung1982.III.{place}"
 
 
 def in_brackets(key: str) -> str:
@@ -92,12 +87,6 @@ class Sample:
             step[k:, k - 1] = -self.lower[k:, k - 1]
             found.append(np.asarray(parts[k] - step @ parts[k - 1]))
         return found
-
-
-def inverse_of(a: Matrix) -> Matrix:
-    """The exact inverse."""
-    entries = [Fraction(int(x.p), int(x.q)) for x in bounds.true_inverse(a).entries()]
-    return np.array(entries, dtype=object).reshape(np.shape(a))
 
 
 @cache
@@ -203,10 +192,6 @@ def reference_33() -> Finding:
     )
 
 
-def _step(steps: Callable[[], Any], i: int) -> bool:
-    return bool(steps().steps[i].holds)
-
-
 @CHECKS.add("hung1984.II.eq34", "hung1984.II.eq35", "hung1984.II.eq36", "hung1984.II.eq37", "hung1984.II.eq38")
 def residuals() -> Finding:
     def holds(sample: Sample) -> bool:
@@ -216,7 +201,7 @@ def residuals() -> Finding:
 
     count = sum(map(holds, samples()))
     return compare(
-        count == len(samples()) and _step(derivation.first_approach, 0) and _step(derivation.first_approach, 1),
+        count == len(samples()) and derivation.first_approach().holds_at(0, 1),
         f"$E=A^{{-1}}R$ exactly, derived for every $n$ and computed for {count} of {len(samples())} inverses",
     )
 
@@ -232,7 +217,7 @@ def residual_norms() -> Finding:
 
     found = held(pairs)
     return compare(
-        found.fails == 0 and _step(derivation.first_approach_norms, 0),
+        found.fails == 0 and derivation.first_approach_norms().holds_at(0),
         f"{found}; error over bound up to {found.largest:.2g}",
         note="strict",
     )
@@ -264,14 +249,14 @@ def changed_residue() -> Finding:
 
 @CHECKS.add("hung1984.II.eq42")
 def changed_error() -> Finding:
-    return compare(_step(derivation.first_approach, 2), "the same, exactly, for every $n$")
+    return compare(derivation.first_approach().holds_at(2), "the same, exactly, for every $n$")
 
 
 @CHECKS.add("hung1982.III.eq42")
 def changed_error_1982() -> Finding:
     numbers = in_brackets("hung1982.III.eq42"), 42
     numbered, cited = (CHECKS.get(f"hung1982.III.eq{number}") for number in numbers)
-    right = _step(derivation.first_approach, 2)
+    right = derivation.first_approach().holds_at(2)
     return compare(
         numbered is changed_error_1982 and right,
         "the equation is right; (43) is the number of the next one, and the text below cites this one as (42)",
@@ -283,7 +268,7 @@ def changed_error_1982() -> Finding:
 @CHECKS.add(*both("s10.unnumbered-e"))
 def changed_matrix_error() -> Finding:
     return compare(
-        _step(derivation.first_approach, 3) and _step(derivation.first_approach, 4),
+        derivation.first_approach().holds_at(3, 4),
         "exact with the computed inverse; what $\\approx$ drops is $A^{-1}\\Delta A\\,E$",
         note="to first order, as $\\approx$ says",
     )
@@ -343,7 +328,7 @@ def relative_error() -> Finding:
 def relative_error_1982() -> Finding:
     _, below, count = _relative_equality()
     return compare(
-        below == count and _step(derivation.first_approach_norms, 0),
+        below == count and derivation.first_approach_norms().holds_at(0),
         f"at most in {below} of {count} cases",
         note="to first order in $\\Delta A$",
     )
@@ -489,7 +474,7 @@ def one_entry() -> Finding:
     )
     return compare(
         zero(one - derivation.printed_entry_error())
-        and _step(derivation.one_step, 0)
+        and derivation.one_step().holds_at(0)
         and all(zero(line - lines[0]) for line in lines[1:]),
         "the same, to first order, with one $\\epsilon$ for division, product and sum",
         note="with an error for each, $\\epsilon_3a(1)-(\\epsilon_1+\\epsilon_2)(a(0)-a(1))$",
@@ -1287,7 +1272,7 @@ def columns_again() -> Finding:
 @CHECKS.add("hung1984.II.eq94", "hung1982.III.eq93-94", *both("s11-3.claim-similar-to-68"), "hung1984.II.eq95")
 def resultant_error() -> Finding:
     return compare(
-        derivation.perturbed_system().holds and _step(derivation.two_systems, 4),
+        derivation.perturbed_system().holds and derivation.two_systems().holds_at(4),
         "right to first order, with the $\\delta A$ and $\\delta b_j$ of the system that was solved",
         note="each column has its own $\\Delta A$; with $A^{-1}$ for $\\hat A^{-1}$ it is exact",
     )

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from gpbnb import ledger
 from gpbnb.bounds import column_sum_norm, exact, max_norm
-from gpbnb.findings import Check, Checks, Finding, Verdict, answer, compare, unverifiable
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.findings import Check, Checks, Finding, Verdict, answer, both, compare, unverifiable
+from gpbnb.formats import FloatFormat, Rounding, prints_as
 from gpbnb.kalman import derivation, experiment, smallest, theory, year
-from gpbnb.kalman.tables import scientific
 from gpbnb.ledger.inventory import quote
+from gpbnb.tables import scientific
 
 CHECKS = Checks()
 
@@ -26,11 +26,6 @@ CHAPTER = "chapter *Kalman bound*"
 YEAR, STEP = 365 * 24 * 3600, 10  # seconds
 GOAL, SIGNAL = 1, 6606  # mas a year: the experiment's goal, and the larger of the drifts that relativity predicts
 N, M = derivation.N, derivation.M
-
-
-def both(place: str) -> tuple[str, str]:
-    """Ids of an entry that both reports have."""
-    return f"hung1984.II.{place}", f"hung1982.III.{place}"
 
 
 # -- material -------------------------------------------------------------------------------------
@@ -137,12 +132,6 @@ def printed(statement: str, algebra: bool, note: str, text: str = "", name: str 
         Verdict.WRONG,
         otherwise_note=note,
     )
-
-
-def step_holds(name: str, number: int) -> bool:
-    """Whether a step of a derivation holds."""
-    steps = getattr(derivation, name)()
-    return bool(steps.steps[number].holds)
 
 
 # -- the filter, (98)-(101) -----------------------------------------------------------------------
@@ -255,7 +244,7 @@ _CANCELS = "as (30): the error of a product is no multiple of the product, which
 def rounded_prediction() -> Finding:
     return printed(
         "(102)",
-        step_holds("report", 0),
+        derivation.report().holds_at(0),
         f"{_CANCELS}; the inequality of (103) also takes $\\epsilon$ for positive, and the error of $P_{{k-1}}$, which "
         "earlier steps made, is left out",
     )
@@ -265,7 +254,7 @@ def rounded_prediction() -> Finding:
 def rounded_covariance() -> Finding:
     return printed(
         "(104)",
-        step_holds("report", 1),
+        derivation.report().holds_at(1),
         "the hat of $P_{kp}$, missing in the first line, is there in the second. Even with every term kept and signs "
         "free: the gain is taken to have no error, though it is computed, and "
         "$I-KH$ magnifies its error by $KP_{kp}/P_k$",
@@ -277,7 +266,7 @@ def rounded_covariance() -> Finding:
 def covariance_bound() -> Finding:
     return printed(
         "(105)",
-        step_holds("report", 1) and derivation.smallest().holds,
+        derivation.report().holds_at(1) and derivation.smallest().holds,
         "$-m\\epsilon P_{kp}$ is dropped as if $\\epsilon$ were positive; $P_{kp}/P_k=1/(1-KH)$ has no limit, and "
         "$P=H=1$ with $R$ below the last digit breaks the bound by $1/(6\\beta)$ in every format; also "
         "$K_kP_k$ for $K_kH_k$, and an $\\epsilon$ is missing in the second line",
@@ -286,7 +275,7 @@ def covariance_bound() -> Finding:
 
 @CHECKS.add(*both("eq106"))
 def rounded_gain() -> Finding:
-    return printed("(106)", step_holds("report", 2), _CANCELS, " of $n+m$ roundings")
+    return printed("(106)", derivation.report().holds_at(2), _CANCELS, " of $n+m$ roundings")
 
 
 @CHECKS.add(*both("s12.r-1-rounding"))
@@ -301,7 +290,7 @@ def inverse_of_r() -> Finding:
 
 @CHECKS.add(*both("eq107"))
 def gain_error() -> Finding:
-    return printed("(107)", step_holds("report", 2), "with the covariance of (104), whose gain has no error")
+    return printed("(107)", derivation.report().holds_at(2), "with the covariance of (104), whose gain has no error")
 
 
 @CHECKS.add(*both("eq108"))
@@ -310,7 +299,7 @@ def gain_bound() -> Finding:
     matrices = smallest.ratios(FOUR, smallest.correlated()).gain
     return printed(
         "(108)",
-        step_holds("report", 2) and derivation.smallest().holds,
+        derivation.report().holds_at(2) and derivation.smallest().holds,
         f"$-m\\epsilon P_{{kp}}H^TR^{{-1}}$ is dropped as in (105); with the first form of (99) it holds for one state "
         f"in the first step, and is exceeded {later:.3g} times in the second, or {matrices:.3g} times with two states",
     )
@@ -338,7 +327,7 @@ def closed_loop() -> Finding:
 
 @CHECKS.add("hung1984.II.eq112")
 def rounded_loop() -> Finding:
-    return printed("(112)", step_holds("report", 3), "with the gain of (108), which fails")
+    return printed("(112)", derivation.report().holds_at(3), "with the gain of (108), which fails")
 
 
 #: What the last line of (112) in 1982 multiplies by the number it takes away.
@@ -359,7 +348,7 @@ def rounded_loop_1982() -> Finding:
 
 @CHECKS.add("hung1984.II.eq113")
 def rounded_input() -> Finding:
-    return printed("(113)", step_holds("report", 4), "with the gain of (108), which fails")
+    return printed("(113)", derivation.report().holds_at(4), "with the gain of (108), which fails")
 
 
 @CHECKS.add("hung1982.III.eq113")
@@ -373,7 +362,7 @@ def rounded_input_1982() -> Finding:
     ]
     return printed(
         "(113)",
-        bool(sp.expand(gain - shown) == 0) and step_holds("report", 4),
+        bool(sp.expand(gain - shown) == 0) and derivation.report().holds_at(4),
         "with the gain of (108), which fails; $3n$ is the scan's or a slip for the $4n$ of (108), since (119) goes on "
         "with $4n$",
         f", which gives ${sp.latex(gain)}$ for the gain and ${sp.latex(ways[0])}$ in (119), as printed there; "
@@ -385,7 +374,7 @@ def rounded_input_1982() -> Finding:
 def rounded_state() -> Finding:
     return printed(
         "(114)",
-        step_holds("report", 5),
+        derivation.report().holds_at(5),
         "$-(4n+3m+3)\\epsilon\\Phi$ of (112) is dropped as if $\\epsilon$ were positive",
     )
 
@@ -408,7 +397,7 @@ def rewritten() -> Finding:
     return compare(
         bool(
             sp.expand(error - loop * derivation.FK * derivation.X - entered * derivation.U) == 0
-            and step_holds("report", 5)
+            and derivation.report().holds_at(5)
         ),
         "(114) with the counts of (115) and (116)",
         note="with these letters no further rounding is due",
@@ -542,7 +531,7 @@ def three_steps_bounded() -> Finding:
 
 @CHECKS.add("hung1984.II.eq124")
 def four_steps_bounded() -> Finding:
-    return printed("(124)", step_holds("general", 9), _NO_BOUND)
+    return printed("(124)", derivation.general().holds_at(9), _NO_BOUND)
 
 
 @CHECKS.add("hung1984.II.eq125", "hung1982.III.eq124-125", *both("s12.claim-main-result"))
@@ -613,7 +602,7 @@ def usefulness() -> Finding:
 @CHECKS.add("hung1984.II.s12.example-sampling", "hung1984.II.s12.example-k", "hung1982.III.s12.example-k")
 def steps_of_a_year() -> Finding:
     k = Fraction(YEAR, STEP)
-    return compare(k == theory.EXAMPLE[0] and theory.prints_as(k, "3.1536e6"), f"${int(k)}$")
+    return compare(k == theory.EXAMPLE[0] and prints_as(k, "3.1536e6"), f"${int(k)}$")
 
 
 @CHECKS.add("hung1984.II.s12.example-n-m", "hung1982.III.s12.example-n-m-and-sampling")
@@ -626,7 +615,7 @@ def dimensions() -> Finding:
 
 def example_number(name: str, value: Fraction | int, text: str, note: str) -> Finding:
     shown = theory.PRINTED[name]
-    return compare(theory.prints_as(value, shown), text, Verdict.WRONG, otherwise_note=note)
+    return compare(prints_as(value, shown), text, Verdict.WRONG, otherwise_note=note)
 
 
 @CHECKS.add(*both("s12.example-first-coefficient"))
@@ -646,7 +635,7 @@ def first_coefficient() -> Finding:
 def second_coefficient() -> Finding:
     value = theory.coefficients(*theory.EXAMPLE).second
     product = theory.read_as_product(*theory.EXAMPLE, 84)
-    found = theory.prints_as(product, theory.PRINTED["second coefficient"])
+    found = prints_as(product, theory.PRINTED["second coefficient"])
     return example_number(
         "second coefficient",
         value,
@@ -672,7 +661,7 @@ def formula_8() -> Finding:
 def first_beta() -> Finding:
     beta = Fraction(1, theory.coefficients(*theory.EXAMPLE).first)
     return compare(
-        theory.prints_as(beta, ".3775e8"),
+        prints_as(beta, ".3775e8"),
         scientific(beta, 4),
         Verdict.WRONG,
         otherwise_note="one over the printed coefficient, which is wrong, is $.3775\\times10^{-8}$; a sign is lost",

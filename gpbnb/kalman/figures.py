@@ -14,8 +14,19 @@ from gpbnb.kalman.answers import Answers, decimal_digits, largest
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.experiment import Bounded, Form
 from gpbnb.kalman.year import Year
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
-from gpbnb.tables import digits
+from gpbnb.plotting import (
+    BOUND,
+    COLOURS,
+    OBSERVED,
+    OBSERVED_OTHERS,
+    REFERENCE,
+    STRICT,
+    colours,
+    label,
+    legend,
+    loglog,
+)
+from gpbnb.tables import arithmetic
 
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",
@@ -40,11 +51,8 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = No
     """
     if quantity not in _QUANTITIES:
         raise ValueError(f"got quantity {quantity!r}; needed one of {', '.join(_QUANTITIES)}")
-    colours = (OBSERVED, *OBSERVED_OTHERS, STRICT, REFERENCE)
-    if len(runs) > len(colours):
-        raise ValueError(f"got {len(runs)} curves; needed at most {len(colours)}; draw two figures")
     artists: list[Artist] = []
-    for run, colour in zip(runs, colours, strict=False):
+    for run, colour in zip(runs, colours(len(runs), (*COLOURS, STRICT, REFERENCE)), strict=True):
         values = np.abs(getattr(run, quantity))
         if values.ndim > 1:
             values = values.max(axis=1)
@@ -56,8 +64,7 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = No
         )
     if goal is not None:
         artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     label(ax, "step $k$", _QUANTITIES[quantity])
     return artists
 
@@ -81,9 +88,7 @@ def _name(run: Year) -> str:
     fmt = run.case.fmt
     if fmt is None:
         return "reference"
-    chopped = ", chopped" if fmt.rounding is Rounding.CHOP else ""
-    form = "" if run.case.form is Form.REPORT else f", {run.case.form}"
-    return f"{digits(fmt)}{chopped}{form}"
+    return arithmetic(fmt) + ("" if run.case.form is Form.REPORT else f", {run.case.form}")
 
 
 def year_end(
@@ -189,8 +194,7 @@ def contraction(found: Bounded, state: int, ax: Axes, name: str) -> list[Artist]
     seen = error > 0
     artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
     artists += ax.plot(steps, found.state[:, state], color=BOUND, label="contraction bound")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax)
     label(ax, "step $k$", f"error of {name}")
     return artists

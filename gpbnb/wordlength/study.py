@@ -15,7 +15,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.bounds import exact
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.inversion.bounds import rationals, smallest_precision, true_inverse
+from gpbnb.inversion.bounds import column_sum, rationals, smallest_precision, true_inverse
 from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision
@@ -305,15 +305,10 @@ def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = R
         raise ValueError(f"{name}: got goal {goal}; needed a relative error above 0")
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
-    conditions = [_column_sum(rationals(a)) * _column_sum(true_inverse(a)) for a in (matrix, scaled)]
+    conditions = [column_sum(rationals(a)) * column_sum(true_inverse(a)) for a in (matrix, scaled)]
     expected = digits_of_125(conditions[1], Fraction(goal), 2, rounding)
     proved = smallest_precision(matrix, goal, 2, rounding).fmt.precision
     return Inverse(name, float(conditions[0]), float(conditions[1]), expected, proved)
-
-
-def _column_sum(matrix: Any) -> Fraction:
-    columns = matrix.transpose().tolist()
-    return max(sum((abs(Fraction(int(e.p), int(e.q))) for e in column), Fraction(0)) for column in columns)
 
 
 def in_units(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:

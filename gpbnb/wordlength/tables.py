@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.kalman.precision import Requirement
-from gpbnb.kalman.tables import arithmetic, short
-from gpbnb.tables import Table, digits
+from gpbnb.tables import Table, arithmetic, digits, short
 from gpbnb.wordlength.examples import ACCELERATORS, NORMAL, STANDARD
 from gpbnb.wordlength.study import Deafness, Inverse, Span
 

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 
+import faults
 import numpy as np
 import pytest
 import sympy as sp
 
-from gpbnb import ledger
 from gpbnb.derivation import Derivation, Step
 from gpbnb.findings import Verdict
 from gpbnb.geometry import checks, derivation, experiment, theory
 from gpbnb.measurement import ARCSEC, deroll
 
-INVENTORY = ledger.load_inventory()
+INVENTORY = faults.INVENTORY
 ENTRIES = [entry for entry in INVENTORY if entry.id in checks.CHECKS]
-FUNCTIONS = {check.__name__: check for check in checks.CHECKS.values()}
+FUNCTIONS = faults.functions(checks.CHECKS)
 
 
 @pytest.fixture(scope="module")
 def rows():
-    return ledger.rows(ENTRIES, topics=["gpbnb.geometry.checks"])
+    return faults.examined(ENTRIES)
 
 
 def test_every_entry_of_chapter_iv_has_a_check_here():
@@ -41,7 +41,7 @@ def test_verdicts(rows):
         "unverifiable": 2,
         "answered": 2,
     }
-    assert {row.entry.id for row in rows if row.finding.verdict is Verdict.WRONG} == {
+    assert faults.by_verdict(rows)[Verdict.WRONG] == {
         "hung1982.IV.eq8",
         "hung1982.IV.eq9",
         "hung1982.IV.identity-transformation",
@@ -49,10 +49,8 @@ def test_verdicts(rows):
 
 
 def test_findings_have_their_notes_and_numbers(rows):
+    faults.check_texts(rows)
     found = {row.entry.id.removeprefix("hung1982."): row.finding for row in rows}
-    for finding in found.values():
-        if finding.verdict is not Verdict.VERIFIED:
-            assert finding.note
     assert "0, 45, 90 degrees" in found["IV.deltas-zero"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
     assert "signs to change: 2, before C, C" in found["IV.eq8"].recomputed
@@ -62,13 +60,8 @@ def test_findings_have_their_notes_and_numbers(rows):
 
 @pytest.fixture
 def patch(monkeypatch):
-    def clear():
-        checks.deroll_steps.cache_clear()
-        checks.mending.cache_clear()
-
-    clear()
-    yield monkeypatch.setattr
-    clear()
+    with faults.forgetting(monkeypatch, checks):
+        yield monkeypatch.setattr
 
 
 def wrong_steps(names):
@@ -112,7 +105,7 @@ DISAGREE = [
 def test_what_agrees_could_disagree(patch, name, target, attribute, value):
     assert FUNCTIONS[name]().agrees is True
     patch(target, attribute, value)
-    checks.deroll_steps.cache_clear()
+    faults.forget(checks)
     assert FUNCTIONS[name]().agrees is False
 
 

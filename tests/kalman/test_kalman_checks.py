@@ -5,41 +5,29 @@ from __future__ import annotations
 from collections import Counter
 from fractions import Fraction
 
+import faults
 import numpy as np
 import pytest
 import sympy as sp
+from faults import all_of, always, breaks, finding, replace
 
 from gpbnb import ledger
 from gpbnb.derivation import Derivation, Step
 from gpbnb.findings import Verdict
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman import checks, derivation, smallest, theory
-from gpbnb.ledger.checking import load_checks
 
-INVENTORY = ledger.load_inventory()
+INVENTORY = faults.INVENTORY
 ENTRIES = (
     *ledger.select(INVENTORY, "hung1984", "II", (12, 13, 14)),
     *ledger.select(INVENTORY, "hung1982", "III", (12, 13)),
 )
-FUNCTIONS = {check.__name__: check for check in checks.CHECKS.values()}
-CACHED = (
-    checks.filtered,
-    checks.optimal,
-    checks.excess,
-    checks.loops_close,
-    checks.refined,
-    checks.year_again,
-    checks.needed_precision,
-)
+FUNCTIONS = faults.functions(checks.CHECKS)
 
 
 @pytest.fixture(scope="module")
 def rows():
-    return ledger.examine(ENTRIES, load_checks(INVENTORY))
-
-
-def finding(rows, key):
-    return next(row.finding for row in rows if row.entry.id == key)
+    return faults.examined(ENTRIES)
 
 
 # -- the present state ----------------------------------------------------------------------------
@@ -52,7 +40,6 @@ def test_every_entry_of_the_sections_has_a_check_here_and_no_other_has():
 
 def test_verdicts_by_document(rows):
     """The present state: to be changed knowingly."""
-    assert [row.entry.id for row in rows if row.finding is None] == []
     counts = {
         document: Counter(row.outcome for row in rows if row.entry.document == document)
         for document in ("hung1984", "hung1982")
@@ -79,9 +66,7 @@ def test_verdicts_by_document(rows):
 
 
 def test_no_finding_is_without_a_note_where_it_differs(rows):
-    for row in rows:
-        assert row.finding.note or row.finding.verdict is Verdict.VERIFIED
-        assert row.finding.recomputed or row.finding.agrees is None
+    faults.check_texts(rows)
 
 
 def test_findings_quote_the_computed_numbers(rows):
@@ -108,36 +93,15 @@ def test_findings_quote_the_computed_numbers(rows):
 @pytest.fixture
 def patch(monkeypatch):
     """Change the code, with nothing remembered; undone, and forgotten, afterwards."""
-    for cached in CACHED:
-        cached.cache_clear()
-    yield monkeypatch
-    monkeypatch.undo()
-    for cached in CACHED:
-        cached.cache_clear()
+    with faults.forgetting(monkeypatch, checks):
+        yield monkeypatch
 
 
-def replace(module, name, value):
-    return lambda patch: patch.setattr(module, name, value)
-
-
-def all_of(*changes):
-    def apply(patch):
-        for change in changes:
-            change(patch)
-
-    return apply
-
-
-WRONG = Derivation((Step("wrong", sp.Integer(1), sp.Integer(2)),) * 12)
 RIGHT = Derivation((Step("right", sp.Integer(1), sp.Integer(1)),) * 12)
 
 
 def fails(name):
-    return replace(derivation, name, lambda: WRONG)
-
-
-def always(value):
-    return lambda *_, **__: value
+    return breaks(derivation, name)
 
 
 STEP = theory.exact_step
@@ -193,11 +157,10 @@ DISAGREE = [
 
 
 @pytest.mark.parametrize(("name", "change"), DISAGREE)
-def test_a_check_that_agrees_can_disagree(patch, name, change):
+def test_a_check_that_agrees_can_disagree(rows, patch, name, change):
+    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {True}
     change(patch)
-    found = FUNCTIONS[name]()
-    assert found.agrees is False
-    assert found.verdict not in (Verdict.VERIFIED, Verdict.ANSWERED)
+    faults.check_disagrees(FUNCTIONS[name])
 
 
 #: For each check that disagrees, changes under which print and code say the same.
@@ -277,11 +240,9 @@ AGREE = [
 
 @pytest.mark.parametrize(("name", "change"), AGREE)
 def test_a_check_that_disagrees_can_agree(rows, patch, name, change):
-    assert all(row.finding.agrees is False for row in rows if checks.CHECKS[row.entry.id] is FUNCTIONS[name])
+    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {False}
     change(patch)
-    found = FUNCTIONS[name]()
-    assert found.agrees is True
-    assert found.verdict is Verdict.VERIFIED
+    faults.check_agrees(FUNCTIONS[name])
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,8 +22,13 @@ MODEL = LinearModel(
 Z = Simulation(MODEL, (3.0, -1.0), 0, resolution=2.0**-30).measurements(STEPS)
 
 
-def error(fmt, form=Form.USUAL, z=Z):
-    return np.abs(emulate(MODEL, z, fmt, form, range(1, STEPS + 1), reference(MODEL, z, range(1, STEPS + 1))).state)
+@cache
+def true():
+    return reference(MODEL, Z, range(1, STEPS + 1))
+
+
+def error(fmt):
+    return np.abs(emulate(MODEL, Z, fmt, Form.USUAL, range(1, STEPS + 1), true()).state)
 
 
 @pytest.mark.parametrize("rounding", list(Rounding))
@@ -54,22 +60,32 @@ def test_errors_of_storing_the_model_count():
     assert error(found.fmt).max() <= 3e-3
 
 
-def upward(model, z, goal, base, **options):
-    """The slow way: every precision from 2 up, until two in succession meet the goal."""
+def errors_in(model, z, base, options):
+    """Largest error of each state in so many digits; None where the run is lost."""
     form, rounding = options.get("form", Form.USUAL), options.get("rounding", Rounding.NEAREST)
     marks = log_spaced(len(z), 16)
-    true, met = reference(model, z, marks), []
-    for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
+    true = reference(model, z, marks)
+
+    @cache  # for all goals
+    def largest(digits):
         fmt = FloatFormat(base, digits, rounding)
         try:
             if options.get("basis") == "bound":
-                errors, lost = bounded(model, z, fmt, form, marks).state, False
-            else:
-                history = emulate(model, z, fmt, form, marks, true)
-                errors, lost = history.state, history.indefinite or history.stopped
+                return bounded(model, z, fmt, form, marks).state.max(axis=0)
+            history = emulate(model, z, fmt, form, marks, true)
         except ValueError:
-            errors, lost = None, True
-        met.append(not lost and bool((np.abs(errors) <= goal).all()))
+            return None
+        return None if history.indefinite or history.stopped else np.abs(history.state).max(axis=0)
+
+    return largest
+
+
+def upward(largest, goal, base):
+    """The slow way: every precision from 2 up, until two in succession meet the goal."""
+    met = []
+    for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
+        errors = largest(digits)
+        met.append(errors is not None and bool((errors <= goal).all()))
         if met[-2:] == [True, True]:
             return digits - 1, met
     return (digits if met[-1] else None), met
@@ -104,9 +120,10 @@ def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
     model, z = MODELS[name]
     if z is model:
         z = Simulation(model, tuple(model.x0.astype(float)), 0, resolution=2.0**-30).measurements(40)
+    largest = errors_in(model, z, base, options)
     for goal in (1e-1, 1e-4, 1e-7):
         found = required_precision(model, len(z), goal, base, z=z, **options)
-        digits, met = upward(model, z, goal, base, **options)
+        digits, met = upward(largest, goal, base)
         assert (found.fmt.precision if found.fmt else None) == digits
         assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
         assert len(found.tried) <= 8  # of up to 52

@@ -22,6 +22,7 @@ def main() -> None:
             link.symlink_to(Path("..") / name)
     with tools.serve(SINGLE) as base, tools.launch() as browser:
         page = browser.new_page(color_scheme="light")
+        page.set_default_timeout(600_000)
         page.goto(base + "book/index.html", wait_until="load")
         page.evaluate("document.querySelectorAll('img').forEach(i => i.loading = 'eager')")
         page.evaluate(tools.SETTLED)

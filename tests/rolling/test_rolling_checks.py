@@ -7,24 +7,24 @@ import math
 from collections import Counter
 from dataclasses import replace as changed
 
+import faults
 import numpy as np
 import pytest
 import sympy as sp
+from faults import always, breaks, replace, times
 
 from gpbnb import ledger
 from gpbnb.derivation import Derivation, Step
 from gpbnb.findings import Checks, Verdict
-from gpbnb.ledger.checking import load_checks
 from gpbnb.rolling import checks, derivation, experiment, theory
 
-INVENTORY = ledger.load_inventory()
-ENTRIES = ledger.select(INVENTORY, "hung1984", "III")
-FUNCTIONS = {check.__name__: check for check in checks.CHECKS.values()}
+ENTRIES = ledger.select(faults.INVENTORY, "hung1984", "III")
+FUNCTIONS = faults.functions(checks.CHECKS)
 
 
 @pytest.fixture(scope="module")
 def rows():
-    return ledger.examine(ENTRIES, load_checks(INVENTORY, ["gpbnb.rolling.checks"]))
+    return faults.examined(ENTRIES)
 
 
 def test_every_entry_of_the_chapter_has_a_check_here():
@@ -34,7 +34,6 @@ def test_every_entry_of_the_chapter_has_a_check_here():
 
 def test_verdicts(rows):
     """The present state: to be changed knowingly."""
-    assert [row.entry.id for row in rows if row.error is not None] == []
     assert Counter(row.outcome for row in rows) == {
         "verified": 46,
         "typo": 7,
@@ -45,7 +44,7 @@ def test_verdicts(rows):
 
 
 def test_which_are_not_right_as_printed(rows):
-    found = {verdict: {row.entry.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
+    found = faults.by_verdict(rows)
 
     def ids(*places):
         return {f"hung1984.III.{place}" for place in places}
@@ -67,50 +66,14 @@ def test_which_are_not_right_as_printed(rows):
 
 
 def test_no_finding_is_without_a_note_where_it_differs(rows):
-    for row in rows:
-        if row.finding.verdict is not Verdict.VERIFIED:
-            assert row.finding.note
-        if row.finding.agrees is not None:
-            assert row.finding.recomputed
-
-
-@pytest.mark.parametrize(
-    ("value", "printed", "same"),
-    [
-        (0.99999998766, ".999999987", True),  # chopped
-        (0.99999998766, ".999999988", True),  # rounded
-        (0.99999998766, ".999999989", False),
-        (1.2566e8, "1.2566e8", True),
-        (1.2567e8, "1.2566e8", False),
-        (0.0076, ".0004", False),
-        (0.00039996, ".0004", True),
-        (1.2337e-6, "1.234e-6", True),
-        (1.2337e-7, "1.234e-6", False),
-    ],
-)
-def test_same_digits(value, printed, same):
-    assert checks.same_digits(value, printed) is same
+    faults.check_texts(rows)
 
 
 # -- each check can come out otherwise ------------------------------------------------------------
 
 
-def replace(module, name, value):
-    return lambda patch: patch.setattr(module, name, value)
-
-
-def always(value):
-    return lambda *_, **__: value
-
-
-def times(module, name, factor):
-    function = getattr(module, name)
-    return replace(module, name, lambda *given, **named: function(*given, **named) * factor)
-
-
 def fails(name):
-    wrong = Derivation((Step("wrong", sp.Integer(1), sp.Integer(2)),) * 9)
-    return replace(derivation, name, always(wrong))
+    return breaks(derivation, name)
 
 
 def changes(name, function):
@@ -232,11 +195,10 @@ DISAGREE = [
 
 
 @pytest.mark.parametrize(("name", "change"), DISAGREE)
-def test_a_check_that_agrees_can_disagree(monkeypatch, name, change):
+def test_a_check_that_agrees_can_disagree(rows, monkeypatch, name, change):
+    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {True}
     change(monkeypatch)
-    found = FUNCTIONS[name]()
-    assert found.agrees is False
-    assert found.verdict not in (Verdict.VERIFIED, Verdict.ANSWERED)
+    faults.check_disagrees(FUNCTIONS[name])
 
 
 #: For each check that disagrees, changes under which print and code say the same.
@@ -262,11 +224,9 @@ AGREE = [
 
 @pytest.mark.parametrize(("name", "change"), AGREE)
 def test_a_check_that_disagrees_can_agree(rows, monkeypatch, name, change):
-    assert all(row.finding.agrees is False for row in rows if checks.CHECKS[row.entry.id] is FUNCTIONS[name])
+    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {False}
     change(monkeypatch)
-    found = FUNCTIONS[name]()
-    assert found.agrees is True
-    assert found.verdict is Verdict.VERIFIED
+    faults.check_agrees(FUNCTIONS[name])
 
 
 @pytest.mark.parametrize(

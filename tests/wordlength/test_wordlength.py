@@ -8,7 +8,6 @@ from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Context, Decimal, localcontext
 from fractions import Fraction
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -28,14 +27,6 @@ Z = examples.tilt_measurements(300)
 GOAL = (0.01, math.inf, math.inf)
 FOUND = Requirement(FloatFormat(2, 17), "emulation", 300, ((16, 2.0), (17, 0.5), (18, 0.4)))
 NONE = replace(FOUND, fmt=None)
-
-
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()
-    plt.close("all")
 
 
 # -- examples -----------------------------------------------------------------------------------------
