@@ -55,7 +55,7 @@ def processors() -> Table:
     body = []
     for name, fmt in (STANDARD | ACCELERATORS).items():
         low, high = NORMAL[name]
-        told = f"`FloatFormat({fmt.base}, {fmt.precision})`"
+        told = f"FloatFormat({fmt.base}, {fmt.precision})"
         body.append((name, told, short(float(fmt.unit_roundoff)), f"$2^{{{low}}}$", f"$2^{{{high + 1}}}$"))
     header = ("format", "here", "unit roundoff", "normal from", "and below")
     return Table(f"{len(body)} formats of processors", header, tuple(body))
