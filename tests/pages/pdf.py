@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from . import browser as tools
@@ -12,6 +13,21 @@ FOOTER = (
     '<div style="width: 100%; font-size: 8px; text-align: center">'
     '<span class="pageNumber"></span> / <span class="totalPages"></span></div>'
 )
+
+
+def dead_links(pdf: bytes) -> set[str]:
+    """Links that lead out to the server that is gone, or to a place that is not there.
+
+    Chromium writes annotations and the table of named places uncompressed.
+    """
+    outside = set(re.findall(rb"/URI \((http://127\.[^)]*)\)", pdf))
+    asked = set(re.findall(rb"/Dest /([^\s/<>\[\]()]+)", pdf))
+    table = re.search(rb"/Dests (\d+) 0 R", pdf)
+    if not asked or not table:
+        raise SystemExit("The PDF has no links within it; Chromium writes them otherwise than before.")
+    start = re.search(rb"(?m)^%b 0 obj$" % table[1], pdf).end()
+    there = set(re.findall(rb"/([^\s/<>\[\]()]+) \[", pdf[start : pdf.index(b"endobj", start)]))
+    return {name.decode() for name in outside | (asked - there)}
 
 
 def main() -> None:
@@ -37,6 +53,8 @@ def main() -> None:
             header_template="<span></span>",
             footer_template=FOOTER,
         )
+    if dead := dead_links(PDF.read_bytes()):
+        raise SystemExit(f"Links of the PDF that lead nowhere: {', '.join(sorted(dead))}")
     print(f"{PDF.parent.name}/{PDF.name}: {PDF.stat().st_size / 1e6:.1f} MB")
 
 
