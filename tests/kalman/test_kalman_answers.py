@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from gpbnb import plotting
-from gpbnb.formats import Rounding
+from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman import answers, figures, theory, year
 
 
@@ -22,6 +26,26 @@ def test_the_answers_are_those_of_the_example_and_of_the_years():
         fewer = [r for r in found.runs if r.case.rounding is rounding and answers.decimal_digits(r.case.fmt) < digits]
         assert fewer
         assert min(answers.end(run) for run in fewer) > 1
+
+
+@pytest.mark.parametrize("digits", [1, 9, 17])
+def test_digits_are_those_of_the_format_and_chopping_costs_as_much_as_a_factor_of_two(digits):
+    assert answers.decimal_digits(FloatFormat(10, digits)) == pytest.approx(digits, abs=1e-12)
+    chopped = answers.decimal_digits(FloatFormat(10, digits, Rounding.CHOP))
+    assert digits - chopped == pytest.approx(math.log10(2), abs=1e-12)
+    # half a unit of the last of 53 bits is 2**-53, and 0.5 * 10**(1 - t) is that for t = 1 + 52 log10(2)
+    assert answers.decimal_digits(FloatFormat(2, 53)) == pytest.approx(1 + 52 * math.log10(2), abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [5.0, -5.0])
+@pytest.mark.parametrize("part", ["drift", "rate"])
+@pytest.mark.parametrize("column", [0, -1])
+def test_the_end_is_the_largest_error_of_the_last_step(part, column, size):
+    run = year.load()[0]
+    zeros = {name: np.zeros_like(getattr(run, name)) for name in ("drift", "rate")}
+    zeros[part][-1, column] = size
+    zeros[part][0] = 9.0
+    assert answers.end(replace(run, **zeros)) == 5.0
 
 
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
