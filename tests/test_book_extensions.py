@@ -90,6 +90,7 @@ def test_mathjax_comes_along_whole_and_no_more(tmp_path):
     book.copy_mathjax(app(tmp_path), None)
     target = tmp_path / "_static" / "mathjax"
     for part in book.MATHJAX_PARTS:
+        assert (target / part).is_file() == part.endswith((".js", ".json")), part
         assert (target / part).exists(), part
     assert any((target / "output/chtml/fonts").rglob("*.woff*"))
     assert {path.name for path in (target / "sre/mathmaps").iterdir()} == {"base.json", "en.json"}
@@ -130,8 +131,17 @@ def test_without_its_page_the_ledger_has_no_labels():
 
 def tree(html):
     document = new_document("page")
-    document += [nodes.paragraph("", "class"), nodes.raw(html, html, format="html")]
+    document += [
+        nodes.paragraph("", "class"),
+        nodes.raw("<br>", "<br>", format="html"),
+        nodes.raw(html, html, format="html"),
+    ]
     return document
+
+
+def html_of(document):
+    _, raw = document.findall(nodes.raw)
+    return raw
 
 
 @pytest.mark.parametrize(
@@ -154,7 +164,7 @@ LINKS = (
 def test_links_lead_within_where_all_pages_are_one(tmp_path):
     document = tree(LINKS)
     book.mend_links(app(tmp_path, "singlehtml"), document, "book/errata")
-    (raw,) = document.findall(nodes.raw)
+    raw = html_of(document)
     mended = (
         '<a href="#document-book/rounding">r</a> <a href="#hung1984.II.eq20">e</a> <a href="https://a.org/x.html">o</a>'
     )
@@ -164,7 +174,7 @@ def test_links_lead_within_where_all_pages_are_one(tmp_path):
 def test_links_stay_where_pages_are_many(tmp_path):
     document = tree(LINKS)
     book.mend_links(app(tmp_path), document, "book/errata")
-    (raw,) = document.findall(nodes.raw)
+    raw = html_of(document)
     assert raw.astext() == LINKS
 
 

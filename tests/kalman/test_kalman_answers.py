@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gpbnb import plotting
-from gpbnb.formats import Rounding
+from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.kalman import answers, figures, theory, year
 
 
@@ -31,6 +34,26 @@ def test_what_counts_is_the_year_and_not_its_end_alone():
     (nine,) = (run for run in answers.find().runs if (run.case.base, run.case.precision) == (10, 9))
     assert max(np.abs(nine.drift[-1]).max(), np.abs(nine.rate[-1]).max()) < 1 < answers.largest(nine)
     assert answers.largest(nine) == np.abs(np.hstack([nine.drift, nine.rate])).max()
+
+
+@pytest.mark.parametrize("digits", [1, 9, 17])
+def test_digits_are_those_of_the_format_and_chopping_costs_as_much_as_a_factor_of_two(digits):
+    assert answers.decimal_digits(FloatFormat(10, digits)) == pytest.approx(digits, abs=1e-12)
+    chopped = answers.decimal_digits(FloatFormat(10, digits, Rounding.CHOP))
+    assert digits - chopped == pytest.approx(math.log10(2), abs=1e-12)
+    # half a unit of the last of 53 bits is 2**-53, and 0.5 * 10**(1 - t) is that for t = 1 + 52 log10(2)
+    assert answers.decimal_digits(FloatFormat(2, 53)) == pytest.approx(1 + 52 * math.log10(2), abs=1e-12)
+
+
+@pytest.mark.parametrize("size", [5.0, -5.0])
+@pytest.mark.parametrize("part", ["drift", "rate"])
+@pytest.mark.parametrize("place", [(0, 0), (-1, -1)])
+def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
+    run = year.load()[0]
+    zeros = {name: np.zeros_like(getattr(run, name)) for name in ("drift", "rate")}
+    zeros[part][place] = size
+    zeros[part][-1, 0] = size / 2 if place == (0, 0) else zeros[part][-1, 0]
+    assert answers.largest(replace(run, **zeros)) == 5.0
 
 
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
