@@ -13,26 +13,13 @@ from numba import njit
 
 from benchmarks.timing import Row, medians, rows
 from gpbnb._kernels.carriers import Compiled
-from gpbnb._kernels.scalar import add, divide, load, matmul, multiply, negative, store, subtract
+from gpbnb._kernels.matrices import difference, total
+from gpbnb._kernels.scalar import divide, load, matmul, multiply, negative, store, subtract
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat
 
 N, M = 10, 2
 STEPS = 20  # in one call of the compiled loop
-
-
-@njit(cache=True, nogil=True)
-def _sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    for i in range(a.shape[0]):
-        for j in range(a.shape[1]):
-            store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
-
-
-@njit(cache=True, nogil=True)
-def _difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    for i in range(a.shape[0]):
-        for j in range(a.shape[1]):
-            store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
 @njit(cache=True, nogil=True)
@@ -45,10 +32,10 @@ def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps
     for _ in range(steps):
         matmul(fmt, Phi, P0, T)
         matmul(fmt, T, PhiT, V)
-        _sum(fmt, V, Q, V)
+        total(fmt, V, Q, V)
         matmul(fmt, V, HT, PHt)
         matmul(fmt, H, PHt, HP)
-        _sum(fmt, HP, R, S)
+        total(fmt, HP, R, S)
         a, b = load(fmt, S, (0, 0)), load(fmt, S, (0, 1))
         c, d = load(fmt, S, (1, 0)), load(fmt, S, (1, 1))
         determinant = subtract(fmt, multiply(fmt, a, d), multiply(fmt, b, c))
@@ -59,11 +46,11 @@ def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps
         matmul(fmt, PHt, S, K)
         matmul(fmt, Phi, x0, u)
         matmul(fmt, H, u, y)
-        _difference(fmt, z, y, g)
+        difference(fmt, z, y, g)
         matmul(fmt, K, g, x)
-        _sum(fmt, u, x, x)
+        total(fmt, u, x, x)
         matmul(fmt, K, H, T)
-        _difference(fmt, identity, T, W)
+        difference(fmt, identity, T, W)
         matmul(fmt, W, V, P)
 
 

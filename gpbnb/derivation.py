@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import sympy as sp
 
@@ -56,8 +57,7 @@ class Step:
     @property
     def holds(self) -> bool:
         """Whether sympy finds both sides equal, and `rest` nonnegative."""
-        difference = (self.left - self.right - self.rest).doit().expand().simplify()
-        return bool(difference == 0 and (self.rest == 0 or self.rest.is_nonnegative is True))
+        return _holds(self.left, self.right, self.rest)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.left} = {self.right}" + (f" + [{self.rest} >= 0]" if self.rest != 0 else "")
@@ -81,11 +81,21 @@ class Derivation:
         """Whether every step holds."""
         return all(step.holds for step in self.steps)
 
+    def holds_at(self, *places: int) -> bool:
+        """Whether the steps at some places, counted from 0, hold."""
+        return all(self.steps[place].holds for place in places)
+
     def __repr__(self) -> str:
         return "\n".join(f"{_mark(step)} {step}" for step in self.steps)
 
     def _repr_markdown_(self) -> str:
         return "\n".join(f"- {_mark(step)} {step.name}\n\n  $$\n  {step.latex()}\n  $$" for step in self.steps)
+
+
+@cache  # a chapter, its checks and its tests ask again and again
+def _holds(left: sp.Expr, right: sp.Expr, rest: sp.Expr) -> bool:
+    difference = (left - right - rest).doit().expand().simplify()
+    return bool(difference == 0 and (rest == 0 or rest.is_nonnegative is True))
 
 
 def _latex(expression: sp.Expr) -> str:

@@ -180,6 +180,11 @@ def _require_bool(name: str, value: object) -> None:
         raise TypeError(f"{name}={value!r} is a {type(value).__name__}; a bool is needed: use bool(...)")
 
 
+def both(place: str) -> tuple[str, str]:
+    """Ids of an entry that both reports have, in ch. II of hung1984 and in ch. III of hung1982."""
+    return f"hung1984.II.{place}", f"hung1982.III.{place}"
+
+
 Check = Callable[[], Finding]
 _C = TypeVar("_C", bound=Check)
 

@@ -174,6 +174,18 @@ class FloatFormat:
         return FloatArray.from_values(values, self)
 
 
+def prints_as(value: Any, printed: str, *roundings: Rounding) -> bool:
+    """Whether a number, fitted into as many decimal digits as `printed` has, is `printed`.
+
+    Parameters
+    ----------
+    roundings : the ways in which it may have been fitted; to nearest alone by default.
+    """
+    figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
+    formats = (FloatFormat(10, figures, rounding) for rounding in roundings or (Rounding.NEAREST,))
+    return any(fmt.round(value) == Fraction(printed) for fmt in formats)
+
+
 _DECIMAL = re.compile(r"\s*([+-]?)(\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
 _RATIO = re.compile(r"\s*([+-]?\d+)\s*/\s*(\d+)\s*", re.ASCII)
 _ACCEPTED = "a str, int, float, Decimal or Fraction"

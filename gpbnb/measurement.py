@@ -33,6 +33,9 @@ ARCSEC = math.pi / (180 * 3600)
 MAS = ARCSEC / 1000
 """One milliarcsecond, in radians."""
 
+YEAR = 365 * 86400.0
+"""Seconds of the year that hung1984 takes."""
+
 Floats = NDArray[np.float64]
 Signal = Literal["gyro", "telescope", "difference"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 # Okabe and Ito's colours, told apart by colour-blind readers and on paper.
 OBSERVED = "#0072B2"
 OBSERVED_OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS = (OBSERVED, *OBSERVED_OTHERS)
+MARKERS = "osD^v"
 BOUND = "#D55E00"
 STRICT = "#000000"
 REFERENCE = "#767676"
@@ -49,6 +52,29 @@ def figure(columns: int = 1, height: float = 3.6) -> tuple[Figure, NDArray[Any]]
     with plt.rc_context(_STYLE):
         fig, axes = plt.subplots(1, columns, figsize=(8.0, height), squeeze=False)
     return fig, axes[0]
+
+
+def colours(count: int, palette: Sequence[str] = COLOURS) -> Sequence[str]:
+    """A colour for each of some curves.
+
+    Raises
+    ------
+    ValueError : more curves than colours.
+    """
+    if count > len(palette):
+        raise ValueError(f"got {count} curves; needed at most {len(palette)}, or colours repeat; draw two figures")
+    return palette[:count]
+
+
+def looks(count: int, markers: str = MARKERS) -> list[tuple[str, str]]:
+    """Marker and colour of each of some curves; see :func:`colours`."""
+    return list(zip(markers, colours(count), strict=False))
+
+
+def loglog(ax: Axes) -> None:
+    """Make both axes logarithmic."""
+    ax.set_xscale("log")
+    ax.set_yscale("log")
 
 
 def legend(ax: Axes, **options: Any) -> None:

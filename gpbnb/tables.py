@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,6 +43,27 @@ def digits(fmt: FloatFormat) -> str:
     """Name the precision of a format, as in "4 decimal digits" or "24 bits"."""
     unit = {2: "bit", 10: "decimal digit"}.get(fmt.base, f"base-{fmt.base} digit")
     return f"{fmt.precision} {unit}{'s' if fmt.precision > 1 else ''}"
+
+
+def arithmetic(fmt: FloatFormat) -> str:
+    """Name digits and rounding of a format, as in "24 bits, chopped"."""
+    return digits(fmt) + (", chopped" if fmt.rounding.value == "chop" else "")
+
+
+def scientific(value: Fraction | float, figures: int) -> str:
+    r"""A number with so many digits and a power of ten, ``$2.5860\times10^{8}$``."""
+    mantissa, _, power = f"{float(value):.{figures - 1}e}".partition("e")
+    return f"${mantissa}\\times10^{{{int(power)}}}$" if int(power) else f"${mantissa}$"
+
+
+def short(value: float, figures: int = 2) -> str:
+    """A number in a cell: plain, or with a power of ten where it is large or small."""
+    rounded = float(f"{value:.{figures - 1}e}")
+    if rounded == 0 or not math.isfinite(value):
+        return f"{rounded:g}"
+    if 1e-4 <= abs(rounded) < 1e6:
+        return f"{Decimal(repr(rounded)):f}".removesuffix(".0")
+    return scientific(rounded, figures)
 
 
 def one_line(text: str) -> str:

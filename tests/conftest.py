@@ -7,4 +7,17 @@ import pytest
 matplotlib.use("Agg")
 
 # Failed assertions of the helpers beside this file tell what came, as those of the tests do.
-pytest.register_assert_rewrite("steps")
+pytest.register_assert_rewrite("faults", "steps")
+
+
+@pytest.fixture
+def ax():
+    """An empty panel of a figure."""
+    import matplotlib.pyplot as plt
+
+    from gpbnb import plotting
+
+    figure, axes = plotting.figure()
+    yield axes[0]
+    figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
+    plt.close("all")

@@ -10,7 +10,16 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.bounds import column_sum_norm, exact, gamma, gamma_probabilistic, max_norm, row_sum_norm
+from gpbnb.bounds import (
+    column_sum_norm,
+    exact,
+    gamma,
+    gamma_probabilistic,
+    integers,
+    inverse_of,
+    max_norm,
+    row_sum_norm,
+)
 from gpbnb.formats import FloatFormat
 
 A = [[1, -2, 3], [-4, 5, Fraction(1, 2)]]
@@ -44,6 +53,24 @@ def test_exact_keeps_every_digit():
 def test_exact_takes_float_arrays_and_keeps_shape():
     x = FloatFormat(10, 4).array([["765.4567", "1"], ["-2", "0.33333"]])
     assert exact(x).tolist() == [[Fraction("765.5"), 1], [-2, Fraction("0.3333")]]
+
+
+def test_integers_and_their_unit_are_the_fractions():
+    fractions = exact([["1/6", "-0.25", 7], [0, "1e-3", "-2/9"]])
+    counts, unit = integers(fractions)
+    assert counts.shape == (2, 3)
+    assert all(type(count) is int for count in counts.flat)
+    assert (counts * unit == fractions).all()
+    assert unit == Fraction(1, 9000)
+
+
+def test_an_inverse_is_exact():
+    a = exact([["0.1", "3", "-7"], ["2/3", 0, 1], [5, "1e-6", 4]])
+    inverse = inverse_of(a)
+    assert (a @ inverse == np.eye(3, dtype=int)).all()
+    assert (inverse @ a == np.eye(3, dtype=int)).all()
+    with pytest.raises(ZeroDivisionError):
+        inverse_of([[1, 2], [2, 4]])
 
 
 def test_norms_of_one_matrix():

@@ -48,6 +48,15 @@ def test_wrong_steps_are_found_out(step):
     assert Derivation((step,))._repr_markdown_().startswith("- ✗")
 
 
+def test_some_steps_of_a_derivation_are_asked_alone():
+    mixed = Derivation((HOLD[0], FAIL[0], HOLD[1]))
+    assert mixed.holds_at(0, 2)
+    assert not mixed.holds_at(0, 1)
+    assert not mixed.holds
+    with pytest.raises(IndexError):
+        mixed.holds_at(3)
+
+
 def test_a_derivation_shows_each_step():
     derivation = Derivation((HOLD[0], FAIL[0]))
     lines = repr(derivation).splitlines()

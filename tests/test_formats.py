@@ -15,7 +15,7 @@ import sympy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gpbnb.formats import FloatFormat, Rounding, exact_ratio
+from gpbnb.formats import FloatFormat, Rounding, exact_ratio, prints_as
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 
@@ -222,3 +222,29 @@ class TestFormat:
         assert pickle.loads(pickle.dumps(fmt)) == fmt
         with pytest.raises(AttributeError):
             fmt.base = 2  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("value", "printed", "so"),
+    [
+        (0.99999998766, ".999999987", True),  # chopped
+        (0.99999998766, ".999999988", True),  # rounded
+        (0.99999998766, ".999999989", False),
+        (1.2566e8, "1.2566e8", True),
+        (1.2567e8, "1.2566e8", False),
+        (0.0076, ".0004", False),
+        (0.00039996, ".0004", True),
+        (1.2337e-6, "1.234e-6", True),
+        (1.2337e-7, "1.234e-6", False),
+    ],
+)
+def test_a_number_rounded_or_chopped_prints_as_it_is_printed(value, printed, so):
+    assert prints_as(value, printed, *Rounding) is so
+
+
+def test_a_number_prints_as_it_is_rounded_unless_another_way_is_named():
+    assert prints_as(Fraction("2.64904e8"), "2.6490e8")
+    assert not prints_as(Fraction("2.64906e8"), "2.6490e8")
+    assert prints_as(Fraction("2.64906e8"), "2.6490e8", Rounding.CHOP)
+    assert not prints_as(Fraction("2.64904e8"), "2.6491e8", *Rounding)
+    assert prints_as(Fraction("-0.77226e-16"), "-.7723e-16")

@@ -58,3 +58,19 @@ def test_no_two_colours_are_alike_and_all_stand_out_from_white():
     distance = np.abs(rgb[:, None] - rgb).sum(axis=2)[np.triu_indices(len(rgb), 1)]
     assert distance.min() > 0.25
     assert (np.abs(rgb - 1).max(axis=1) > 0.5).all()
+
+
+def test_every_curve_has_a_colour_and_a_marker_of_its_own():
+    looks = plotting.looks(5)
+    assert looks[0] == ("o", plotting.OBSERVED)
+    assert len({marker for marker, _ in looks}) == len({colour for _, colour in looks}) == 5
+    assert plotting.looks(2, "sD") == [("s", plotting.OBSERVED), ("D", plotting.OBSERVED_OTHERS[0])]
+    assert plotting.colours(2, ("red", "blue", "green")) == ("red", "blue")
+    with pytest.raises(ValueError, match="got 6 curves; needed at most 5, or colours repeat; draw two figures"):
+        plotting.looks(6)
+
+
+def test_both_axes_become_logarithmic():
+    _, (ax,) = plotting.figure()
+    plotting.loglog(ax)
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")

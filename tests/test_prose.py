@@ -40,7 +40,7 @@ README = {
     "31 arcseconds of roll": ("rolling", "rolling_limit", 31, 0),
     "Ten decimal digits": ("kalman", "digits_observed", 10, 0),
     "or 32 bits, keep": ("kalman", "bits_observed", 32, 0),
-    "seven equations on the way": ("integration", "slipped", 7, 0),
+    "eight equations on the way": ("integration", "slipped", 8, 0),
     "a hundred thousand random inverses": ("inversion", "inv_given", 100_000, -4),
 }
 

@@ -1,4 +1,4 @@
-"""Links of the book built as one page, as for its PDF: each leads to its place within that page."""
+"""The book built as one page, as for its PDF: links lead to their places within it; tables of the ledger fit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from sphinx.application import Sphinx
 
 EXT = Path(__file__).resolve().parents[1] / "book" / "_ext"
 CONF = """
-extensions = ["sphinx.ext.autodoc", "myst_parser", "gpbnb_book"]
+extensions = ["sphinx.ext.autodoc", "myst_parser", "gpbnb_book", "gpbnb_ledger"]
 root_doc = "book/index"
 numfig = True
 """
@@ -56,6 +56,11 @@ x^2
 ```{raw} html
 <p id="row.2">Row</p>
 ```
+
+| Item | Verdict | Printed | Recomputed | Note |
+| --- | --- | --- | --- | --- |
+| eq (1) | wrong | $a*b*c$ | 2 \\* 3 | see \\*Kalman bound\\*, and 2 \\* 3 \\* 4 |
+| eq (2) | verified | 5 | | |
 """,
 }
 
@@ -98,3 +103,18 @@ def test_each_way_to_link_is_mended(single):
     assert text["The ledger"] == "two-ledger"
     assert (text["(1)"], text["a row"], text["one page, raw"]) == ("equation-square", "row.2", "document-book/one")
     assert (text["one"], text["book"]) == ("document-book/one", "book")
+
+
+def test_a_table_of_the_ledger_has_four_columns(single):
+    table = re.search(r'<table class="[^"]*ledger-table.*?</table>', single, re.S)[0]
+    rows = [
+        [" ".join(re.sub(r"<[^>]+>", " ", cell).split()) for cell in re.findall(r"<t[hd].*?</t[hd]>", row, re.S)]
+        for row in re.findall(r"<tr.*?</tr>", table, re.S)
+    ]
+    assert rows == [
+        ["Item", "Verdict", "Printed", "Recomputed, and note"],
+        ["eq (1)", "wrong", r"\(a*b*c\)", "2 * 3 see Kalman bound , and 2 * 3 * 4"],
+        ["eq (2)", "verified", "5", ""],
+    ]
+    assert "<em>Kalman bound</em>" in table
+    assert table.count('<th class="stub"') == 2

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 
 import pytest
 
-from gpbnb.formats import FloatFormat
-from gpbnb.tables import Table, digits, one_line
+from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.tables import Table, arithmetic, digits, one_line, scientific, short
 
 
 def cells(line):
@@ -62,3 +63,33 @@ def test_digits_names_base_and_precision():
     named = {(2, 1): "1 bit", (2, 24): "24 bits", (10, 1): "1 decimal digit", (10, 4): "4 decimal digits"}
     named |= {(16, 6): "6 base-16 digits", (3, 1): "1 base-3 digit"}
     assert {key: digits(FloatFormat(*key)) for key in named} == named
+
+
+@pytest.mark.parametrize(
+    ("value", "figures", "text"),
+    [(82, 2, r"$8.2\times10^{1}$"), (Fraction(1, 3), 3, r"$3.33\times10^{-1}$"), (1, 2, "$1.0$")],
+)
+def test_scientific_numbers(value, figures, text):
+    assert scientific(value, figures) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "figures", "text"),
+    [
+        (0.0, 2, "0"),
+        (131.2, 2, "130"),
+        (0.00021, 2, "0.00021"),
+        (-0.831, 2, "-0.83"),
+        (999999.0, 2, r"$1.0\times10^{6}$"),
+        (12500000.0, 3, r"$1.25\times10^{7}$"),
+        (-1.13e-8, 2, r"$-1.1\times10^{-8}$"),
+        (float("inf"), 2, "inf"),
+    ],
+)
+def test_short_numbers(value, figures, text):
+    assert short(value, figures) == text
+
+
+def test_an_arithmetic_is_named_by_its_digits_and_by_chopping():
+    assert arithmetic(FloatFormat(2, 24)) == "24 bits"
+    assert arithmetic(FloatFormat(10, 4, Rounding.CHOP)) == "4 decimal digits, chopped"

@@ -99,9 +99,8 @@ def write_powers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
 def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     """Where all pages are one, lead every link to its place within it.
 
-    Sphinx would lead those to a part of a page to ``book/index.html``, as seen from this page itself in the folder
-    ``book``, and drop which page was meant, though ids such as ``id3`` stand in several; HTML outputs name the pages as
-    they were.
+    Sphinx would lead those to a part of a page to ``book/index.html``, as seen from the folder above, and drop which
+    page was meant, though ids such as ``id3`` stand in several; HTML outputs name the pages as they were.
     """
     if app.builder.name != "singlehtml":
         return

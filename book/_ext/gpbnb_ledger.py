@@ -5,6 +5,7 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
 from gpbnb.ledger import load_inventory
+from gpbnb.ledger.page import EMPHASIS
 
 PAGE = "book/errata"
 HEADER = ["Item", "Verdict", "Printed", "Recomputed", "Note"]
@@ -48,6 +49,12 @@ def join_columns(app: Sphinx, doctree: nodes.document) -> None:
                 for paragraph in cell:
                     paragraph["classes"].append(name)
             wide.extend(child for cell in others for child in cell.children)
+        for text in list(group.findall(nodes.Text)):
+            # Stars in the notes are the ledger's own, which Markdown was not to read.
+            parts = EMPHASIS.split(text.astext())
+            if len(parts) > 1 and not isinstance(text.parent, nodes.math):
+                marked = [nodes.emphasis("", p) if i % 2 else nodes.Text(p) for i, p in enumerate(parts)]
+                text.parent.replace(text, marked)
         table = group.parent.deepcopy()
         table["classes"].append("ledger-table")
         group.parent.replace_self(nodes.container("", table, classes=["ledger"]))

@@ -13,21 +13,23 @@ document.addEventListener("DOMContentLoaded", () => {
 const LONG = 9; // em
 const LONG_BRACKETS = 12; // em
 const OPENS = ":scope > mjx-c:is(.mjx-c28, .mjx-c5B, .mjx-c7B)";
-const CLOSES = ":scope > mjx-c:is(.mjx-c29, .mjx-c5D, .mjx-c7D)";
+const CLOSES = ":is(:scope, :scope:is(mjx-msup, mjx-msub, mjx-msubsup) > mjx-mo) > mjx-c:is(.mjx-c29, .mjx-c5D, .mjx-c7D)";
 const COMMA = ":scope > mjx-c:is(.mjx-c2C, .mjx-c3B)";
 
 function breakFormulas(boxes = document.querySelectorAll("article mjx-container")) {
-  for (const box of [...boxes].filter((each) => isLong(each, LONG))) breakRow(box.firstElementChild);
+  // All is measured before anything is changed: each change would have the page laid out anew.
+  const plans = [...boxes].flatMap((box) => (isLong(box, LONG) ? planRow(box.firstElementChild) : []));
+  plans.forEach(breakRow);
   for (const box of boxes) keepPunctuation(box.closest("span.math"));
 }
 function isLong(first, limit, last = first) {
   const width = last.getBoundingClientRect().right - first.getBoundingClientRect().left;
   return width > limit * parseFloat(getComputedStyle(first).fontSize);
 }
-function breakRow(row) {
+function planRow(row) {
   while (row.children.length === 1 && /^MJX-(MROW|MSTYLE)$/.test(row.firstElementChild.tagName)) row = row.firstElementChild;
   const parts = [...row.children];
-  if (parts.length < 3 || row.matches("mjx-mtable, .formula-row")) return;
+  if (parts.length < 3 || row.matches("mjx-mtable, .formula-row")) return [];
   // How many pairs of short brackets each part is in.
   const depth = parts.map(() => 0);
   const open = [];
@@ -37,16 +39,18 @@ function breakRow(row) {
     const start = open.pop();
     if (!isLong(parts[start], LONG_BRACKETS, part)) for (let k = start + 1; k <= i; k++) depth[k]++;
   });
-  const rows = parts.map((part) => part.tagName === "MJX-MROW" && isLong(part, LONG_BRACKETS));
+  const within = parts.map((part) => (part.tagName === "MJX-MROW" && isLong(part, LONG_BRACKETS) ? planRow(part) : []));
   const starts = parts.map((part, i) => {
     const sign = part.tagName === "MJX-MO" && part.getAttribute("space") > 2;
     return !depth[i] && (sign || (i && parts[i - 1].querySelector(COMMA)));
   });
+  return [{ row, parts, starts, rows: within.map((plans) => plans.length > 0) }, ...within.flat()];
+}
+function breakRow({ row, parts, starts, rows }) {
   row.classList.add("formula-row");
   let piece = null;
   parts.forEach((part, i) => {
     if (rows[i]) {
-      breakRow(part);
       piece = null;
       return;
     }
@@ -64,6 +68,11 @@ function keepPunctuation(formula) {
   const signs = after?.nodeType === Node.TEXT_NODE && after.data.match(/^[,.;:!?)\]’”]+/)?.[0];
   if (!signs) return;
   after.splitText(signs.length);
+  const last = [...formula.querySelectorAll(".formula-piece")].at(-1);
+  if (last) {
+    last.append(after);
+    return;
+  }
   const kept = document.createElement("span");
   kept.className = "formula-kept";
   formula.before(kept);
@@ -72,12 +81,23 @@ function keepPunctuation(formula) {
 
 // What scrolls sideways must be reachable by keyboard. Formulas get their width late, boxes with the window's.
 function markScrolling() {
-  for (const box of document.querySelectorAll("article :is(div, pre, mjx-container)")) {
-    const scrolls = box.scrollWidth > box.clientWidth && /auto|scroll/.test(getComputedStyle(box).overflowX);
-    if (scrolls) box.tabIndex = 0;
+  const boxes = [...document.querySelectorAll("article :is(div, pre, mjx-container)")];
+  const scrolls = boxes.map((box) => box.scrollWidth > box.clientWidth && /auto|scroll/.test(getComputedStyle(box).overflowX));
+  boxes.forEach((box, i) => {
+    if (scrolls[i]) box.tabIndex = 0;
     else box.removeAttribute("tabindex");
-  }
+  });
 }
+// On paper nothing scrolls: a formula that has no place to break is set smaller, to the width of its cell.
+function shrinkToCells() {
+  const boxes = [...document.querySelectorAll("article td mjx-container")].filter((box) => box.scrollWidth > box.clientWidth);
+  const sizes = boxes.map((box) => (parseFloat(box.style.fontSize || "100") * box.clientWidth) / box.scrollWidth);
+  boxes.forEach((box, i) => {
+    box.classList.add("shrinks");
+    box.style.setProperty("--on-paper", `${sizes[i]}%`);
+  });
+}
+window.addEventListener("beforeprint", shrinkToCells);
 window.addEventListener("load", async () => {
   await window.MathJax?.startup?.promise;
   breakFormulas();

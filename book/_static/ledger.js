@@ -88,6 +88,7 @@ function setFormulas(rows, whenReady) {
       const formulas = take([...waiting.keys()]);
       MathJax.typeset(formulas);
       reach(formulas);
+      shrinkToCells();
     });
   });
 }

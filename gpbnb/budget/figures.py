@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from gpbnb.budget import theory
 from gpbnb.budget.experiment import Draws
 from gpbnb.budget.theory import Budget, ErrorForm
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog
 
 
 def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes, most: int = 100) -> list[Artist]:
@@ -30,8 +30,7 @@ def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes
         artists += ax.plot(n, each, color=colour, label=f"root-sum-square {total:g} mas")
     artists += ax.plot(n, totals[0] / n, color=BOUND, ls="--", label=f"all of one sign, {totals[0]:g} mas")
     artists += ax.plot(*printed, "o", mfc="white", color=STRICT, ms=8, label="printed example")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax)
     label(ax, "number of equal sources $N$ (no unit)", "error of each (mas)")
     return artists

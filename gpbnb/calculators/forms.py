@@ -14,6 +14,7 @@ from gpbnb.calculators.javascript import Definition
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration import theory as integration
 from gpbnb.kalman import theory as kalman
+from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory as rolling
 
 Values = Mapping[str, float]
@@ -281,7 +282,7 @@ def _deroll_reference(given: Values) -> dict[str, Any]:
     return {
         "rate": rolling.roll_rate(given["period"]),
         "error": error,
-        "beat": 2 * math.pi / float(error) / rolling.YEAR,
+        "beat": 2 * math.pi / float(error) / YEAR,
         "phase": float(error) * duration,
         "lost": rolling.off_tuned_loss(float(error), duration),
         "across": rolling.off_tuned_drift(given["drift"], float(error), duration),

@@ -55,6 +55,47 @@ def larger_effect() -> Finding:
     )
 
 
+RIGEL = math.radians(-8.2)
+"""Declination of the star, which is not in the documents."""
+
+
+@CHECKS.add("hung1982.I.approximately-parallel")
+def approximately_parallel() -> Finding:
+    off = angle_to_axis(RIGEL)
+    return compare(
+        off < math.radians(10),
+        f"the drift of a gyro that points to Rigel makes {math.degrees(off):.1f} degrees with the Earth's axis, as "
+        "much as the star is off the equator",
+        note="if it is said of the plane: that of a polar orbit contains the axis",
+    )
+
+
+def angle_to_axis(declination: float) -> float:
+    """Angle between the Earth's axis and the geodetic drift for a star in the plane of the orbit; radians."""
+    star = np.array([math.cos(declination), 0.0, math.sin(declination)])
+    drift = np.cross([0.0, 1.0, 0.0], star)  # about the normal of the orbit
+    return float(math.acos(abs(drift[2]) / np.hypot(drift[0], drift[2])))
+
+
+@CHECKS.add("hung1982.I.theories-differ")
+def theories_differ() -> Finding:
+    omega = sp.Symbol("omega", positive=True)
+    ratio = geodetic_of_brans_dicke(omega)
+    difference = sp.simplify(1 - ratio)
+    return compare(
+        difference != 0 and sp.limit(ratio, omega, sp.oo) == 1,
+        f"in the Brans-Dicke theory the geodetic drift is ${sp.latex(sp.factor(ratio))}$ of Einstein's, with its "
+        f"parameter $\\omega$: {float(difference.subs(omega, 6)):.0%} less for $\\omega=6$, and the same in the limit",
+        note="procession is a slip for precession",
+    )
+
+
+def geodetic_of_brans_dicke(omega: sp.Symbol) -> sp.Expr:
+    """Geodetic drift over that of general relativity: (1 + 2γ)/3, γ the curvature of space by unit mass."""
+    gamma = (1 + omega) / (2 + omega)
+    return sp.together((1 + 2 * gamma) / 3)
+
+
 @CHECKS.add("hung1982.I.progress-report")
 def progress_report() -> Finding:
     printed, mended = deroll_errors()
@@ -88,6 +129,46 @@ def pictures() -> Finding:
 def six_frames() -> Finding:
     count = len(np.unique(frames_of_a_case().round(9), axis=0))
     return compare(count == 6, f"with all angles nonzero the definitions give {count} different frames")
+
+
+@CHECKS.add("hung1982.IV.absolute-frame")
+def absolute_frame() -> Finding:
+    year, orbit = theory.aberration(640e3)
+    line = theory.line_fit_leak(year, 1)
+    return compare(
+        year + orbit < MAS,
+        f"starlight is aberrated: the line of sight moves by up to {year / ARCSEC:.1f} arcseconds in a year and "
+        f"{orbit / ARCSEC:.1f} in an orbit at 640 km; a straight line through a year of (7) would be off by up to "
+        f"{line / ARCSEC:.0f} arcseconds a year",
+        Verdict.INCONSISTENT,
+        otherwise_note="it cannot stand still and follow the line of sight. (1) keeps the star at (1, 0, 0): "
+        "(7) gives the drift against the apparent star, and the report does not mention aberration; from the "
+        "known velocities it can be taken out",
+    )
+
+
+@CHECKS.add("hung1982.IV.intermediate-frame")
+def intermediate_frame() -> Finding:
+    phi = np.array([0.0, 5.0, 3.0]) * ARCSEC
+    pointings, phases = np.array([[0.0, -2.0, 4.0], [0.0, 7.0, -1.0]]) * ARCSEC, (0.3, 2.1)
+    turned = boresight_offset(pointings[1] - pointings[0])
+    none = np.zeros(3)
+    drifts = [
+        deroll(
+            (spin_in_readout(theta_of(phi, alpha), none, none, phase) - star_in_telescope(alpha, none, phase))[1:],
+            phase,
+        )
+        for alpha, phase in zip(pointings, phases, strict=True)
+    ]
+    apart = float(np.abs(np.array(drifts) - [-phi[2], phi[1]]).max())
+    return compare(
+        turned < 1e-9,
+        f"pointings of (−2, 4) and (7, −1) arcseconds turn it by {turned / ARCSEC:.1f}; at both (7) gives the drift to "
+        f"{apart / MAS:.0e} milliarcseconds",
+        Verdict.TYPO if apart < 1e-3 * MAS else Verdict.WRONG,
+        otherwise_note="it stands still only as long as the roll axis does; (5) to (7) are of one instant and do not "
+        "ask it to",
+    )
 
 
 def frames_of_a_case() -> np.ndarray:

@@ -60,11 +60,6 @@ def printed_small(angles: Sequence[sp.Expr]) -> sp.Matrix:
     return sp.Matrix([[1, a3, -a2], [-a3, 1, a1], [a2, -a1, 1]])
 
 
-def printed_roll() -> sp.Matrix:
-    """The roll matrix as (1) to (4) print it."""
-    return sp.Matrix([[1, 0, 0], [0, C, S], [0, -S, C]])
-
-
 def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Expr:
     """`expression` expanded up to products of `order` of the `small` symbols."""
     scaled = expression.subs({symbol: H * symbol for symbol in small}, simultaneous=True)

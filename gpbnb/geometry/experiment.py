@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.geometry.theory import YEAR, Case, Effect
-from gpbnb.measurement import apply, deroll, into_spacecraft, rotation
+from gpbnb.geometry.theory import Case, Effect
+from gpbnb.measurement import YEAR, apply, deroll, into_spacecraft, rotation
 
 Floats = NDArray[np.float64]
 CHUNK = 2**16

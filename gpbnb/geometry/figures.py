@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.geometry import theory
 from gpbnb.geometry.experiment import Year
 from gpbnb.measurement import ARCSEC, MAS, deroll, roll, rotation, theta_of
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
 
 Frames = Mapping[str, NDArray[np.float64]]
 FRAME_COLOURS = dict(
@@ -140,14 +140,13 @@ def deroll_of_a_roll(
 def losses(curves: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]], ax: Axes) -> list[Artist]:
     """Error of φ that small-angle forms make, against one angle: simulated (points), analysis (lines)."""
     artists: list[Artist] = []
-    looks = zip("osD^", (BOUND, OBSERVED, OBSERVED_OTHERS[0], OBSERVED_OTHERS[1]), strict=True)
-    for (marker, colour), (name, (sizes, errors)) in zip(looks, curves.items(), strict=False):
+    styles = zip("osD^", (BOUND, OBSERVED, *OBSERVED_OTHERS[:2]), strict=True)
+    for (marker, colour), (name, (sizes, errors)) in zip(styles, curves.items(), strict=False):
         shown = rf"$\{name[:-1]}_{name[-1]}$"
         artists += ax.plot(sizes / ARCSEC, errors / MAS, marker, color=colour, label=shown, mfc="none")
         artists += ax.plot(sizes / ARCSEC, theory.small_angle_loss(name, sizes) / MAS, color=colour, lw=1)
     artists.append(ax.axhline(1, color=STRICT, ls=":", label="the goal, 1 mas"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax, loc="lower right")
     label(ax, "angle (arcsec)", r"error of $\varphi$ (mas)")
     return artists
@@ -179,8 +178,7 @@ def first_rolls(still: Year, rolled: Year, ax: Axes) -> list[Artist]:
 def year_errors(results: Mapping[str, Year], ax: Axes, component: int) -> list[Artist]:
     """Error of φ2 (0) or φ3 (1) over a year, simulated means (points) beside the analysis (lines)."""
     artists: list[Artist] = []
-    looks = zip("osD^v", (OBSERVED, *OBSERVED_OTHERS), strict=True)
-    for (marker, colour), (name, result) in zip(looks, results.items(), strict=False):
+    for (marker, colour), (name, result) in zip(looks(len(results)), results.items(), strict=True):
         some = np.linspace(0, len(result.time) - 1, 13).astype(int)
         time = result.time[some]
         simulated = result.phi[some, component] - result.case.drift[component] * time

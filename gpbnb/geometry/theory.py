@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gpbnb.measurement import ARCSEC, apply, deroll, rotation
+from gpbnb.measurement import ARCSEC, YEAR, apply, deroll, rotation
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -17,14 +17,16 @@ GEODETIC = 6.6 * ARCSEC
 """Drift in the plane of the orbit, of the size that was predicted for Gravity Probe B; radians a year."""
 MOTIONAL = 0.04 * ARCSEC
 """Drift across the plane of the orbit; radians a year."""
-YEAR = 365 * 86400.0
-"""Seconds of the year that hung1984 takes."""
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 GM = 3.986004e14
 """Gravitational parameter of the Earth, m³/s²."""
 LIGHT = 299792458.0
 """Speed of light, m/s."""
+SUN_GM = 1.32712440e20
+"""Gravitational parameter of the Sun, m³/s²."""
+SUN_DISTANCE = 1.495978707e11
+"""Mean distance of the Earth from the Sun, m."""
 RADIUS = 6.378137e6
 """Equatorial radius of the Earth, m."""
 INERTIA = 0.3307
@@ -52,6 +54,22 @@ def precession_rates(altitude: float) -> tuple[float, float]:
     geodetic = 1.5 * GM**1.5 / (LIGHT**2 * r**2.5)
     motional = GM * INERTIA * RADIUS**2 * SPIN / (2 * LIGHT**2 * r**3)
     return geodetic * YEAR, motional * YEAR
+
+
+def aberration(altitude: float) -> tuple[float, float]:
+    r"""Largest displacement of a star by the speed of the Earth, and of a spacecraft on a circular orbit; radians.
+
+    .. math:: v/c, \qquad v = \sqrt{GM/r}
+
+    for the orbit around the Sun, taken as a circle, and for that around the Earth.
+
+    Parameters
+    ----------
+    altitude : above the equatorial radius, m; 0 or above.
+    """
+    if not altitude >= 0:
+        raise ValueError(f"got an altitude of {altitude} m; needed 0 or above")
+    return math.sqrt(SUN_GM / SUN_DISTANCE) / LIGHT, math.sqrt(GM / (RADIUS + altitude)) / LIGHT
 
 
 @dataclass(frozen=True)

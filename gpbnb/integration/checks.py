@@ -7,7 +7,6 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
-from gpbnb.derivation import Derivation
 from gpbnb.findings import Checks, Finding, Verdict, answer, compare, unverifiable
 from gpbnb.formats import FloatFormat
 from gpbnb.integration import derivation, experiment, theory
@@ -48,11 +47,6 @@ def same(*expressions: sp.Expr) -> bool:
     """Whether expressions, or matrices, are equal."""
     first, *others = (sp.Matrix([[e]]) if not isinstance(e, sp.MatrixBase) else e for e in expressions)
     return all(all(sp.simplify(entry.rewrite(sp.exp).expand()) == 0 for entry in first - other) for other in others)
-
-
-def step(steps: Derivation, *places: int) -> bool:
-    """Whether some steps of a derivation hold."""
-    return all(steps.steps[place].holds for place in places)
 
 
 @cache
@@ -499,7 +493,7 @@ def covariance_equation() -> Finding:
 @CHECKS.add(*eq("21"))
 def covariance_components() -> Finding:
     second, printed = derivation.continuous().steps[1].right, P11 - sp.Symbol("omega_BW") * P12
-    holds = step(derivation.continuous(), 0, 1, 2)
+    holds = derivation.continuous().holds_at(0, 1, 2)
     return compare(
         holds and same(second, printed),
         f"$\\dot P_{{12}}={sp.latex(second.subs(OMEGA, sp.Symbol('omega_bw')))}$; the others as printed",
@@ -516,7 +510,7 @@ def density() -> Finding:
     steady = -2 * OMEGA * P + sp.Symbol("N_P11")  # (21)
     needed = float(sp.solve(steady, "N_P11")[0].subs({OMEGA: 3, P: 4}))
     return compare(
-        bool(np.max(abs(found / needed - 1)) < 1e-12) and step(derivation.continuous(), 0),
+        bool(np.max(abs(found / needed - 1)) < 1e-12) and derivation.continuous().holds_at(0),
         f"the density of $n_{{p1}}$ is {found[0]:g} at every frequency for $\\sigma_x=2$, $\\omega_{{bw}}=3$, and so "
         f"is $N_{{P_{{11}}}}=2\\omega_{{bw}}\\sigma_x^2$, which keeps $P_{{11}}$ steady",
         note="two-sided and a hertz: over positive frequencies alone it is twice as much",
@@ -528,7 +522,7 @@ def continuous_solution() -> Finding:
     steady = sp.solve(sp.Eq(-2 * OMEGA * P11 + 2 * OMEGA * P, 0), P11)
     rate, other = (float(np.diff(theory.error_variance([5000, 5001], 0.5, start))[0]) for start in (1.0, 0.0))
     return compare(
-        step(derivation.continuous(), 3, 4, 5) and steady == [P],
+        derivation.continuous().holds_at(3, 4, 5) and steady == [P],
         "(23) solves (22) from zero",
         note="" if abs(rate / other - 1) > 1e-9 else "the rate in the end does not depend on how $P_{11}$ starts",
     )
@@ -604,7 +598,7 @@ def steady_p31() -> Finding:
     return compare(
         len(ours) == 1
         and same(ours[0], printed)
-        and step(derivation.steady_state(), 0)
+        and derivation.steady_state().holds_at(0)
         and same(sp.limit(derivation.p12(TIME), TIME, sp.oo), P / OMEGA),
         "the same; $P_{12\\infty}=P_{11\\infty}/\\omega_{bw}$",
     )
@@ -651,7 +645,7 @@ def steady_rate() -> Finding:
     quotient, phi21 = (1 + DECAY) / (1 - DECAY), (1 - DECAY) / OMEGA
     middle = quotient * T + 2 / OMEGA - 2 * (phi21 / (1 - DECAY) + 1 / OMEGA)
     last = ((1 + DECAY) * T - 2 * phi21) / (1 - DECAY)
-    return compare(step(derivation.steady_state(), 3) and same(middle, last), "the same, from (32)")
+    return compare(derivation.steady_state().holds_at(3) and same(middle, last), "the same, from (32)")
 
 
 @CHECKS.add(*eq("34"))
@@ -675,7 +669,7 @@ def random_walk() -> Finding:
     printed = sigma * np.sqrt(theory.printed_walk_factor(omega / f) / f)
     ours = theory.random_walk(sigma, omega, f)
     return compare(
-        step(derivation.steady_state(), 4, 5, 6) and bool(abs(ours / printed - 1) < 1e-13),
+        derivation.steady_state().holds_at(4, 5, 6) and bool(abs(ours / printed - 1) < 1e-13),
         "$\\sigma_x\\sqrt{L(\\mu/2)/f_c}$, with Langevin's function $L(x)=\\coth x-1/x$",
     )
 
@@ -739,7 +733,7 @@ def units() -> Finding:
 def exponential() -> Finding:
     ours = sp.series(sp.exp(-MU), MU, 0, 4).removeO()
     printed = 1 - MU + MU**2 / 2 - MU**3 / 6
-    return compare(same(ours, printed) and step(derivation.small_mu(), 0), f"${sp.latex(ours, order='rev-lex')}$")
+    return compare(same(ours, printed) and derivation.small_mu().holds_at(0), f"${sp.latex(ours, order='rev-lex')}$")
 
 
 @CHECKS.add(*eq("37"))
@@ -753,7 +747,7 @@ def series() -> Finding:
         and same(denominator, 1 - cubic, MU * (1 - half * MU + sixth * MU**2))
         and same(1 - half * MU + quarter * MU**2 - 1 + half * MU - sixth * MU**2, (quarter - sixth) * MU**2)
         and same(2 / MU * (quarter - sixth) * MU**2, sixth * MU)
-        and step(steps, 1, 2)
+        and steps.holds_at(1, 2)
     )
     return compare(
         same(numerator, printed) and others,
@@ -772,7 +766,7 @@ def approximation() -> Finding:
     printed = theory.printed_random_walk(1.7, 0.03, 3.0) / theory.random_walk(1.7, 0.03, 3.0) - 1
     next_term = bool(np.all(abs(excess / (mu**2 / 120) - 1) < 0.01)) and bool(abs(printed / excess[0] - 1) < 1e-6)
     return compare(
-        step(derivation.small_mu(), 2, 3, 4) and next_term,
+        derivation.small_mu().holds_at(2, 3, 4) and next_term,
         f"too large by $\\mu^2/120$; by 1 % at $\\mu={theory.validity(0.01):.2f}$, by 10 % at "
         f"$\\mu={theory.validity(0.1):.2f}$",
         note="for small $\\mu$, as the document says",

@@ -14,10 +14,8 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration import theory
 from gpbnb.integration.experiment import Accuracy, Meeting, Simulation, Sweep
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
-from gpbnb.tables import digits
-
-COLOURS = (OBSERVED, *OBSERVED_OTHERS)
+from gpbnb.plotting import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend, loglog, looks
+from gpbnb.tables import arithmetic
 
 
 def block_diagram(ax: Axes) -> list[Artist]:
@@ -86,8 +84,7 @@ def accuracy(results: Mapping[str, Accuracy], ax: Axes) -> list[Artist]:
         ulp = np.clip(result.ulp, 1e-2, top)
         artists += ax.plot(result.mu, ulp, marker, color=colour, ms=3, alpha=0.7, label=name, ls="none")
     artists.append(ax.axhline(top, color=REFERENCE, ls=":", label="no digit right"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     ax.set_ylim(5e-3, 1e18)
     legend(ax, fontsize=9)
     label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "error (units in the last place)")
@@ -99,13 +96,12 @@ def approximations(terms: int, ax: Axes) -> list[Artist]:
     mu = np.geomspace(0.1, 20, 300)
     exact, total = theory.walk_factor(mu), np.zeros_like(mu)
     artists: list[Artist] = []
-    for k, (c, colour) in enumerate(zip(theory.series(terms), (STRICT, *COLOURS), strict=False)):
+    for k, (c, colour) in enumerate(zip(theory.series(terms), colours(terms, (STRICT, *COLOURS)), strict=True)):
         total = total + float(c) * mu ** (2 * k + 1)
         error = np.abs(np.sqrt(np.where(total > 0, total, np.nan) / exact) - 1)
         artists += ax.plot(mu, error, color=colour, label=f"{k + 1} terms" if k else "(39)")
     artists.append(ax.axvline(2 * np.pi, color=REFERENCE, ls=":", label=r"$\mu=2\pi$"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     ax.set_ylim(1e-6, 10)
     legend(ax, fontsize=9)
     label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "error relative to (35) (no unit)")
@@ -136,8 +132,7 @@ def random_walk(result: Sweep, ax: Axes) -> list[Artist]:
         *ax.plot(line, np.sqrt(line / 6), color=STRICT, ls="--", lw=1, label=r"(39), small $\mu$"),
         *ax.plot(result.mu, np.sqrt(result.walk), "o", color=OBSERVED, label="simulation"),
     ]
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     ax.set_ylim(8e-3, 6)
     legend(ax)
     label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", r"$\sigma_{e_{rw}}\,/\,\sigma_x\sqrt{T}$ (no unit)")
@@ -167,13 +162,12 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
     n = np.geomspace(1, max(run.n[-1] for run in runs), 200)
     unit = runs[0].process.sigma / runs[0].f_c
     walk = n * float(theory.walk_factor(mu))
-    for run, colour, marker in zip(runs, COLOURS, "osD^v", strict=False):
+    for run, (marker, colour) in zip(runs, looks(len(runs)), strict=True):
         artists += ax.plot(run.n, np.sqrt(run.variance) / unit, marker, color=colour, label=run.rule.name)
     artists += ax.plot(n, np.sqrt(theory.error_variance(n, mu)), color=BOUND, label="exact, trapezoidal")
     artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=BOUND, ls=":", label="rectangular")
     artists += ax.plot(n, np.sqrt(walk), color=STRICT, ls="--", lw=1, label="random walk (35)")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     low = float(min(np.sqrt(run.variance).min() for run in runs)) / unit
     ax.set_ylim(10 ** np.floor(np.log10(low)), 10 ** np.ceil(np.log10(np.sqrt(walk[-1])) + 0.5))
     legend(ax, fontsize=8.5)
@@ -186,7 +180,7 @@ def rules_first_order(rules: Sequence[str], ax: Axes) -> list[Artist]:
     mu = np.geomspace(0.03, 100, 60)
     least = [theory.walk_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
     artists: list[Artist] = []
-    for name, colour in zip(rules, COLOURS, strict=False):
+    for name, colour in zip(rules, colours(len(rules)), strict=True):
         rate = [theory.walk_rate(theory.first_order(1.0, one), 1.0, theory.RULES[name]) for one in mu.tolist()]
         artists += ax.plot(mu, np.sqrt(np.array(rate) / least), color=colour, label=name)
     best = [theory.best_possible_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
@@ -203,11 +197,10 @@ def rules_resonant(rules: Sequence[str], zeta: float, ax: Axes) -> list[Artist]:
     rate = np.geomspace(0.3, 30, 400)
     process = theory.resonant(1.0, 2 * np.pi, zeta)
     artists: list[Artist] = []
-    for name, colour in zip(rules, COLOURS, strict=False):
+    for name, colour in zip(rules, colours(len(rules)), strict=True):
         walk = [theory.walk_rate(process, f, theory.RULES[name]) for f in rate.tolist()]
         artists += ax.plot(rate, np.sqrt(walk), color=colour, label=name, lw=1.2)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     label(
         ax,
         "$f_c$ / natural frequency $f_0$ (no unit)",
@@ -217,21 +210,16 @@ def rules_resonant(rules: Sequence[str], zeta: float, ax: Axes) -> list[Artist]:
     return artists
 
 
-def _name(fmt: FloatFormat) -> str:
-    return f"{digits(fmt)}{', chopped' if fmt.rounding is Rounding.CHOP else ''}"
-
-
 def meeting(result: Meeting, ax: Axes) -> list[Artist]:
     """Discretization and rounding errors over the iteration rate, observed (points) beside theory (lines)."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     artists: list[Artist] = []
     artists += ax.plot(result.rates, result.discretization[0], "o", color=REFERENCE, label="discretization")
     artists += ax.plot(rates, result.theory(result.formats[0], rates)[0], color=REFERENCE)
-    for i, (fmt, colour, marker) in enumerate(zip(result.formats, COLOURS, "sD^vo", strict=False)):
-        artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {_name(fmt)}")
+    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, looks(len(result.formats), "sD^vo"), strict=True)):
+        artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {arithmetic(fmt)}")
         artists += ax.plot(rates, result.theory(fmt, rates)[1], color=colour, lw=1)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     ax.set_ylim(result.rounding.min() / 300, result.discretization.max() * 3)
     legend(ax, fontsize=8, loc="lower left")
     label(ax, "iteration rate $f_c$ (Hz)", r"error, rms (unit of $x_1$ $\times$ s)")
@@ -242,15 +230,14 @@ def totals(result: Meeting, ax: Axes) -> list[Artist]:
     """Both errors together, and the best rate (star) of each format."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     artists: list[Artist] = []
-    for i, (fmt, colour, marker) in enumerate(zip(result.formats, COLOURS, "sD^vo", strict=False)):
-        artists += ax.plot(result.rates, result.total[i], marker, color=colour, label=_name(fmt))
+    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, looks(len(result.formats), "sD^vo"), strict=True)):
+        artists += ax.plot(result.rates, result.total[i], marker, color=colour, label=arithmetic(fmt))
         artists += ax.plot(rates, result.theory(fmt, rates)[2], color=colour, lw=1)
         best = theory.best_rate(result.omega_bw, result.duration, fmt)
         if rates[0] <= best <= rates[-1]:
             least = theory.two_errors(1.0, result.omega_bw, best, result.duration, fmt).total
             artists += ax.plot([best], [least * 1.6], "*", color=colour, ms=12, mfc="none")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax, fontsize=8, loc="lower left")
     label(ax, "iteration rate $f_c$ (Hz)", r"total error, rms (unit of $x_1$ $\times$ s)")
     return artists
@@ -267,7 +254,7 @@ def _best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
 def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequence[int], ax: Axes) -> list[Artist]:
     """The best iteration rate against the number of bits, for several durations in s."""
     artists: list[Artist] = []
-    for (name, duration), colour in zip(durations.items(), COLOURS, strict=False):
+    for (name, duration), colour in zip(durations.items(), colours(len(durations)), strict=True):
         for rounding, style in ((Rounding.NEAREST, "-"), (Rounding.CHOP, ":")):
             rate = [_best_rate(omega_bw, duration, FloatFormat(2, t, rounding)) for t in precisions]
             named: dict[str, Any] = {"label": name} if style == "-" else {}
@@ -281,7 +268,7 @@ def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequ
 def needed_bits(omega_bw: float, durations: Mapping[str, float], rates: Sequence[float], ax: Axes) -> list[Artist]:
     """Bits with which rounding is a tenth of the discretization error, against the rate, for durations in s."""
     artists: list[Artist] = []
-    for (name, duration), colour in zip(durations.items(), COLOURS, strict=False):
+    for (name, duration), colour in zip(durations.items(), colours(len(durations)), strict=True):
         for rounding, style in ((Rounding.NEAREST, "-"), (Rounding.CHOP, ":")):
             bits = [theory.needed_precision(omega_bw, f, duration, 2, rounding) for f in rates]
             named: dict[str, Any] = {"label": name} if style == "-" else {}

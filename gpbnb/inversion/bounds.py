@@ -286,8 +286,12 @@ def true_inverse(a: Any) -> Any:
 
 def true_error(x: Any, inverse: Any) -> Fraction:
     """The column sum norm of X minus the true inverse, exact."""
-    columns = (rationals(x) - inverse).transpose().tolist()
-    largest = max(sum((abs(entry) for entry in column), flint.fmpq(0)) for column in columns)
+    return column_sum(rationals(x) - inverse)
+
+
+def column_sum(matrix: Any) -> Fraction:
+    """The column sum norm of a matrix of python-flint's rationals."""
+    largest = max(sum((abs(entry) for entry in column), flint.fmpq(0)) for column in matrix.transpose().tolist())
     return Fraction(int(largest.p), int(largest.q))
 
 
@@ -364,13 +368,7 @@ def smallest_precision(
 def _relative(bound: float, x: FloatArray) -> float:
     """From ‖X - A⁻¹‖ to a bound of it over ‖A⁻¹‖, which is at least ‖X‖ - bound."""
     with _working(128):
-        norm = _column_sum_below(x) - flint.arb(bound)
+        norm = flint.arb(flint.fmpq(*column_sum(rationals(x)).as_integer_ratio())) - flint.arb(bound)
         if not norm > 0:
             raise ValueError("got a bound above the norm of the inverse; needed a smaller one; use more digits")
         return _upper(flint.arb(bound) / norm)
-
-
-def _column_sum_below(x: FloatArray) -> Any:
-    """Column sum norm of a FloatArray, as a ball."""
-    columns = rationals(x).transpose().tolist()
-    return flint.arb(max(sum((abs(entry) for entry in column), flint.fmpq(0)) for column in columns))

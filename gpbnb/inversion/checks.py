@@ -14,11 +14,11 @@ import sympy as sp
 from numpy.typing import NDArray
 
 from gpbnb import ledger, linalg
-from gpbnb.bounds import column_sum_norm, exact
-from gpbnb.findings import Checks, Finding, Verdict, compare
+from gpbnb.bounds import column_sum_norm, exact, inverse_of
+from gpbnb.findings import Checks, Finding, Verdict, both, compare, unverifiable
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.inversion import bounds, derivation, example, experiment, procedure, theory
+from gpbnb.inversion import derivation, example, experiment, procedure, theory
 from gpbnb.inversion.theory import Reduction
 from gpbnb.ledger.inventory import load_inventory, quote
 
@@ -26,11 +26,6 @@ CHECKS = Checks()
 
 FOUR = FloatFormat(10, 4)
 Matrix = NDArray[Any]
-
-
-def both(place: str) -> tuple[str, str]:
-    """Ids of an entry that both reports have."""
-    return f"hung1984.II.{place}", f"hung1982.III.{place}"
 
 
 def in_brackets(key: str) -> str:
@@ -94,12 +89,6 @@ class Sample:
         return found
 
 
-def inverse_of(a: Matrix) -> Matrix:
-    """The exact inverse."""
-    entries = [Fraction(int(x.p), int(x.q)) for x in bounds.true_inverse(a).entries()]
-    return np.array(entries, dtype=object).reshape(np.shape(a))
-
-
 @cache
 def samples() -> tuple[Sample, ...]:
     """Random matrices of two to four rows in three formats, with and without pivoting, and that of 11.4."""
@@ -155,7 +144,7 @@ def of_example(norm: Callable[[Matrix], Any] = column_sum_norm) -> tuple[Sample,
 # -- section 10 -----------------------------------------------------------------------------------
 
 
-@CHECKS.add("hung1984.II.s10.inverse-definition", "hung1984.II.eq33", "hung1984.II.s10.claim-n-solutions")
+@CHECKS.add(*both("s10.inverse-definition"), "hung1984.II.eq33", "hung1984.II.s10.claim-n-solutions")
 def columns_of_the_inverse() -> Finding:
     agree = all(
         (sample.reduction.stages[0] @ sample.inverse == exact(np.eye(len(sample.lower), dtype=int))).all()
@@ -203,10 +192,6 @@ def reference_33() -> Finding:
     )
 
 
-def _step(steps: Callable[[], Any], i: int) -> bool:
-    return bool(steps().steps[i].holds)
-
-
 @CHECKS.add("hung1984.II.eq34", "hung1984.II.eq35", "hung1984.II.eq36", "hung1984.II.eq37", "hung1984.II.eq38")
 def residuals() -> Finding:
     def holds(sample: Sample) -> bool:
@@ -216,7 +201,7 @@ def residuals() -> Finding:
 
     count = sum(map(holds, samples()))
     return compare(
-        count == len(samples()) and _step(derivation.first_approach, 0) and _step(derivation.first_approach, 1),
+        count == len(samples()) and derivation.first_approach().holds_at(0, 1),
         f"$E=A^{{-1}}R$ exactly, derived for every $n$ and computed for {count} of {len(samples())} inverses",
     )
 
@@ -232,7 +217,7 @@ def residual_norms() -> Finding:
 
     found = held(pairs)
     return compare(
-        found.fails == 0 and _step(derivation.first_approach_norms, 0),
+        found.fails == 0 and derivation.first_approach_norms().holds_at(0),
         f"{found}; error over bound up to {found.largest:.2g}",
         note="strict",
     )
@@ -248,7 +233,7 @@ def first_approach_1982() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq41", "hung1984.II.s10.residue-of-41", "hung1984.II.s10.line-before-42")
+@CHECKS.add("hung1984.II.eq41", *both("s10.residue-of-41"), "hung1984.II.s10.line-before-42")
 def changed_residue() -> Finding:
     h, u_j, change = sp.symbols("h u Delta", commutative=False)
     a, hat = sp.symbols("A H", commutative=False)
@@ -264,14 +249,14 @@ def changed_residue() -> Finding:
 
 @CHECKS.add("hung1984.II.eq42")
 def changed_error() -> Finding:
-    return compare(_step(derivation.first_approach, 2), "the same, exactly, for every $n$")
+    return compare(derivation.first_approach().holds_at(2), "the same, exactly, for every $n$")
 
 
 @CHECKS.add("hung1982.III.eq42")
 def changed_error_1982() -> Finding:
     numbers = in_brackets("hung1982.III.eq42"), 42
     numbered, cited = (CHECKS.get(f"hung1982.III.eq{number}") for number in numbers)
-    right = _step(derivation.first_approach, 2)
+    right = derivation.first_approach().holds_at(2)
     return compare(
         numbered is changed_error_1982 and right,
         "the equation is right; (43) is the number of the next one, and the text below cites this one as (42)",
@@ -283,7 +268,7 @@ def changed_error_1982() -> Finding:
 @CHECKS.add(*both("s10.unnumbered-e"))
 def changed_matrix_error() -> Finding:
     return compare(
-        _step(derivation.first_approach, 3) and _step(derivation.first_approach, 4),
+        derivation.first_approach().holds_at(3, 4),
         "exact with the computed inverse; what $\\approx$ drops is $A^{-1}\\Delta A\\,E$",
         note="to first order, as $\\approx$ says",
     )
@@ -343,13 +328,13 @@ def relative_error() -> Finding:
 def relative_error_1982() -> Finding:
     _, below, count = _relative_equality()
     return compare(
-        below == count and _step(derivation.first_approach_norms, 0),
+        below == count and derivation.first_approach_norms().holds_at(0),
         f"at most in {below} of {count} cases",
         note="to first order in $\\Delta A$",
     )
 
 
-@CHECKS.add("hung1984.II.s10.claim-special-case")
+@CHECKS.add(*both("s10.claim-special-case"))
 def special_case() -> Finding:
     sample, _ = of_example()
     residual = theory.residual(sample.reduction.stages[0], sample.reduction.solution)
@@ -382,7 +367,7 @@ def practicality() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s11.claim-two-parts")
+@CHECKS.add(*both("s11.claim-two-parts"))
 def two_parts() -> Finding:
     def holds(sample: Sample) -> bool:
         inverse = linalg.inv(sample.matrix, sample.pivot)
@@ -460,7 +445,7 @@ def first_multiplier() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s11-1.a-22-1-definition")
+@CHECKS.add(*both("s11-1.a-22-1-definition"))
 def reduced_entry() -> Finding:
     found = derivation.stages(2)
     a = found.given
@@ -489,7 +474,7 @@ def one_entry() -> Finding:
     )
     return compare(
         zero(one - derivation.printed_entry_error())
-        and _step(derivation.one_step, 0)
+        and derivation.one_step().holds_at(0)
         and all(zero(line - lines[0]) for line in lines[1:]),
         "the same, to first order, with one $\\epsilon$ for division, product and sum",
         note="with an error for each, $\\epsilon_3a(1)-(\\epsilon_1+\\epsilon_2)(a(0)-a(1))$",
@@ -521,7 +506,9 @@ BLOCKS = {
 }
 
 
-@CHECKS.add(*(f"hung1984.II.s11-1.{name}-definition" for name in ("a-1", "b-1", "a-2", "b-2")))
+@CHECKS.add(
+    *(f"hung1984.II.s11-1.{name}-definition" for name in ("a-1", "b-1", "a-2", "b-2")), "hung1982.III.s11-1.blocks"
+)
 def blocks() -> Finding:
     sample, _ = of_example()
     stages, rights = sample.reduction.stages, sample.general
@@ -574,6 +561,16 @@ def right_side_definition() -> Finding:
         Verdict.TYPO if zero(meant - (bi + m * b1)) else Verdict.WRONG,
         otherwise_note="two slips: the sign of $m_{i1}$, which contains the minus of (46), and $b_i(0)$ for $b_1(0)$ "
         "in the product; the last line below is right for $b_1(0)$",
+    )
+
+
+@CHECKS.add("hung1982.III.s11-1.b-i-1-definition")
+def right_side_definition_1982() -> Finding:
+    follows = right_side_step_1982().agrees
+    return unverifiable(
+        f"the next line, with $b_1(0)$ in the product, is {'right' if follows else 'not right'}: hung1984 has not its "
+        "slips from there",
+        "the line is lost from the scan",
     )
 
 
@@ -653,7 +650,7 @@ def compounded() -> Finding:
 # -- section 11.1: all steps ----------------------------------------------------------------------
 
 
-@CHECKS.add("hung1984.II.eq50", "hung1984.II.s11-1.a-33-2-definition", "hung1984.II.s11-1.b-3-2-definition")
+@CHECKS.add("hung1984.II.eq50", *both("s11-1.a-33-2-definition"), "hung1984.II.s11-1.b-3-2-definition")
 def second_step() -> Finding:
     sample, _ = of_example()
     stage, right = sample.reduction.stages[1], sample.general[1]
@@ -821,7 +818,7 @@ def _norm_finding(right: bool, extra: str = "") -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s11-1.claim-upper-triangular", "hung1984.II.s11-1.a-t-a-n-1", "hung1982.III.s11-1.a-t")
+@CHECKS.add(*both("s11-1.claim-upper-triangular"), "hung1984.II.s11-1.a-t-a-n-1", "hung1982.III.s11-1.a-t")
 def upper_triangular() -> Finding:
     count = sum(
         not np.tril(np.asarray(sample.reduction.stages[-1] != 0), -1).any()
@@ -882,7 +879,7 @@ def perturbation_defined() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s11-2.claim-transformed")
+@CHECKS.add(*both("s11-2.claim-transformed"))
 def backward() -> Finding:
     def pairs(sample: Sample) -> Iterable[tuple[Any, Any]]:
         stages, rights, x = sample.reduction
@@ -941,7 +938,7 @@ def computed_inverse() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s11-2.claim-only-back-substitution")
+@CHECKS.add(*both("s11-2.claim-only-back-substitution"))
 def only_back_substitution() -> Finding:
     def holds(sample: Sample) -> bool:
         upper = procedure.triangularize(sample.matrix, sample.pivot).upper
@@ -962,6 +959,7 @@ def only_back_substitution() -> Finding:
     "hung1984.II.eq71",
     "hung1984.II.s11-2.x-3-line",
     "hung1984.II.s11-2.x-2-line",
+    "hung1982.III.s11-2.x-3-x-2-lines",
 )
 def triangular_system() -> Finding:
     a, x, b, computed = derivation.triangle()
@@ -1053,7 +1051,7 @@ def first_row() -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s11-2.claim-approximations", "hung1984.II.eq78", "hung1984.II.eq79")
+@CHECKS.add(*both("s11-2.claim-approximations"), "hung1984.II.eq78", "hung1984.II.eq79")
 def first_equation() -> Finding:
     return compare(
         derivation.leftover(78) == 0 and derivation.leftover(79) == 0,
@@ -1158,7 +1156,7 @@ def weights() -> Finding:
 
 
 @CHECKS.add(
-    "hung1984.II.s11-2.claim-generalization",
+    *both("s11-2.claim-generalization"),
     "hung1982.III.eq85",
     "hung1984.II.eq86",
     "hung1984.II.eq87",
@@ -1271,10 +1269,10 @@ def columns_again() -> Finding:
     return compare(bool(columns_of_the_inverse().agrees), "the columns of the inverse, as in (33)", note="a definition")
 
 
-@CHECKS.add("hung1984.II.eq94", "hung1982.III.eq93-94", "hung1984.II.s11-3.claim-similar-to-68", "hung1984.II.eq95")
+@CHECKS.add("hung1984.II.eq94", "hung1982.III.eq93-94", *both("s11-3.claim-similar-to-68"), "hung1984.II.eq95")
 def resultant_error() -> Finding:
     return compare(
-        derivation.perturbed_system().holds and _step(derivation.two_systems, 4),
+        derivation.perturbed_system().holds and derivation.two_systems().holds_at(4),
         "right to first order, with the $\\delta A$ and $\\delta b_j$ of the system that was solved",
         note="each column has its own $\\Delta A$; with $A^{-1}$ for $\\hat A^{-1}$ it is exact",
     )
@@ -1318,11 +1316,16 @@ def error_norm() -> Finding:
     )
 
 
+def terms_of_96() -> tuple[float, float, float]:
+    """The norms of error, computed inverse and bracket of (95), in the example of 11.4."""
+    sample, error = of_example()
+    bracket = theory.printed_bracket(sample.reduction, sample.beta)
+    return error, float(column_sum_norm(sample.reduction.solution)), float(column_sum_norm(bracket))
+
+
 @CHECKS.add("hung1984.II.s11-3.claim-e-defined")
 def letter_e() -> Finding:
-    sample, error = of_example()
-    inverse = float(column_sum_norm(sample.reduction.solution))
-    bracket = float(column_sum_norm(theory.printed_bracket(sample.reduction, sample.beta)))
+    error, inverse, bracket = terms_of_96()
     return compare(
         error <= inverse * error,
         f"the scan has one $E$ before, (36), the error itself: with it (96) would say that $\\|\\hat A^{{-1}}\\|$ is "
@@ -1412,6 +1415,17 @@ def flow_chart_1982() -> Finding:
         Verdict.INCONSISTENT if of_a == len(samples()) else Verdict.WRONG,
         otherwise_note="the box that generates $\\tilde A$ calls it the error in $A_T$ and contradicts (91), where "
         "it is one of $A$; else the boxes follow the equations",
+    )
+
+
+@CHECKS.add("hung1982.III.s11-3.claim-d-defined")
+def letter_d() -> Finding:
+    error, inverse, bracket = terms_of_96()
+    return compare(
+        error <= inverse * bracket < inverse * 3,
+        f"with the bracket of (95), (96) says for the example of 11.4 that {error:.1e} is at most "
+        f"{inverse * bracket:.1e}; with the $D$ below (27), whose norm is $n$, at most {inverse * 3:.2g}",
+        note="the letter has two more meanings, below (27) and in the examples of 9.2",
     )
 
 

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import exact
+from gpbnb.bounds import exact, inverse_of
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.inversion import bounds, procedure
+from gpbnb.inversion import procedure
 from gpbnb.inversion.procedure import NORMS
 
 #: The matrix, as printed.
@@ -125,7 +125,7 @@ def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
 
 def round_once(a: Matrix, fl: Rounder) -> Matrix:
     """The true inverse, each entry rounded: the best that a format can hold."""
-    return _each(_inverse(a), fl)
+    return _each(inverse_of(a), fl)
 
 
 METHODS: dict[str, Callable[[Matrix, Rounder], Matrix]] = {
@@ -141,11 +141,6 @@ def _each(a: Matrix, fl: Rounder) -> Matrix:
         entry: Any = a[index]
         out[index] = fl(entry)
     return out
-
-
-def _inverse(a: Matrix) -> Matrix:
-    entries = [Fraction(int(x.p), int(x.q)) for x in bounds.true_inverse(a).entries()]
-    return np.array(entries, dtype=object).reshape(a.shape)
 
 
 # -- readings -------------------------------------------------------------------------------------
@@ -209,6 +204,7 @@ def chance(printed: str) -> float:
     return math.log10(high / low)
 
 
+@cache
 def _interval(printed: str) -> tuple[Fraction, Fraction]:
     """Numbers that are printed so if rounded, or if chopped."""
     digits, exponent = printed.split("e")
@@ -263,7 +259,7 @@ def error_readings() -> tuple[Column, ...]:
         computed = [invert(a, fl) for a, fl in zip(stored, rounders, strict=True)]
         references = {"given": [given] * 3} | ({"stored": stored} if (stored[0] != given).any() else {})
         for reference, matrices in references.items():
-            true = [_inverse(a) for a in matrices]
+            true = [inverse_of(a) for a in matrices]
             for (name, norm), relative in product(NORMS.items(), (False, True)):
                 values = tuple(
                     float(norm(x - t)) / (float(norm(t)) if relative else 1)
@@ -413,7 +409,7 @@ def possible(
     if reference not in ("given", "stored"):
         raise ValueError(f"reference: got {reference!r}; needed 'given' or 'stored'")
     printed = printed or PRINTED["error"][PLACES.index(places)]
-    true = _inverse(matrix() if reference == "given" else _each(matrix(), wordlength.rounder(places)))
+    true = inverse_of(matrix() if reference == "given" else _each(matrix(), wordlength.rounder(places)))
     scale = Fraction(float(NORMS[norm](true))) if relative else Fraction(1)
     low, high = (end * scale for end in _interval(printed))
     square = norm == "Frobenius"

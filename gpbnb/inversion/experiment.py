@@ -105,8 +105,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
             if name not in MAY_BE_ABSENT:
                 raise
     error = bounds.true_error(computing.x, inverse)
-    zero = a.format.array(np.zeros(a.shape, dtype=int))
-    condition = float(bounds.true_error(a, bounds.rationals(zero))) * float(bounds.true_error(zero, inverse))
+    condition = float(bounds.column_sum(bounds.rationals(a))) * float(bounds.column_sum(inverse))
     return Trial(family, a, computing.x, pivot, condition, error, evaluated)
 
 
@@ -270,26 +269,6 @@ def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np
         with suppress(np.linalg.LinAlgError):
             trials.append(trial(fmt.array(conditioned(n, d, rng)), True, BETTER, "nearly singular"))
     return trials
-
-
-def worst_small(
-    names: Sequence[str], fmt: FloatFormat, n: int, largest: int, draws: int, rng: np.random.Generator
-) -> dict[str, Trial]:
-    """Among matrices of random integers up to `largest` in size, those whose error exceeds each bound the most.
-
-    Pivoting is on. `draws` matrices are looked at; the singular ones, and those with an exact inverse, do not count.
-    """
-    worst: dict[str, Trial] = {}
-    for _ in range(draws):
-        a = fmt.array(rng.integers(-largest, largest + 1, (n, n)))
-        try:
-            one = trial(a, True, names, "small integers")
-        except np.linalg.LinAlgError:
-            continue
-        for name in names:
-            if one.error and (name not in worst or one.ratio(name) < worst[name].ratio(name)):
-                worst[name] = one
-    return worst
 
 
 SEED = 1984

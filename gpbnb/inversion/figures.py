@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from gpbnb.inversion.example import PLACES, PRINTED, Column
 from gpbnb.inversion.experiment import Frozen, Trial
 from gpbnb.inversion.tables import in_math
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.plotting import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend
 
 
 class Box(NamedTuple):
@@ -123,7 +123,7 @@ def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
     families = [str(row["family"]) for row in result.select(format="all", bound=bounds[0]) if row["family"] != "all"]
     width = 0.8 / len(bounds)
     artists: list[Artist] = []
-    for k, (name, colour) in enumerate(zip(bounds, _colours(len(bounds)), strict=True)):
+    for k, (name, colour) in enumerate(zip(bounds, colours(len(bounds), (STRICT, *COLOURS)), strict=True)):
         rows = [result.select(family=family, format="all", bound=name)[0] for family in families]
         share = [100 * int(row["violations_regular"]) / max(1, int(row["regular"])) for row in rows]
         bars = ax.bar(
@@ -143,7 +143,7 @@ def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
 def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: str = "size") -> list[Artist]:
     """Bound over error: medians with the range as a band against the size, or points against the condition number."""
     artists: list[Artist] = []
-    for name, marker, colour in zip(bounds, "osD^Pv", _colours(len(bounds)), strict=False):
+    for name, marker, colour in zip(bounds, "osD^Pv", colours(len(bounds), (STRICT, *COLOURS)), strict=False):
         having = [one for one in trials if name in one.bounds and one.error]
         if against == "condition":
             x = [one.condition for one in having]
@@ -164,10 +164,3 @@ def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: st
         ax.set_xscale("log")
     label(ax, "condition number (no unit)" if against == "condition" else "rows $n$", "bound / error (no unit)")
     return artists
-
-
-def _colours(count: int) -> list[str]:
-    colours = [STRICT, OBSERVED, *OBSERVED_OTHERS]
-    if count > len(colours):
-        raise ValueError(f"got {count} bounds; needed at most {len(colours)}, or colours repeat; draw two figures")
-    return colours[:count]

@@ -6,19 +6,20 @@ from collections.abc import Mapping, Sequence
 
 from gpbnb.inversion.example import PLACES, PRINTED, Claim, Column, Possible, Search
 from gpbnb.inversion.experiment import Frozen, Trial
-from gpbnb.tables import Table, digits
+from gpbnb.tables import Table, digits, scientific
 
 
 def table1(readings: Sequence[tuple[Column, Column]]) -> Table:
     """The six numbers of Table 1 in some readings, each with its ratio to the printed one."""
     header = ("wordlength", "reading", *(f"{name}, {p}" for name in ("bound", "error") for p in PLACES))
-    printed = ("as printed", "", *(_number(float(value)) for name in ("bound", "error") for value in PRINTED[name]))
+    values = (float(value) for name in ("bound", "error") for value in PRINTED[name])
+    printed = ("as printed", "", *(scientific(value, 4) for value in values))
     body = [
         (
             str(bound.wordlength),
             in_math(bound.detail),
             *(
-                f"{_number(value)} ({ratio:.3g})"
+                f"{scientific(value, 4)} ({ratio:.3g})"
                 for column in (bound, error)
                 for value, ratio in zip(column.values, column.ratios, strict=True)
             ),
@@ -48,7 +49,7 @@ def searches(found: Sequence[Search]) -> Table:
             str(one.agreements),
             f"{one.expected:.2g}",
             _reading(one.closest),
-            ", ".join(map(_number, one.closest.values)),
+            ", ".join(scientific(value, 4) for value in one.closest.values),
             ", ".join(f"{ratio:.3g}" for ratio in one.closest.ratios),
         )
         for one in found
@@ -96,7 +97,7 @@ def summary(result: Frozen, bounds: Sequence[str]) -> Table:
     body = []
     for name in bounds:
         (row,) = result.select(family="all", format="all", bound=name)
-        ratios = (_number(float(row[key])) if "e" in row[key] else row[key] for key in keys[3:])
+        ratios = (scientific(float(row[key]), 4) if "e" in row[key] else row[key] for key in keys[3:])
         body.append((in_math(name), *(row[key] for key in keys[:3]), *ratios))
     names = (f"bound / error: {name}" for name in keys[3:])
     return Table(f"{len(body)} bounds", ("bound", "inversions", "says nothing", "exceeded", *names), tuple(body))
@@ -111,8 +112,8 @@ def worst(trials: Mapping[str, Trial]) -> Table:
             f"{digits(one.matrix.format)}, {one.matrix.format.rounding.value}",
             "yes" if one.pivot else "no",
             f"{one.condition:.0f}",
-            _number(float(one.error)),
-            _number(one.bounds[name]),
+            scientific(float(one.error), 4),
+            scientific(one.bounds[name], 4),
             f"{one.ratio(name):.3g}",
         )
         for name, one in trials.items()
@@ -129,8 +130,8 @@ def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
             "; ".join(" ".join(map(str, row)) for row in one.matrix),
             digits(one.matrix.format),
             "; ".join(" ".join(map(str, row)) for row in one.computed),
-            _number(float(one.error)),
-            *(_number(one.bounds[bound]) if bound in one.bounds else "none" for bound in bounds),
+            scientific(float(one.error), 4),
+            *(scientific(one.bounds[bound], 4) if bound in one.bounds else "none" for bound in bounds),
         )
         for name, one in trials.items()
     ]
@@ -146,9 +147,3 @@ def in_math(text: str) -> str:
     """Set the inverse in the name of a reading in mathematics."""
     words = text.split(", ")
     return ", ".join({"A": "$A^{-1}$", "A_T": "$A_T^{-1}$"}.get(word, word) for word in words)
-
-
-def _number(value: float) -> str:
-    """Four digits and a power of ten."""
-    digits_, exponent = f"{value:.3e}".split("e")
-    return rf"${digits_}\cdot 10^{{{int(exponent)}}}$"

@@ -286,16 +286,6 @@ def strict_bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> An
     return norm(_checked(reduction).solution) * size / _rest(size, "‖E‖", "more digits")
 
 
-def strict_entry_bounds(reduction: Reduction, beta: Any, inverse: Any) -> NDArray[Any]:
-    r"""Bound of each entry of the error, :math:`|A^{-1}|(|\delta b| + |\delta A||\hat x|)`; to every order.
-
-    `inverse` is the true inverse of ``stages[0]``, whose rows are in the order of elimination.
-    """
-    entries = bracket_bounds(reduction, strict_perturbation_bounds(reduction, beta))
-    left, right = _common(abs(_square(inverse, "inverse")), entries)
-    return np.asarray(left @ right)
-
-
 # -- checked input, exact or float64 --------------------------------------------------------------
 
 

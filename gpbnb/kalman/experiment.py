@@ -483,7 +483,7 @@ class Run:
         if not fine:
             raise ValueError(
                 f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
-                "this format; use more digits"
+                "this format; use more digits, or add a little to the diagonals of Q and P0"
             )
         self._parts = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
 
@@ -525,6 +525,8 @@ class Run:
         if self.fmt is None:
             entries = np.asarray(values)
             if entries.dtype == np.float64:
+                if not np.isfinite(entries).all():
+                    raise ValueError("got measurements with NaN or infinity; needed finite numbers")
                 return np.stack([entries, np.zeros_like(entries)], axis=-1)
             return double_doubles(entries)
         array = self.fmt.array(values)

@@ -10,12 +10,23 @@ from matplotlib.axes import Axes
 
 from gpbnb.formats import Rounding
 from gpbnb.kalman import theory
-from gpbnb.kalman.answers import Answers, decimal_digits, end
+from gpbnb.kalman.answers import Answers, decimal_digits, largest
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.experiment import Bounded, Form
 from gpbnb.kalman.year import Year
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
-from gpbnb.tables import digits
+from gpbnb.plotting import (
+    BOUND,
+    COLOURS,
+    OBSERVED,
+    OBSERVED_OTHERS,
+    REFERENCE,
+    STRICT,
+    colours,
+    label,
+    legend,
+    loglog,
+)
+from gpbnb.tables import arithmetic
 
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",
@@ -40,11 +51,8 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = No
     """
     if quantity not in _QUANTITIES:
         raise ValueError(f"got quantity {quantity!r}; needed one of {', '.join(_QUANTITIES)}")
-    colours = (OBSERVED, *OBSERVED_OTHERS, STRICT, REFERENCE)
-    if len(runs) > len(colours):
-        raise ValueError(f"got {len(runs)} curves; needed at most {len(colours)}; draw two figures")
     artists: list[Artist] = []
-    for run, colour in zip(runs, colours, strict=False):
+    for run, colour in zip(runs, colours(len(runs), (*COLOURS, STRICT, REFERENCE)), strict=True):
         values = np.abs(getattr(run, quantity))
         if values.ndim > 1:
             values = values.max(axis=1)
@@ -56,8 +64,7 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = No
         )
     if goal is not None:
         artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     label(ax, "step $k$", _QUANTITIES[quantity])
     return artists
 
@@ -81,9 +88,7 @@ def _name(run: Year) -> str:
     fmt = run.case.fmt
     if fmt is None:
         return "reference"
-    chopped = ", chopped" if fmt.rounding is Rounding.CHOP else ""
-    form = "" if run.case.form is Form.REPORT else f", {run.case.form}"
-    return f"{digits(fmt)}{chopped}{form}"
+    return arithmetic(fmt) + ("" if run.case.form is Form.REPORT else f", {run.case.form}")
 
 
 def year_end(
@@ -93,7 +98,7 @@ def year_end(
     counts: Sequence[tuple[str, theory.Coefficients]],
     answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
-    """Error of drift or rate at the end of a year against the digits, beside (125) and the answers to how many.
+    """Largest error of drift or rate in a year against the digits, beside (125) and the answers to how many.
 
     Parameters
     ----------
@@ -106,7 +111,7 @@ def year_end(
     looks = [(form, rounding) for rounding in Rounding for form in Form]
     for form, rounding in looks:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        points = [(decimal_digits(fmt), largest(run)) for run in group if (fmt := run.case.fmt) is not None]
         if points:
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
             name = f"{form}, {rounding.value}"
@@ -123,7 +128,7 @@ def year_end(
         artists += ax.plot(list(places), [goal] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name)
     ax.set_yscale("log")
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "error after a year (mas, mas/yr)")
+    label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
     return artists
 
 
@@ -150,7 +155,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         (Rounding.NEAREST, OBSERVED, "emulated, rounded"),
     ):
         group = [run for run in found.runs if run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), end(run)) for run in group if (fmt := run.case.fmt) is not None]
+        points = [(decimal_digits(fmt), largest(run)) for run in group if (fmt := run.case.fmt) is not None]
         artists += ax.plot(*zip(*points, strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     t = np.linspace(3.5, 23, 50)
     for word, faults, style in (
@@ -173,7 +178,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     ax.set_yticks(10.0 ** np.arange(-8, 20, 4))
     ax.set_xticks(range(4, 24, 2))
     legend(ax, loc="lower left")
-    label(ax, "decimal digits that the computer carries", "error after a year (mas, mas/yr)")
+    label(ax, "decimal digits that the computer carries", "largest error in a year (mas, mas/yr)")
     return artists
 
 
@@ -189,8 +194,7 @@ def contraction(found: Bounded, state: int, ax: Axes, name: str) -> list[Artist]
     seen = error > 0
     artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
     artists += ax.plot(steps, found.state[:, state], color=BOUND, label="contraction bound")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax)
     label(ax, "step $k$", f"error of {name}")
     return artists

@@ -146,10 +146,19 @@ def _check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None
     except ValueError:
         definite = False
     if not definite:
-        least = float(np.linalg.eigvalsh(matrix.astype(np.float64))[0])
+        values = np.linalg.eigvalsh(matrix.astype(np.float64))
+        cure = ""
+        if not strictly and abs(values[0]) < 2.0**-10 * abs(
+            values[-1]
+        ):  # such as G @ G.T in floats, or stored in few bits
+            more = 2 * max(-values[0], 2.0**-52 * values[-1])
+            cure = (
+                "; it misses that by no more than roundings may: compute its entries as Fractions, or add a little to "
+                f"its diagonal, {more:.0e} or more"
+            )
         raise ValueError(
-            f"got {letter} with a least eigenvalue near {least:.3g}; needed a positive {needed} matrix: "
-            f"no variance may be {'zero or ' if strictly else ''}negative, in any direction"
+            f"got {letter} with a least eigenvalue near {values[0]:.3g}; needed a positive {needed} matrix: "
+            f"no variance may be {'zero or ' if strictly else ''}negative, in any direction{cure}"
         )
 
 

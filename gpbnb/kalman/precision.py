@@ -14,7 +14,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb._kernels.carriers import LARGEST_PRECISION
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.kalman.experiment import Followed, Form, Kept, Simulation, emulate, log_spaced, reference
+from gpbnb.kalman.experiment import Followed, Form, Kept, Run, Simulation, compare_runs, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 
 Basis = Literal["emulation", "bound"]
@@ -31,20 +31,25 @@ class Requirement:
     steps : of the filter.
     tried : precision, and largest error over goal of all states and steps looked at; infinite where the run stopped, a
         variance was lost, or nothing can be said.
+    why : of the largest precision tried that has no number for an error, why not; empty if all have one. Shown where it
+        kept the answer from being a smaller one.
     """
 
     fmt: FloatFormat | None
     basis: Basis
     steps: int
     tried: tuple[tuple[int, float], ...]
+    why: str = ""
 
     def __str__(self) -> str:
         if self.fmt is None:
-            return f"no precision up to {self.tried[-1][0]} digits meets the goal ({self.basis}, {self.steps} steps)"
-        ratio = dict(self.tried)[self.fmt.precision]
+            most, why = self.tried[-1][0], f"; {self.why}" if self.why else ""
+            return f"no precision up to {most} digits meets the goal ({self.basis}, {self.steps} steps){why}"
+        tried = dict(self.tried)
+        why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
         return (
             f"{self.fmt.precision} digits of base {self.fmt.base}, {self.fmt.rounding.value}: "
-            f"{ratio:.2g} of the goal ({self.basis}, {self.steps} steps)"
+            f"{tried[self.fmt.precision]:.2g} of the goal ({self.basis}, {self.steps} steps){why}"
         )
 
 
@@ -85,31 +90,20 @@ def required_precision(
     ValueError : a goal that is not positive; another basis; a base without compiled loops; not as many measurements as
         steps.
     """
-    goals = np.broadcast_to(np.asarray(goal, dtype=np.float64), (model.n,))
-    if not (goals > 0).all() or not np.isfinite(goals).any():
-        raise ValueError(f"got goal {goal}; needed an error above 0 for each of the {model.n} states, one finite")
-    if basis not in ("emulation", "bound"):
-        raise ValueError(f'got basis {basis!r}; needed "emulation" or "bound"')
-    if base not in LARGEST_PRECISION:
-        raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
-    if steps < 1:
-        raise ValueError(f"got {steps} steps; needed at least 1")
+    goals = _checked(model, goal, base, form, basis)
+    if not isinstance(steps, (int, np.integer)) or steps < 1:
+        raise ValueError(f"got {steps!r} steps; needed a whole number, at least 1")
     if z is None:
         z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
-    measured, marks = np.asarray(z), log_spaced(steps, 16)
-    if measured.shape != (steps, model.m):
-        raise ValueError(
-            f"got {len(measured)} measurements of shape {measured.shape[1:]}; needed one for each of the {steps} "
-            f"steps, of shape ({model.m},)"
-        )
+    measured, marks = _measured(model, z, steps), log_spaced(steps, 16)
     true = reference(model, measured, marks) if basis == "emulation" else None
-    most, tried = LARGEST_PRECISION[base], dict[int, float]()
+    most, tried, why = LARGEST_PRECISION[base], dict[int, float](), dict[int, str]()
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
 
         def meets(precision: int) -> bool:
             if precision not in tried:
                 fmt = FloatFormat(base, precision, rounding)
-                tried[precision] = _over_goal(model, measured, fmt, form, marks, true, goals)
+                tried[precision], why[precision] = _over_goal(model, measured, fmt, form, marks, true, goals)
                 bar.update()
             return tried[precision] <= 1
 
@@ -117,7 +111,8 @@ def required_precision(
         while answer < most and not (meets(answer) and meets(answer + 1)):
             answer += 1
         found = FloatFormat(base, answer, rounding) if meets(answer) else None
-    return Requirement(found, basis, steps, tuple(sorted(tried.items())))
+    reasons = [f"in {digits} digits {reason}" for digits, reason in sorted(why.items()) if reason]
+    return Requirement(found, basis, int(steps), tuple(sorted(tried.items())), reasons[-1] if reasons else "")
 
 
 def survey(
@@ -135,12 +130,55 @@ def survey(
     Returns
     -------
     tried : precision, and largest error or bound over goal, as in :class:`Requirement`.
+
+    Raises
+    ------
+    ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
-    measured, goals = np.asarray(z), np.broadcast_to(np.asarray(goal, dtype=np.float64), (model.n,))
+    goals, measured = _checked(model, goal, base, form, basis), _measured(model, z)
+    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
+    if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION[base]]:
+        raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION[base]}")
     marks = log_spaced(len(measured), 16)
     true = reference(model, measured, marks) if basis == "emulation" else None
-    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
-    return tuple((fmt.precision, _over_goal(model, measured, fmt, form, marks, true, goals)) for fmt in formats)
+    return tuple((fmt.precision, _over_goal(model, measured, fmt, form, marks, true, goals)[0]) for fmt in formats)
+
+
+def _checked(model: LinearModel, goal: Any, base: int, form: Form, basis: str) -> NDArray[np.float64]:
+    """The goal of each state, if all that was asked makes sense."""
+    needed = f"needed an error above 0 for each of the {model.n} states, one finite"
+    try:
+        goals = np.asarray(goal, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"got goal {goal!r}; {needed}") from None
+    if goals.shape not in ((), (model.n,)):
+        raise ValueError(f"got goal {goal} of shape {goals.shape}; {needed}: one number, or {model.n} in a row")
+    if not (goals > 0).all() or not np.isfinite(goals).any():
+        raise ValueError(f"got goal {goal}; {needed}")
+    if basis not in ("emulation", "bound"):
+        raise ValueError(f'got basis {basis!r}; needed "emulation" or "bound"')
+    if base not in LARGEST_PRECISION:
+        raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
+    if not isinstance(form, Form):
+        raise ValueError(f"got form {form!r}; needed one of {', '.join(f'Form.{each.name}' for each in Form)}")
+    return np.broadcast_to(goals, (model.n,))
+
+
+def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[Any]:
+    """Measurements, (steps, m), each of them a number."""
+    measured = np.asarray(z)
+    if measured.ndim != 2 or measured.shape[1] != model.m or not len(measured) or steps not in (None, len(measured)):
+        count = f"{steps} steps" if steps else "steps, at least one"
+        column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
+        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else repr(z)
+        raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
+    if measured.dtype.kind == "f" and not np.isfinite(measured).all():
+        k, i = np.argwhere(~np.isfinite(measured))[0]
+        raise ValueError(
+            f"got {measured[k, i]} for measurement {i} of step {k + 1}; needed finite numbers; where a sensor is "
+            "silent, give H a cycle with a row of zeros there, and any number as its measurement"
+        )
+    return measured
 
 
 def _over_goal(
@@ -151,17 +189,22 @@ def _over_goal(
     marks: Sequence[int],
     true: Kept | None,
     goals: NDArray[np.float64],
-) -> float:
-    """Largest error over goal against `true`, or without it, largest bound over goal; infinite if a run fails."""
-    asked = np.isfinite(goals)
+) -> tuple[float, str]:
+    """Largest error over goal against `true`, or without it, largest bound over goal; or infinity, and why."""
+    asked, measured = np.isfinite(goals), fmt.array(z)
     try:
-        if true is None:
-            followed = Followed(model, fmt, form, marks)
-            followed.take(fmt.array(z))
-            lost, error = followed.stopped is not None, followed.bounds[0]
-        else:
-            history = emulate(model, z, fmt, form, marks, true)
-            lost, error = history.indefinite is not None or history.stopped is not None, history.state
-    except ValueError:  # a covariance is not definite in so few digits
-        return math.inf
-    return math.inf if lost else float((np.abs(error[:, asked]) / goals[asked]).max())
+        run = (Followed if true is None else Run)(model, fmt, form, marks)
+    except ValueError as error:  # a covariance is not definite in so few digits
+        return math.inf, str(error)
+    run.take(measured)
+    if run.stopped is not None:
+        return math.inf, f"the run stopped at step {run.stopped}, by a division by zero or a number out of range"
+    if isinstance(run, Followed):
+        errors = run.bounds[0]
+    elif true is not None:
+        errors = compare_runs(run, true).state
+        if run.indefinite is not None:
+            lost = f"a computed variance was not positive at step {run.indefinite}"
+            return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
+    ratio = float((np.abs(errors[:, asked]) / goals[asked]).max())
+    return ratio, "the bound says nothing" if math.isinf(ratio) else ""

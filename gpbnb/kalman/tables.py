@@ -8,13 +8,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.formats import FloatFormat, prints_as
 from gpbnb.kalman import smallest, theory, year
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.model import STATES, LinearModel
 from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
-from gpbnb.tables import Table, digits
+from gpbnb.tables import Table, arithmetic, scientific, short
 
 DOUBLE = FloatFormat(2, 53)
 
@@ -45,7 +45,7 @@ def slips(k: int, n: int, m: int) -> Table:
     wrong = theory.one_figure_slips(k, n, m, printed["first coefficient"])
     loops = sorted({a * n + b * m + c for a, b, c in wrong})
     ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in wrong)
-    products = [loop for loop in loops if theory.prints_as(theory.read_as_product(k, n, m, loop), printed[_SECOND])]
+    products = [loop for loop in loops if prints_as(theory.read_as_product(k, n, m, loop), printed[_SECOND])]
     values: list[tuple[str, str, str]] = [
         ("first coefficient", scientific(first, 5), f"{', '.join(map(str, loops))} times $k$, as by {ways}"),
         (
@@ -59,7 +59,7 @@ def slips(k: int, n: int, m: int) -> Table:
     for name, coefficient in (("first", first), ("second", second)):
         given = Fraction(printed[f"{name} coefficient"])
         beta = Fraction(printed[f"{name} beta"])
-        follows = theory.prints_as(1 / given, printed[f"{name} beta"])
+        follows = prints_as(1 / given, printed[f"{name} beta"])
         values.append(
             (f"{name} beta", scientific(Fraction(1, coefficient), 4), _yes(follows, "one over the printed coefficient"))
         )
@@ -135,11 +135,6 @@ def mildest(fmts: Sequence[FloatFormat]) -> Table:
             body.append((arithmetic(fmt), name, *cells))
     header = ("arithmetic", "form of (99)", "$R$ for (105)", "$R$ for (108)", "$R$ for (125)")
     return Table(f"the largest noise that breaks a bound, {len(body)} ways", header, tuple(body))
-
-
-def arithmetic(fmt: FloatFormat) -> str:
-    """Digits and rounding of a format."""
-    return digits(fmt) + (", chopped" if fmt.rounding is Rounding.CHOP else "")
 
 
 def states(model: LinearModel) -> Table:
@@ -235,23 +230,6 @@ def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
         body.append((name, answer.basis, str(answer.steps), smallest_format, ratio))
     header = ("filter", "rests on", "steps", "smallest precision", "error or bound / goal")
     return Table(f"{len(body)} answers", header, tuple(body))
-
-
-def scientific(value: Fraction | int, figures: int) -> str:
-    r"""A number as ``$2.5860\\times10^{8}$``."""
-    mantissa, _, power = f"{float(value):.{figures - 1}e}".partition("e")
-    return f"${mantissa}\\times10^{{{int(power)}}}$" if int(power) else f"${mantissa}$"
-
-
-def short(value: float, figures: int = 2) -> str:
-    """A number in a cell: plain, or with a power of ten where it is large or small."""
-    rounded = float(f"{value:.{figures - 1}e}")
-    if rounded == 0 or not math.isfinite(value):
-        return f"{rounded:g}"
-    if 1e-4 <= abs(rounded) < 1e6:
-        return np.format_float_positional(rounded, trim="-")
-    mantissa, _, power = f"{rounded:.{figures - 1}e}".partition("e")
-    return f"${mantissa}\\times10^{{{int(power)}}}$"
 
 
 def _typeset(printed: str) -> str:

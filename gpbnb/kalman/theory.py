@@ -36,12 +36,11 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Any, NamedTuple
 
 import numpy as np
-from flint import fmpq, fmpq_mat
 from numba import njit
 from numpy.typing import NDArray
 
-from gpbnb.bounds import column_sum_norm, exact, max_norm
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.bounds import column_sum_norm, exact, inverse_of, max_norm
+from gpbnb.formats import FloatFormat, Rounding, prints_as
 
 # -- the counts of the report -----------------------------------------------------------------------------------------
 
@@ -212,12 +211,6 @@ PRINTED = {
 """Numbers of the closing example as hung1982 prints them; hung1984 loses a minus sign."""
 
 
-def prints_as(value: Fraction | int, printed: str) -> bool:
-    """Whether `value`, rounded to as many digits as `printed` has, is `printed`."""
-    figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("0"))
-    return FloatFormat(10, figures).round(value) == Fraction(printed)
-
-
 def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
     """The second coefficient with its plus sign read as times, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
 
@@ -289,19 +282,12 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
     Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
     predicted = Phi @ P @ Phi.T + Q
     S = H @ predicted @ H.T + R
-    gain = predicted @ H.T @ _inverse_of(S)
+    gain = predicted @ H.T @ inverse_of(S)
     transition = Phi - gain @ (H @ Phi)
     innovation = z - H @ (Phi @ x)
     return ExactStep(
         Phi @ x + gain @ innovation, predicted - gain @ (H @ predicted), predicted, gain, S, innovation, transition
     )
-
-
-def _inverse_of(S: NDArray[Any]) -> NDArray[Any]:
-    m = len(S)
-    inverse = fmpq_mat(m, m, [fmpq(s.numerator, s.denominator) for s in S.flat]).inv()
-    entries = [Fraction(int(e.p), int(e.q)) for e in inverse.entries()]
-    return np.array(entries, dtype=object).reshape(m, m)
 
 
 # -- the contraction bound --------------------------------------------------------------------------------------------

@@ -102,6 +102,8 @@ def _cases() -> tuple[Case, ...]:
     cases += [Case(usual, 2, t, nearest, Form.REPORT) for t in (16, 26, 40)]
     cases += [Case(usual, 2, t, chop, Form.REPORT) for t in (14, 20, 28, 53)]
     cases += [Case(usual, 2, 53, nearest, form) for form in others]
+    # The neighbours of the smallest that meet a milliarcsecond a year, so that these are known to the digit.
+    cases += [Case(usual, 10, 9, nearest, Form.REPORT), *(Case(usual, 2, t, nearest, Form.REPORT) for t in (31, 33))]
     return tuple(cases)
 
 

@@ -28,7 +28,8 @@ CHAPTERS = {
 
 LEDGER_PAGE = "errata.html"
 _DIFFERS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.TYPO, Verdict.OCR)
-_EMPHASIS = re.compile(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])")
+EMPHASIS = re.compile(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])")
+"""What stands between stars in a note."""
 _PAGE_OF = {title: topic for topic, title in CHAPTERS.items()}
 
 
@@ -311,7 +312,7 @@ def _chapter_link(title: str) -> str:
 def _text(text: str) -> str:
     r"""Turn prose with math between dollar signs into HTML; a chapter's title between stars becomes a link."""
     parts = one_line(text).split("$")
-    parts[::2] = [_EMPHASIS.sub(_emphasis, escape(prose, quote=False)) for prose in parts[::2]]
+    parts[::2] = [EMPHASIS.sub(_emphasis, escape(prose, quote=False)) for prose in parts[::2]]
     parts[1::2] = [
         rf'<span class="math notranslate nohighlight">\({escape(math, quote=False)}\)</span>' for math in parts[1::2]
     ]

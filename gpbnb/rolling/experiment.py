@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 from scipy import signal
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb._kernels.carriers import Compiled
+from gpbnb._kernels.carriers import LARGEST_PRECISION, Compiled
 from gpbnb._kernels.scalar import add, load, multiply, store, subtract
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat
+from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
 from gpbnb.rolling.flicker import flicker, record
-from gpbnb.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN, YEAR
+from gpbnb.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
 
 YEAR_SAMPLES = round(YEAR / INTERVAL)
 
@@ -650,9 +651,8 @@ def digits_needed_observed(
     """
     bound = theory.rotation_bound(method, period, steps[-1])
     rotate = {"recursion": recursion, "direct": direct}[method]
-    most = {2: 53, 10: 18, 16: 13}[base]
     enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
-    for precision in range(min(most, enough), 1, -1):
+    for precision in range(min(LARGEST_PRECISION[base], enough), 1, -1):
         if rotate(FloatFormat(base, precision), period, steps).drift_error(drift) > error:
             return precision + 1
     return 2

@@ -9,10 +9,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.measurement import YEAR
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, colours, label, legend, loglog
 from gpbnb.rolling import theory
 from gpbnb.rolling.experiment import DriftStudy, FilterStudy, Rotation, Slope, Spectra, Spectrum
-from gpbnb.rolling.theory import YEAR
 from gpbnb.tables import digits
 
 DENSITY = "density (mas²/Hz)"
@@ -35,7 +35,7 @@ def density(spectrum: Spectrum, level: float, slope: Slope, ax: Axes) -> list[Dr
     artists += ax.plot(
         spectrum.frequency, theory.flicker_density(level, spectrum.frequency), color=THEORY, label="$A/f$"
     )
-    _loglog(ax)
+    loglog(ax)
     legend(ax)
     label(ax, "frequency (Hz)", DENSITY)
     return artists
@@ -61,7 +61,7 @@ def before_rolling(result: Spectra, ax: Axes) -> list[Drawn]:
     f = np.geomspace(1 / result.duration, 0.5 / result.interval, 300)
     artists += ax.plot(f, theory.flicker_density(result.level, f, result.interval), color=THEORY, label="theory")
     artists += ax.plot(f, theory.ramp_density(result.drift, result.duration, f), color=THEORY)
-    _loglog(ax)
+    loglog(ax)
     legend(ax, fontsize=9)
     label(ax, "frequency (Hz)", DENSITY, "(a) without rolling")
     return artists
@@ -79,7 +79,7 @@ def after_rolling(result: Spectra, ax: Axes) -> list[Drawn]:
         line = theory.ramp_density(result.drift, result.duration, distance) / 4
         artists += ax.plot(1 / result.period + side * distance, line, color=THEORY)
     ax.set_ylim(*_range(result))
-    _loglog(ax)
+    loglog(ax)
     legend(ax, fontsize=9)
     label(ax, "frequency (Hz)", DENSITY, "(b) rolled")
     return artists
@@ -149,7 +149,7 @@ def drift_errors(study: DriftStudy, ax: Axes) -> list[Drawn]:
             level = theory.drift_error_unrolled(study.level, duration, at_rest=True)
             artists.append(ax.axhline(level, color=THEORY, ls="--", label=r"$\sqrt{8A}/T$"))
     artists.append(ax.axhline(theory.DRIFTS[1], color=REFERENCE, lw=0.8, label="frame dragging"))
-    _loglog(ax)
+    loglog(ax)
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     label(ax, "roll period (s)", "standard error of drift (mas a year)")
     return artists
@@ -178,7 +178,7 @@ def bandwidths(study: FilterStudy, density: float, ax: Axes) -> list[Drawn]:
     artists += ax.plot(b, slope / (4 * b), color=STRICT, lw=0.8, ls="--", label="lag")
     artists += ax.plot(b, np.sqrt(density * b), color=STRICT, lw=0.8, ls=":", label="noise in band")
     artists.append(ax.axvline(theory.best_bandwidth(study.drift, density), color=REFERENCE, lw=0.8, label="optimum"))
-    _loglog(ax)
+    loglog(ax)
     ax.set_ylim(bottom=0.3 * float(np.sqrt(study.error.min())))
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     label(ax, "noise bandwidth $B$ (Hz)", "rms error (mas)")
@@ -199,7 +199,7 @@ def resets(
     artists.append(ax.axhline(never, color=OBSERVED, ls=":", label="simulated, never reset"))
     free = theory.rate_walk_error(drift, intensity)
     artists.append(ax.axhline(free, color=THEORY, ls="--", label="theory, never reset"))
-    _loglog(ax)
+    loglog(ax)
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     label(ax, "time between resets (s)", "rms drift error (mas a year)")
     return artists
@@ -208,12 +208,7 @@ def resets(
 def rotations(results: Sequence[Rotation], drift: float, ax: Axes, title: str = "") -> list[Drawn]:
     """Error in mas of a derolled drift over the year, a colour a format, beside the bound (line)."""
     artists: list[Drawn] = []
-    colours = (OBSERVED, *OBSERVED_OTHERS)
-    if len(results) > len(colours):
-        raise ValueError(
-            f"got {len(results)} results; needed at most {len(colours)}, or colours repeat; draw two figures"
-        )
-    for colour, result in zip(colours, results, strict=False):
+    for colour, result in zip(colours(len(results)), results, strict=True):
         t = result.step * result.interval
         scale = drift * t / YEAR
         shown = result.size > 0
@@ -223,7 +218,7 @@ def rotations(results: Sequence[Rotation], drift: float, ax: Axes, title: str = 
         within = result.bound < 2
         artists += ax.plot(t[within] / 86400, (scale * result.bound)[within], color=colour, lw=0.9)
     artists.append(ax.axhline(1, color=REFERENCE, lw=0.8, ls="--"))
-    _loglog(ax)
+    loglog(ax)
     legend(ax, fontsize=8.5)
     label(ax, "time (days)", "error (mas)", title)
     return artists
@@ -238,7 +233,7 @@ def phase_costs(angle: np.ndarray, found: np.ndarray, drift: tuple[float, float]
         artists += ax.plot(np.degrees(angle), np.abs(found[:, i]), "o", color=colour, label=name)
         artists += ax.plot(np.degrees(line), np.abs(cost[:, i]), color=THEORY, label="theory" if i else None)
     artists.append(ax.axhline(1, color=REFERENCE, lw=0.8, ls="--", label="1 mas a year"))
-    _loglog(ax)
+    loglog(ax)
     legend(ax, fontsize=9)
     label(ax, "phase error (degrees)", "error of drift (mas a year)")
     return artists
@@ -252,8 +247,3 @@ def _points(spectrum: Spectrum, name: str, colour: str, ax: Axes) -> list[Drawn]
 def _range(result: Spectra) -> tuple[float, float]:
     low = float(theory.flicker_density(result.level, 0.5 / result.interval)) / 10
     return low, 30 * float(theory.flicker_density(result.level, 1 / result.duration))
-
-
-def _loglog(ax: Axes) -> None:
-    ax.set_xscale("log")
-    ax.set_yscale("log")

@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.formats import FloatFormat
+from gpbnb.measurement import YEAR
 from gpbnb.rolling import experiment, theory
-from gpbnb.rolling.theory import YEAR
-from gpbnb.tables import Table, digits
+from gpbnb.tables import Table, arithmetic
 
 
 def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
     """What rounding ω_r costs in a year: worst case, then as it is."""
     body = []
     for fmt in formats:
-        name = digits(fmt) + (", chopped" if fmt.rounding is Rounding.CHOP else "")
         for case, error in (
             ("worst", float(theory.worst_rate_error(period, fmt))),
             ("as rounded", abs(experiment.rounded_rate_error(period, fmt))),
         ):
-            body.append((name, case, *_cells(error)))
+            body.append((arithmetic(fmt), case, *_cells(error)))
     header = (
         "register",
         "which $\\Delta\\omega$",

@@ -21,9 +21,7 @@ from scipy import fft, special
 
 from gpbnb.bounds import gamma
 from gpbnb.formats import FloatFormat
-
-YEAR = 365 * 86400.0
-"""A year in seconds; at a sample every 10 s, of 3,153,600 samples."""
+from gpbnb.measurement import YEAR
 
 DRIFTS = (6600.0, 40.0)
 """Geodetic drift and frame dragging, in mas a year, rounded; Everitt et al. 2011."""
@@ -193,13 +191,6 @@ def derolled_density(level: float, period: float, frequency: Any, interval: floa
     """
     f, roll = np.asarray(frequency, dtype=np.float64), 1 / period
     return np.asarray((flicker_density(level, roll - f, interval) + flicker_density(level, roll + f, interval)) / 2)
-
-
-def rectified_power(level: float, period: float, bandwidth: float) -> float:
-    r"""Power of the derolled noise of a component below a frequency, :math:`A\,\mathrm{artanh}(B/f_r)`, in mas²."""
-    if not 0 <= bandwidth * period < 1:
-        raise ValueError(f"got a bandwidth of {bandwidth:g} Hz; needed less than the roll frequency {1 / period:g} Hz")
-    return level * math.atanh(bandwidth * period)
 
 
 FLOWN_DENSITY = float(flicker_density(LEVEL, 1 / PERIOD_FLOWN, INTERVAL))

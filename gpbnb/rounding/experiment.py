@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import column_sum_norm
+from gpbnb.bounds import column_sum_norm, integers
 from gpbnb.floatarray import FloatArray
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.rounding import theory
@@ -223,9 +223,11 @@ def random_numbers(
     significands = rng.integers(limit // fmt.base, limit, shape)
     if kind != "like signs":
         significands = significands * rng.choice([-1, 1], shape)
-    scale = rng.integers(-fmt.precision, fmt.precision + 1, shape) if kind == "far exponents" else 0
-    base = np.full(shape, Fraction(fmt.base), dtype=object)
-    numbers = fmt.array(significands.astype(object) * base**scale)
+    if kind == "far exponents":
+        powers = np.array([Fraction(fmt.base) ** e for e in range(-fmt.precision, fmt.precision + 1)])
+        numbers = fmt.array(significands.astype(object) * powers[rng.integers(0, len(powers), shape)])
+    else:
+        numbers = fmt.array(significands)
     if kind == "cancelling":
         head = numbers[..., :-1]
         last: Any = -head.sum(axis=-1)[..., np.newaxis]
@@ -336,13 +338,14 @@ def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rn
         x = cast(FloatArray, np.repeat(once, longest, axis=1))
     else:
         x = random_numbers(rng, fmt, (repeats, longest), kind)
-    terms = x.to_fractions()
-    total, exact, size = x[:, 0], terms[:, 0], abs(terms[:, 0])
+    terms, unit = integers(x.to_fractions())
+    sizes: Any = abs(terms)
+    total, exact, size = x[:, 0], terms[:, 0], sizes[:, 0]
     errors = {}
     for j in range(1, longest):
-        total, exact, size = total + x[:, j], exact + terms[:, j], size + abs(terms[:, j])
+        total, exact, size = total + x[:, j], exact + terms[:, j], size + sizes[:, j]
         if j + 1 in lengths:
-            errors[j + 1] = (total.to_fractions() - exact) / (size * fmt.unit_roundoff)
+            errors[j + 1] = (total.to_fractions() / unit - exact) / (size * fmt.unit_roundoff)
     ordered = tuple(sorted(errors))
     return Growth(fmt, kind, ordered, np.array([errors[n] for n in ordered], dtype=np.float64))
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from gpbnb.bounds import column_sum_norm
 from gpbnb.formats import Rounding
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
 from gpbnb.rounding import theory
 from gpbnb.rounding.experiment import Growth, Sawtooth, Trial
 from gpbnb.tables import digits
@@ -37,7 +37,7 @@ def worst_ratios(
 ) -> list[Artist]:
     """Largest error over a first-order bound, against the number of operands, a curve a format."""
     artists: list[Artist] = []
-    for (marker, colour), curve in zip(_looks(len(curves)), curves, strict=True):
+    for (marker, colour), curve in zip(looks(len(curves)), curves, strict=True):
         n = [len(trial.inputs[0]) for trial in curve]
         ratio = [trial.ratio(bound) for trial in curve]
         name = digits(curve[0].fmt)
@@ -51,7 +51,7 @@ def worst_ratios(
 def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
     """Median (points) and largest error (thin lines) of sums of ever more terms, beside both laws."""
     artists: list[Artist] = []
-    for (marker, colour), result in zip(_looks(len(results)), results, strict=True):
+    for (marker, colour), result in zip(looks(len(results)), results, strict=True):
         size, n = np.abs(result.errors), np.array(result.lengths)
         name = f"{result.kind}, {result.fmt.rounding.value}"
         artists += ax.plot(n, np.median(size, axis=1), marker, color=colour, label=name)
@@ -61,8 +61,7 @@ def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
     law = [theory.probabilistic_sum_factor(int(k), beta) / float(beta) for k in n]
     artists += ax.plot(n, n - 1, color=BOUND, label="bound $n-1$")
     artists += ax.plot(n, law, color=STRICT, ls="--", label=r"$\sqrt{n}$ law, fails in 1 %")
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     label(ax, "terms $n$", r"error of the sum / $\beta\sum|x_j|$ (no unit)")
     return artists
@@ -77,8 +76,7 @@ def cancellation(trials: Sequence[Trial], ax: Axes) -> list[Artist]:
         points = [(x, t.ratio(bound)) for x, t in zip(lost, trials, strict=True) if t.error]
         artists += ax.plot(*zip(*points, strict=True), marker, color=colour, label=f"error / {bound}", alpha=0.6)
     artists.append(ax.axhline(1, color=BOUND, label="bound"))
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    loglog(ax)
     legend(ax)
     label(ax, r"cancellation $\|M_1\|\,\|M_2\| \,/\, \|M_1 M_2\|$ (no unit)", "error / bound (no unit)")
     return artists
@@ -102,11 +100,3 @@ def pessimism(
     ax.axhline(0.1, color=REFERENCE, lw=0.6, ls=":")
     label(ax, f"{operands} $n$", f"error / {bound_name} (no unit)")
     return [artist for group in boxes.values() for artist in group]
-
-
-def _looks(curves: int) -> list[tuple[str, str]]:
-    """Marker and colour of each of some curves."""
-    looks = list(zip("osD^v", (OBSERVED, *OBSERVED_OTHERS), strict=True))
-    if curves > len(looks):
-        raise ValueError(f"got {curves} curves; needed at most {len(looks)}, or colours repeat; draw two figures")
-    return looks[:curves]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import column_sum_norm, exact, gamma, gamma_probabilistic
+from gpbnb.bounds import column_sum_norm, exact, gamma, gamma_probabilistic, integers
 
 # -- sums: errors in the units of the terms -------------------------------------------------------
 
@@ -235,10 +235,11 @@ def matrix_sum_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 def product(matrices: Sequence[Any]) -> NDArray[Any]:
     """The exact product of matrices."""
     interfaces(matrices)
-    result = exact(matrices[0])
+    result, unit = integers(exact(matrices[0]))
     for matrix in matrices[1:]:
-        result = result @ exact(matrix)
-    return result
+        counts, its_unit = integers(exact(matrix))
+        result, unit = result @ counts, unit * its_unit
+    return np.asarray(result * unit)
 
 
 def interfaces(matrices: Sequence[Any]) -> list[int]:

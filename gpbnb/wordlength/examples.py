@@ -24,8 +24,17 @@ STANDARD = {
     "binary64": FloatFormat(2, 53),
 }
 
-#: Least and largest powers of two of their normal numbers; IEEE 754-2019, table 3.5.
-NORMAL = {"binary16": (-14, 15), "binary32": (-126, 127), "binary64": (-1022, 1023)}
+#: Formats of accelerators, with the exponents of binary32. Sums are usually kept in binary32 there.
+ACCELERATORS = {"bfloat16": FloatFormat(2, 8), "TF32": FloatFormat(2, 11)}
+
+#: Least and largest powers of two of their normal numbers; IEEE 754-2019, table 3.5, for the standard ones.
+NORMAL = {
+    "binary16": (-14, 15),
+    "binary32": (-126, 127),
+    "binary64": (-1022, 1023),
+    "bfloat16": (-126, 127),
+    "TF32": (-126, 127),
+}
 
 
 def tilt(wander: str = "1e-10") -> LinearModel:
@@ -52,6 +61,31 @@ def tilt(wander: str = "1e-10") -> LinearModel:
 def tilt_measurements(steps: int, seed: int = 0) -> NDArray[np.float64]:
     """Measurements of the tilt filter that begins 3° and 0.5 °/s off, in steps of 1/4096; (steps, 2)."""
     return Simulation(tilt(), (3.0, -5.0, 0.5), seed, resolution=2.0**-12).measurements(steps)
+
+
+def altimeter(more: str = "0") -> LinearModel:
+    """Height (m), speed (m/s) and bias of an accelerometer (m/s²) by a barometer, 50 steps a second: n = 3, m = 1.
+
+    The states are what the accelerometer alone gets wrong, so that it is no input here. Its noise of 0.35 m/s² enters
+    height and speed of a step together, as in textbooks: that part of Q has rank one.
+
+    Parameters
+    ----------
+    more : what is added to the diagonal of Q.
+    """
+    step, push = Fraction(1, 50), exact(["1/5000", "1/50", "0"])
+    Q = np.multiply.outer(push, push) * Fraction("0.35") ** 2
+    for i, wander in enumerate(("0", "0", "1e-8")):
+        Q[i, i] += Fraction(wander) + Fraction(more)
+    return LinearModel(
+        Phi=exact([["1", step, -step * step / 2], ["0", "1", -step], ["0", "0", "1"]]),
+        H=exact([["1", "0", "0"]]),
+        Q=Q,
+        R=exact([["0.25"]]),
+        x0=exact(["0", "0", "0"]),
+        P0=exact([["100", "0", "0"], ["0", "1", "0"], ["0", "0", "0.04"]]),
+        name="altimeter",
+    )
 
 
 def tracker(origin: str = "0") -> LinearModel:

@@ -10,11 +10,9 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend
+from gpbnb.plotting import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, looks
 from gpbnb.wordlength.examples import STANDARD
 
-_COLOURS = (OBSERVED, *OBSERVED_OTHERS)
-_MARKERS = "os^Dv"
 #: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
@@ -46,7 +44,7 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
 def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
     """Error (points) and bound (lines) over the goal against the bits, a colour a form; infinities are left out."""
     artists: list[Artist] = []
-    for (name, curve), colour, marker in zip(emulated.items(), _COLOURS, _MARKERS, strict=False):
+    for (name, curve), (marker, colour) in zip(emulated.items(), looks(len(emulated), "os^Dv"), strict=True):
         points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]
         artists += ax.plot(*zip(*points, strict=True), marker, color=colour, label=name)
         lines = [(t, ratio) for t, ratio in bounded.get(name, ()) if ratio < math.inf]
@@ -63,7 +61,7 @@ def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes
 def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) -> list[Artist]:
     """Bits (points: observed; lines: bounds and formulas) against the number of steps."""
     artists: list[Artist] = []
-    for (name, curve), colour, marker in zip(points.items(), _COLOURS, _MARKERS, strict=False):
+    for (name, curve), (marker, colour) in zip(points.items(), looks(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
     for (name, curve), style in zip(lines.items(), ("-", "--", "-.", ":"), strict=False):
         artists += ax.plot(*zip(*curve, strict=True), style, color=BOUND, label=name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.bounds import exact
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.inversion.bounds import rationals, smallest_precision, true_inverse
+from gpbnb.inversion.bounds import column_sum, rationals, smallest_precision, true_inverse
 from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision
@@ -45,7 +46,13 @@ def growth(
     Parameters
     ----------
     options : form, basis, base and rounding of that function.
+
+    Raises
+    ------
+    ValueError : a number of steps below 1, or more than there are measurements; as that function.
     """
+    if not all(1 <= k <= len(z) for k in steps):
+        raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
     return tuple(required_precision(_first(model, k), k, goal, z=z[:k], **options) for k in steps)
 
 
@@ -118,7 +125,14 @@ def deafness(
     Parameters
     ----------
     state : its index. last : how many steps at the end are watched one by one.
+
+    Raises
+    ------
+    ValueError : no such state; not more measurements than the steps to be watched.
     """
+    _check_state(model, state)
+    if not 0 < last < len(z):
+        raise ValueError(f"got {last} steps to watch of {len(z)}; needed at least 1, and one less than all")
     marks = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
     true, found = reference(model, z, marks), []
     for fmt in formats:
@@ -132,9 +146,22 @@ def deafness(
 
 
 def hidden_bits(model: LinearModel, z: NDArray[Any], state: int) -> float:
-    r""":math:`\log_2 P_{ii}/Q_{ii}` after the last step: with fewer bits than about that, adding Q changes nothing."""
-    kept = reference(model, z, (len(z),))
-    return math.log2(float(kept.P[-1, state, state]) / float(model.Q[0, state, state]))
+    r""":math:`\log_2 P_{ii}/Q_{ii}` after the last step: with fewer bits than about that, adding Q changes nothing.
+
+    Infinite where the state has no process noise.
+
+    Raises
+    ------
+    ValueError : no such state.
+    """
+    _check_state(model, state)
+    kept, noise = reference(model, z, (len(z),)), float(model.Q[0, state, state])
+    return math.log2(float(kept.P[-1, state, state]) / noise) if noise else math.inf
+
+
+def _check_state(model: LinearModel, state: int) -> None:
+    if state not in range(model.n):
+        raise ValueError(f"got state {state!r}; needed an index from 0 to {model.n - 1}")
 
 
 def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
@@ -162,6 +189,89 @@ def companion(
     return np.abs(history.state).max(axis=0), bound.max(axis=0)
 
 
+def native(
+    model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]], progress: bool = False
+) -> NDArray[np.float64]:
+    """Run the form by the innovation in a type of NumPy, with what a processor does and the emulation does not.
+
+    Operations and their order are those of the emulation. Here they are rounded half to even, numbers too small become
+    subnormal or zero, and too large ones infinite. Products and sums are rounded one by one: none is fused.
+
+    Parameters
+    ----------
+    model, z : as of :func:`gpbnb.kalman.precision.survey`; each entry is read as float64, and then as the type.
+    dtype : numpy.float16, numpy.float32 or numpy.float64.
+    progress : show a bar, a tick a step.
+
+    Returns
+    -------
+    x : (steps, n), the estimate after each step; not finite where the range did not suffice.
+    """
+    with np.errstate(all="ignore"):
+        told = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
+        return innovation(told, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
+
+
+def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]]) -> NDArray[np.float64]:
+    """Largest error of each state of :func:`native`, (n,), as :func:`gpbnb.kalman.precision.survey` takes it.
+
+    The errors of storing model and measurements are among them; infinite or NaN where the range did not suffice.
+    """
+    marks = log_spaced(len(z), 16)
+    true = reference(model, z, marks).x.astype(np.float64)
+    return np.asarray(np.abs(native(model, z, dtype)[np.array(marks) - 1] - true).max(axis=0))
+
+
+def innovation(told: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
+    """The form by the innovation, in whatever numbers the arrays hold; see :func:`native`.
+
+    Parameters
+    ----------
+    told : Phi, H, Q, R with a leading axis, x0 and P0, as of :meth:`gpbnb.kalman.model.LinearModel.to_float`.
+    z : (steps, m).
+
+    Returns
+    -------
+    x : (steps, n), the estimate after each step.
+    """
+    x, P, estimates = told["x0"][:, np.newaxis], told["P0"], np.empty((len(z), len(told["x0"])), z.dtype)
+    identity = np.eye(len(P), dtype=P.dtype)
+    for k, measured in enumerate(tqdm(z, desc="native", unit="step", disable=not progress)):
+        Phi, H, Q, R = (told[letter][k % len(told[letter])] for letter in ("Phi", "H", "Q", "R"))
+        predicted = _times(_times(Phi, P), Phi.T) + Q
+        PHt = _times(predicted, H.T)
+        K = _times(PHt, _inverse(_times(H, PHt) + R))
+        P = _times(identity - _times(K, H), predicted)
+        x = _times(Phi, x)
+        x = x + _times(K, measured[:, np.newaxis] - _times(H, x))
+        estimates[k] = x[:, 0]
+    return estimates
+
+
+def _times(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """The product, each entry summed from left to right; NumPy's own is summed otherwise."""
+    result = a[:, :1] * b[:1]
+    for k in range(1, a.shape[1]):
+        result = result + a[:, k : k + 1] * b[k : k + 1]
+    return result
+
+
+def _inverse(a: NDArray[Any]) -> NDArray[Any]:
+    """By elimination without exchange of rows."""
+    upper, m = a.copy(), len(a)
+    result = np.eye(m, dtype=a.dtype)
+    for k in range(m):
+        for i in range(k + 1, m):
+            factor = upper[i, k] / upper[k, k]
+            upper[i, k + 1 :] = upper[i, k + 1 :] - factor * upper[k, k + 1 :]
+            result[i] = result[i] - factor * result[k]
+    for k in range(m - 1, -1, -1):
+        for i in range(k + 1, m):
+            result[k] = result[k] - upper[k, i] * result[i]
+        result[k] = result[k] / upper[k, k]
+    return result
+
+
 class Inverse(NamedTuple):
     """Bits that the inverse of a matrix needs, and what its condition lets one expect."""
 
@@ -181,18 +291,24 @@ def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = R
     Parameters
     ----------
     matrix : (n, n), exact, symmetric positive definite.
+    goal : largest error of the inverse, relative to it in norm; above 0.
+
+    Raises
+    ------
+    ValueError : a matrix that is not symmetric, or without a positive diagonal; a goal that is not above 0.
     """
+    matrix = exact(matrix)
+    square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
+    if not square or np.any(matrix != matrix.T) or not (matrix.diagonal() > 0).all():
+        raise ValueError(f"{name}: got shape {matrix.shape}; needed a symmetric matrix with a positive diagonal")
+    if not 0 < goal < math.inf:
+        raise ValueError(f"{name}: got goal {goal}; needed a relative error above 0")
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
-    conditions = [_column_sum(rationals(a)) * _column_sum(true_inverse(a)) for a in (matrix, scaled)]
+    conditions = [column_sum(rationals(a)) * column_sum(true_inverse(a)) for a in (matrix, scaled)]
     expected = digits_of_125(conditions[1], Fraction(goal), 2, rounding)
     proved = smallest_precision(matrix, goal, 2, rounding).fmt.precision
     return Inverse(name, float(conditions[0]), float(conditions[1]), expected, proved)
-
-
-def _column_sum(matrix: Any) -> Fraction:
-    columns = matrix.transpose().tolist()
-    return max(sum((abs(Fraction(int(e.p), int(e.q))) for e in column), Fraction(0)) for column in columns)
 
 
 def in_units(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:

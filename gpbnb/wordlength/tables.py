@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.kalman.precision import Requirement
-from gpbnb.kalman.tables import arithmetic, short
-from gpbnb.tables import Table, digits
-from gpbnb.wordlength.examples import NORMAL
+from gpbnb.tables import Table, arithmetic, digits, short
+from gpbnb.wordlength.examples import ACCELERATORS, NORMAL, STANDARD
 from gpbnb.wordlength.study import Deafness, Inverse, Span
 
 
@@ -49,6 +48,17 @@ def spans(found: Sequence[Span]) -> Table:
         held = [name for name, (low, high) in NORMAL.items() if low <= each.least and each.largest <= high]
         body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(held) or "none"))
     return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "held by"), tuple(body))
+
+
+def processors() -> Table:
+    """Formats of processors: what they are here, and the range that they have and the emulation has not."""
+    body = []
+    for name, fmt in (STANDARD | ACCELERATORS).items():
+        low, high = NORMAL[name]
+        told = f"FloatFormat({fmt.base}, {fmt.precision})"
+        body.append((name, told, short(float(fmt.unit_roundoff)), f"$2^{{{low}}}$", f"$2^{{{high + 1}}}$"))
+    header = ("format", "here", "unit roundoff", "normal from", "and below")
+    return Table(f"{len(body)} formats of processors", header, tuple(body))
 
 
 def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:

@@ -4,27 +4,14 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from drawn import legend_of
 
-from gpbnb import plotting
 from gpbnb.budget import experiment, figures, tables, theory
 
 READING = theory.read(files("gpbnb.budget") / "example.csv")
 BUDGET = READING.budget
-
-
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()
-    plt.close("all")
-
-
-def legend_of(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def test_budget_curve(ax):

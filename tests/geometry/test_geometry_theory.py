@@ -105,6 +105,14 @@ def test_reach_is_where_the_loss_is_the_limit():
     assert theory.twist_limit(MAS) / ARCSEC == pytest.approx(206264.806 / 6600, rel=1e-6)
 
 
+def test_aberration():
+    """The constant of aberration is 20.4955 arcseconds; the Earth's orbit is not quite a circle."""
+    year, orbit = theory.aberration(640e3)
+    assert year == pytest.approx(20.4955 * ARCSEC, rel=2e-4)
+    period = 2 * math.pi * (theory.RADIUS + 640e3) / (orbit * theory.LIGHT)
+    assert period == pytest.approx(97.5 * 60, rel=1e-2)
+
+
 def test_precession_rates_are_of_the_size_that_is_used():
     geodetic, motional = theory.precession_rates(640e3)
     assert geodetic == pytest.approx(theory.GEODETIC, rel=0.01)
@@ -136,6 +144,7 @@ def test_cases():
         (lambda: theory.line_fit_leak(1, 5, 1), "with 1 samples each"),
         (lambda: theory.ramp_leak(1, -600), "got a roll period of -600"),
         (lambda: theory.precession_rates(-1), "got an altitude of -1"),
+        (lambda: theory.aberration(-1), "got an altitude of -1"),
     ],
 )
 def test_bad_input_is_refused(call, message):

@@ -5,42 +5,32 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace as replaced
 
+import faults
 import numpy as np
 import pytest
 import sympy as sp
+from faults import breaks, plus, replace, times
 
 from gpbnb import ledger
 from gpbnb.derivation import Derivation, Step
 from gpbnb.findings import Verdict
 from gpbnb.integration import checks, derivation, experiment, theory
-from gpbnb.ledger.checking import load_checks
 
-INVENTORY = ledger.load_inventory()
-ENTRIES = ledger.select(INVENTORY, "savage2016")
-FUNCTIONS = {check.__name__: check for check in checks.CHECKS.values()}
+ENTRIES = ledger.select(faults.INVENTORY, "savage2016")
+FUNCTIONS = faults.functions(checks.CHECKS)
 MAIN = checks.MAIN
 
 
-def clear():
-    for cached in (
-        checks.slips,
-        checks.mended,
-        checks.simulated,
-        derivation.noise,
-        derivation.transition_matrix,
-        theory.exact_step,
-    ):
-        getattr(cached, "cache_clear", lambda: None)()
+REMEMBERING = (checks, derivation, theory)
 
 
 @pytest.fixture(scope="module")
 def rows():
-    clear()
-    return ledger.examine(ENTRIES, load_checks(INVENTORY))
+    return faults.examined(ENTRIES)
 
 
 def finding(rows, key):
-    return next(row.finding for row in rows if row.entry.id == MAIN + key)
+    return faults.finding(rows, MAIN + key)
 
 
 def test_every_entry_of_the_document_has_a_check_here():
@@ -48,10 +38,6 @@ def test_every_entry_of_the_document_has_a_check_here():
     assert len(ENTRIES) == 69
     numbers = {n for n in range(1, 40) if not any(entry.item.split()[:2] == ["eq", f"({n})"] for entry in ENTRIES)}
     assert numbers == set()
-
-
-def test_no_check_fails(rows):
-    assert [row.entry.id for row in rows if row.error is not None or row.finding is None] == []
 
 
 def test_verdicts(rows):
@@ -72,11 +58,7 @@ def test_verdicts(rows):
 
 
 def test_differences_have_notes(rows):
-    for row in rows:
-        if row.finding.verdict is not Verdict.VERIFIED:
-            assert row.finding.note
-        if row.finding.agrees is not None:
-            assert row.finding.recomputed
+    faults.check_texts(rows)
 
 
 def test_findings_quote_the_computed_numbers(rows):
@@ -90,10 +72,8 @@ def test_findings_quote_the_computed_numbers(rows):
 
 
 def test_findings_are_the_same_again(rows):
-    clear()
-    for name in ("transient", "exact", "complete_set"):
-        keys = [key for key, check in checks.CHECKS.items() if check is FUNCTIONS[name]]
-        assert [row.finding for row in rows if row.entry.id in keys] == [FUNCTIONS[name]()] * len(keys)
+    faults.forget(*REMEMBERING)
+    faults.check_again(rows, checks.CHECKS, "transient", "exact", "complete_set")
 
 
 # -- each check can come out otherwise ------------------------------------------------------------
@@ -102,38 +82,12 @@ def test_findings_are_the_same_again(rows):
 @pytest.fixture
 def patch(monkeypatch):
     """Change the code, with nothing remembered; undone, and forgotten, afterwards."""
-    clear()
-    yield monkeypatch
-    monkeypatch.undo()
-    clear()
+    with faults.forgetting(monkeypatch, *REMEMBERING):
+        yield monkeypatch
 
 
-def replace(module, name, value):
-    return lambda patch: patch.setattr(module, name, value)
-
-
-def times(module, name, factor):
-    original = getattr(module, name)
-    return replace(module, name, lambda *arguments, **named: original(*arguments, **named) * factor)
-
-
-def plus(module, name, amount):
-    original = getattr(module, name)
-    return replace(module, name, lambda *arguments, **named: original(*arguments, **named) + amount)
-
-
-def breaks(name, place=None):
-    """A derivation of which one step, or every step, does not hold."""
-    wrong = Step("wrong", derivation.MU, derivation.T)
-
-    def apply(patch):
-        steps = list(getattr(derivation, name)().steps)
-        chosen = range(len(steps)) if place is None else [place]
-        for i in chosen:
-            steps[i] = wrong
-        patch.setattr(derivation, name, lambda: Derivation(tuple(steps)))
-
-    return apply
+def fails(name, place=None):
+    return breaks(derivation, name, place)
 
 
 def changed_after(patch):
@@ -228,7 +182,7 @@ DISAGREE = [
     ("means", biased),
     ("rate_of_a_cycle", growing),
     ("density", times(theory.Process, "psd", 1.001)),
-    ("density", breaks("continuous", 0)),
+    ("density", fails("continuous", 0)),
     ("steady_input", times(derivation, "noise", 2)),
     ("steady_input", plus(derivation, "p22", 1)),
     ("steady_covariances", times(derivation, "p12", 2)),
@@ -241,7 +195,7 @@ DISAGREE = [
     ("discrete", times(derivation, "p22", 2)),
     ("discrete", times(derivation, "p12", 2)),
     ("transition", times(derivation, "printed_transition", 2)),
-    ("transition", breaks("transition", 1)),
+    ("transition", fails("transition", 1)),
     ("components", changed_after),
     ("error_variance", plus(theory, "error_variance", 0.1)),
     ("products", changed_after),
@@ -251,29 +205,29 @@ DISAGREE = [
     ("p31", changed_first),
     ("p33", changed_after),
     ("covariance_equation", times(derivation, "printed_transition", 2)),
-    ("continuous_solution", breaks("continuous", 4)),
+    ("continuous_solution", fails("continuous", 4)),
     ("p22_at_cycles", times(derivation, "p22", 2)),
     ("p12_at_cycles", times(derivation, "p12", 2)),
     ("p11_at_cycles", times(derivation, "noise", 2)),
-    ("steady_p31", breaks("steady_state", 0)),
+    ("steady_p31", fails("steady_state", 0)),
     ("steady_p31", times(derivation, "p12", 2)),
     ("steady_changes", changed_steady(0)),
     ("steady_changes", changed_steady(1)),
     ("steady_changes", changed_steady(2)),
-    ("steady_rate", breaks("steady_state", 3)),
-    ("random_walk", breaks("steady_state", 5)),
+    ("steady_rate", fails("steady_state", 3)),
+    ("random_walk", fails("steady_state", 5)),
     ("random_walk", times(theory, "random_walk", 1.001)),
-    ("exact", breaks("independent")),
+    ("exact", fails("independent")),
     ("exact", times(theory.Process, "psd", 1.001)),
     ("exact", replace(experiment.Sweep, "deviations", lambda self: [5.0])),
     ("large_n", times(theory, "takeover", 0.9)),
     ("units", replace(theory, "random_walk", lambda sigma, omega, f: sigma * omega / f)),
-    ("exponential", breaks("small_mu", 0)),
-    ("approximation", breaks("small_mu", 2)),
-    ("approximation", breaks("small_mu", 3)),
+    ("exponential", fails("small_mu", 0)),
+    ("approximation", fails("small_mu", 2)),
+    ("approximation", fails("small_mu", 3)),
     ("approximation", times(theory, "approximation_ratio", 1.001)),
     ("approximation", times(theory, "printed_random_walk", 1.001)),
-    ("transient", breaks("transient", 1)),
+    ("transient", fails("transient", 1)),
     ("transient", plus(theory, "error_variance_recursion", 0.1)),
     ("transient", replace(experiment.Simulation, "deviations", lambda self, variance: [5.0])),
     ("numerical_example", times(theory, "walk_rate", 1.001)),
@@ -282,13 +236,10 @@ DISAGREE = [
 
 
 @pytest.mark.parametrize(("name", "change"), DISAGREE)
-def test_a_check_that_agrees_can_disagree(patch, name, change):
-    assert FUNCTIONS[name]().agrees is True
-    clear()
+def test_a_check_that_agrees_can_disagree(rows, patch, name, change):
+    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {True}
     change(patch)
-    finding = FUNCTIONS[name]()
-    assert finding.agrees is False
-    assert finding.verdict not in (Verdict.VERIFIED, Verdict.ANSWERED)
+    faults.check_disagrees(FUNCTIONS[name])
 
 
 def half_is_one(patch):
@@ -339,11 +290,9 @@ AGREE = [
 
 @pytest.mark.parametrize(("name", "change"), AGREE)
 def test_a_check_that_disagrees_can_agree(rows, patch, name, change):
-    assert all(row.finding.agrees is False for row in rows if checks.CHECKS[row.entry.id] is FUNCTIONS[name])
+    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {False}
     change(patch)
-    found = FUNCTIONS[name]()
-    assert found.agrees is True
-    assert found.verdict is Verdict.VERIFIED
+    faults.check_agrees(FUNCTIONS[name])
 
 
 @pytest.mark.parametrize(
@@ -354,9 +303,9 @@ def test_a_check_that_disagrees_can_agree(rows, patch, name, change):
         ("rate", changed_steady(0), Verdict.WRONG),
         ("p32", changed_after, Verdict.WRONG),
         ("p22_recursion", times(derivation, "p22_change", 2), Verdict.WRONG),
-        ("covariance_components", breaks("continuous", 1), Verdict.WRONG),
-        ("covariance_components", breaks("continuous", 2), Verdict.WRONG),
-        ("series", breaks("small_mu", 1), Verdict.WRONG),
+        ("covariance_components", fails("continuous", 1), Verdict.WRONG),
+        ("covariance_components", fails("continuous", 2), Verdict.WRONG),
+        ("series", fails("small_mu", 1), Verdict.WRONG),
         ("abstract", replace(theory, "exponents", lambda mu: (0 * mu, 0 * mu)), Verdict.WRONG),
         ("noise_integral", replace(derivation, "noise", lambda kernel="right": sp.eye(2) * len(kernel)), Verdict.WRONG),
     ],

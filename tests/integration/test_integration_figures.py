@@ -7,23 +7,12 @@ import math
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from drawn import legend_of
 from matplotlib.patches import Circle, Rectangle
 
 from gpbnb import plotting
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration import experiment, figures, tables, theory
-
-
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
-    plt.close("all")
-
-
-def names(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def line(ax, label):
@@ -65,7 +54,7 @@ def test_accuracy(ax):
     for name, result in results.items():
         assert line(ax, name).get_xdata().tolist() == mu
         assert line(ax, name).get_ydata().tolist() == np.clip(result.ulp, 1e-2, 2.0**53).tolist()
-    assert names(ax) == ["printed", "stable", "no digit right"]
+    assert legend_of(ax) == ["printed", "stable", "no digit right"]
     check_labels(ax, "rad", "units in the last place")
 
 
@@ -84,7 +73,7 @@ def test_powers(ax):
     figures.powers(ax)
     shown = line(ax, "of the iteration rate")
     assert shown.get_ydata() == pytest.approx(theory.exponents(shown.get_xdata())[1])
-    assert names(ax) == ["of the bandwidth", "of the iteration rate"]
+    assert legend_of(ax) == ["of the bandwidth", "of the iteration rate"]
     flat = sorted(each.get_ydata()[0] for each in ax.lines if each.get_linestyle() == "--")
     assert flat == [-1.0, 0.5]
     check_labels(ax, "rad", "power")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gpbnb import linalg
+from gpbnb.bounds import inverse_of
 from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.inversion import example, procedure
 from gpbnb.inversion.example import PLACES, PRINTED, Wordlength
@@ -270,7 +271,7 @@ class TestPossible:
         wordlength = Wordlength("t = places", rounding)
         fl = wordlength.rounder(3)
         stored = example._each(example.matrix(), fl)
-        true = example._inverse(stored)
+        true = inverse_of(stored)
         assert (true @ stored == np.eye(3, dtype=int)).all()
         for norm in example.SEARCHED:
             error = norm_of(example.round_once(stored, fl) - true, norm)

@@ -296,21 +296,6 @@ class TestFigureData:
         assert trials[0].condition < trials[1].condition < trials[2].condition
         assert len(experiment.against_condition(FloatFormat(10, 2), 5, (12,) * 9, np.random.default_rng(1))) < 9
 
-    def test_worst_small(self):
-        names, fmt = ("signed, chart, A",), FloatFormat(10, 3)
-        worst = experiment.worst_small(names, fmt, 2, 9, 60, np.random.default_rng(5))[names[0]]
-        rng = np.random.default_rng(5)
-        ratios = []
-        for _ in range(60):
-            a = fmt.array(rng.integers(-9, 10, (2, 2)))
-            try:
-                one = experiment.trial(a, names=names)
-            except np.linalg.LinAlgError:
-                continue
-            if one.error:
-                ratios.append(one.ratio(names[0]))
-        assert worst.ratio(names[0]) == min(ratios)
-
 
 @pytest.mark.parametrize(
     ("matrix", "reading"),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from drawn import colour, legend_of
 from matplotlib.patches import FancyArrowPatch
 
 from gpbnb import plotting
@@ -14,22 +13,6 @@ from gpbnb.inversion import example, experiment, figures
 from gpbnb.inversion.experiment import Frozen
 
 FMT = FloatFormat(2, 24)
-
-
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
-    plt.close("all")
-
-
-def legend_of(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
-def colour(artist):
-    return to_hex(artist.get_color()).upper()
 
 
 class TestFlowChart:
@@ -116,5 +99,5 @@ class TestRatios:
 
     def test_no_more_bounds_than_colours(self, ax):
         trials = experiment.against_size(FMT, (2,), 1, np.random.default_rng(1))
-        with pytest.raises(ValueError, match="got 7 bounds; needed at most 6, or colours repeat; draw two figures"):
+        with pytest.raises(ValueError, match="got 7 curves; needed at most 6, or colours repeat; draw two figures"):
             figures.ratios(trials, experiment.BETTER[:7], ax)

@@ -13,7 +13,7 @@ from gpbnb.inversion.experiment import Frozen
 
 def number(value):
     exponent = math.floor(math.log10(value))
-    return rf"${float(value) / 10**exponent:.3f}\cdot 10^{{{exponent}}}$"
+    return rf"${float(value) / 10**exponent:.3f}\times10^{{{exponent}}}$"
 
 
 def test_table1():
@@ -22,12 +22,12 @@ def test_table1():
     assert table.body[0] == (
         "as printed",
         "",
-        r"$3.706\cdot 10^{-2}$",
-        r"$3.706\cdot 10^{-4}$",
-        r"$3.706\cdot 10^{-7}$",
-        r"$7.782\cdot 10^{-5}$",
-        r"$4.530\cdot 10^{-7}$",
-        r"$4.672\cdot 10^{-10}$",
+        r"$3.706\times10^{-2}$",
+        r"$3.706\times10^{-4}$",
+        r"$3.706\times10^{-7}$",
+        r"$7.782\times10^{-5}$",
+        r"$4.530\times10^{-7}$",
+        r"$4.672\times10^{-10}$",
     )
     bound, error = readings[2]
     line = table.body[3]
@@ -95,7 +95,7 @@ def test_violations():
 
 def test_summary():
     table = tables.summary(Frozen({}, ROWS), ("ball",))
-    assert table.body == (("ball", "40", "3", "1", "0.5", "2", r"$1.500\cdot 10^{9}$"),)
+    assert table.body == (("ball", "40", "3", "1", "0.5", "2", r"$1.500\times10^{9}$"),)
 
 
 def test_worst():

@@ -278,16 +278,9 @@ def test_back_substitution_solves_a_system_within_the_weights():
 
 
 def test_strict_bounds_hold_and_corrected_ones_in_these_cases():
-    closest = {"entries": 0, "norm": 0, "corrected": 0}
+    closest = {"norm": 0, "corrected": 0}
     proved = 0
     for case in cases():
-        closest["entries"] = max(
-            closest["entries"],
-            ratios(
-                case.reduction.solution - case.true,
-                theory.strict_entry_bounds(case.reduction, case.beta, case.inverse),
-            ),
-        )
         assert case.error <= theory.bound(case.reduction, case.beta)
         closest["corrected"] = max(closest["corrected"], case.error / theory.bound(case.reduction, case.beta))
         try:
@@ -298,7 +291,6 @@ def test_strict_bounds_hold_and_corrected_ones_in_these_cases():
         assert case.error <= bound
         closest["norm"] = max(closest["norm"], case.error / bound)
     assert proved > 40
-    assert closest["entries"] > 0.2
     assert closest["norm"] > 0.05
     assert closest["corrected"] > 0.05
 

@@ -21,11 +21,19 @@ def test_the_answers_are_those_of_the_example_and_of_the_years():
     assert found.printed == (9, 17)
     assert all(mended > formula for mended, formula in zip(found.mended, found.formula, strict=True))
     for rounding, digits in found.observed.items():
-        met = [run for run in found.runs if run.case.rounding is rounding and answers.end(run) <= 1]
+        met = [run for run in found.runs if run.case.rounding is rounding and answers.largest(run) <= 1]
         assert digits == min(answers.decimal_digits(run.case.fmt) for run in met)
         fewer = [r for r in found.runs if r.case.rounding is rounding and answers.decimal_digits(r.case.fmt) < digits]
         assert fewer
-        assert min(answers.end(run) for run in fewer) > 1
+        assert min(answers.largest(run) for run in fewer) > 1
+    assert found.observed[Rounding.NEAREST] == 10
+
+
+def test_what_counts_is_the_year_and_not_its_end_alone():
+    """Nine decimal digits end within the goal, and were beyond it before."""
+    (nine,) = (run for run in answers.find().runs if (run.case.base, run.case.precision) == (10, 9))
+    assert max(np.abs(nine.drift[-1]).max(), np.abs(nine.rate[-1]).max()) < 1 < answers.largest(nine)
+    assert answers.largest(nine) == np.abs(np.hstack([nine.drift, nine.rate])).max()
 
 
 @pytest.mark.parametrize("digits", [1, 9, 17])
@@ -39,13 +47,13 @@ def test_digits_are_those_of_the_format_and_chopping_costs_as_much_as_a_factor_o
 
 @pytest.mark.parametrize("size", [5.0, -5.0])
 @pytest.mark.parametrize("part", ["drift", "rate"])
-@pytest.mark.parametrize("column", [0, -1])
-def test_the_end_is_the_largest_error_of_the_last_step(part, column, size):
+@pytest.mark.parametrize("place", [(0, 0), (-1, -1)])
+def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
     run = year.load()[0]
     zeros = {name: np.zeros_like(getattr(run, name)) for name in ("drift", "rate")}
-    zeros[part][-1, column] = size
-    zeros[part][0] = 9.0
-    assert answers.end(replace(run, **zeros)) == 5.0
+    zeros[part][place] = size
+    zeros[part][-1, 0] = size / 2 if place == (0, 0) else zeros[part][-1, 0]
+    assert answers.largest(replace(run, **zeros)) == 5.0
 
 
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():

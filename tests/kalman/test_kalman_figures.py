@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from drawn import colour, legend_of
 
 from gpbnb import plotting
 from gpbnb.formats import FloatFormat, Rounding
@@ -18,25 +17,9 @@ USUAL = year.MODELS[0]
 TWENTY_FOUR = year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT)
 
 
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
-    plt.close("all")
-
-
 @pytest.fixture(scope="module")
 def runs():
     return {run.case: run for run in year.load()}
-
-
-def legend_of(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
-def colour(artist):
-    return to_hex(artist.get_color()).upper()
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,8 +22,13 @@ MODEL = LinearModel(
 Z = Simulation(MODEL, (3.0, -1.0), 0, resolution=2.0**-30).measurements(STEPS)
 
 
-def error(fmt, form=Form.USUAL, z=Z):
-    return np.abs(emulate(MODEL, z, fmt, form, range(1, STEPS + 1), reference(MODEL, z, range(1, STEPS + 1))).state)
+@cache
+def true():
+    return reference(MODEL, Z, range(1, STEPS + 1))
+
+
+def error(fmt):
+    return np.abs(emulate(MODEL, Z, fmt, Form.USUAL, range(1, STEPS + 1), true()).state)
 
 
 @pytest.mark.parametrize("rounding", list(Rounding))
@@ -53,22 +60,32 @@ def test_errors_of_storing_the_model_count():
     assert error(found.fmt).max() <= 3e-3
 
 
-def upward(model, z, goal, base, **options):
-    """The slow way: every precision from 2 up, until two in succession meet the goal."""
+def errors_in(model, z, base, options):
+    """Largest error of each state in so many digits; None where the run is lost."""
     form, rounding = options.get("form", Form.USUAL), options.get("rounding", Rounding.NEAREST)
     marks = log_spaced(len(z), 16)
-    true, met = reference(model, z, marks), []
-    for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
+    true = reference(model, z, marks)
+
+    @cache  # for all goals
+    def largest(digits):
         fmt = FloatFormat(base, digits, rounding)
         try:
             if options.get("basis") == "bound":
-                errors, lost = bounded(model, z, fmt, form, marks).state, False
-            else:
-                history = emulate(model, z, fmt, form, marks, true)
-                errors, lost = history.state, history.indefinite or history.stopped
+                return bounded(model, z, fmt, form, marks).state.max(axis=0)
+            history = emulate(model, z, fmt, form, marks, true)
         except ValueError:
-            errors, lost = None, True
-        met.append(not lost and bool((np.abs(errors) <= goal).all()))
+            return None
+        return None if history.indefinite or history.stopped else np.abs(history.state).max(axis=0)
+
+    return largest
+
+
+def upward(largest, goal, base):
+    """The slow way: every precision from 2 up, until two in succession meet the goal."""
+    met = []
+    for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
+        errors = largest(digits)
+        met.append(errors is not None and bool((errors <= goal).all()))
         if met[-2:] == [True, True]:
             return digits - 1, met
     return (digits if met[-1] else None), met
@@ -103,9 +120,10 @@ def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
     model, z = MODELS[name]
     if z is model:
         z = Simulation(model, tuple(model.x0.astype(float)), 0, resolution=2.0**-30).measurements(40)
+    largest = errors_in(model, z, base, options)
     for goal in (1e-1, 1e-4, 1e-7):
         found = required_precision(model, len(z), goal, base, z=z, **options)
-        digits, met = upward(model, z, goal, base, **options)
+        digits, met = upward(largest, goal, base)
         assert (found.fmt.precision if found.fmt else None) == digits
         assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
         assert len(found.tried) <= 8  # of up to 52
@@ -123,7 +141,7 @@ def test_a_lucky_precision_does_not_count(monkeypatch):
             precision,
             "_over_goal",
             lambda m, z, fmt, *rest, least=threshold, by_luck=lucky: (
-                0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0
+                (0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0, "")
             ),
         )
         found = required_precision(MODEL, 4, 1.0, 2, z=Z[:4])
@@ -203,11 +221,56 @@ def test_its_own_measurements_are_seeded():
         ({"goal": (math.inf, math.inf)}, "one finite"),
         ({"base": 3}, "got base 3; needed one with compiled loops"),
         ({"basis": "hope"}, 'got basis \'hope\'; needed "emulation" or "bound"'),
-        ({"steps": 0}, "got 0 steps; needed at least 1"),
+        ({"goal": (1.0,)}, r"got goal \(1.0,\) of shape \(1,\); .*: one number, or 2 in a row"),
+        ({"goal": ((1.0, 1.0),)}, r"of shape \(1, 2\)"),
+        ({"goal": "small"}, "got goal 'small'; needed an error above 0 for each of the 2 states"),
+        ({"goal": None}, "got goal None"),
+        ({"form": "ud"}, "got form 'ud'; needed one of Form.REPORT, .*Form.UD"),
+        ({"steps": 0}, "got 0 steps; needed a whole number, at least 1"),
+        ({"steps": 2.5}, "got 2.5 steps; needed a whole number"),
+        ({"z": np.where(np.arange(60) == 7, np.nan, 1.0)[:, None]}, "got nan for measurement 0 of step 8; .*H a cycle"),
+        ({"z": 3.0}, "got 3.0; needed one for each of the 60 steps"),
         ({"z": Z[:5]}, r"got 5 measurements of shape \(1,\); needed one for each of the 60 steps, of shape \(1,\)"),
-        ({"z": Z[:, 0], "basis": "bound"}, r"got 60 measurements of shape \(\); needed one for each of the 60 steps"),
+        ({"z": Z[:, 0], "basis": "bound"}, r"got 60 measurements of shape \(\); .*write z.reshape\(-1, 1\)"),
     ],
 )
 def test_what_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         required_precision(**({"model": MODEL, "steps": STEPS, "goal": 1e-3} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"goal": -1.0}, "got goal -1.0"),
+        ({"basis": "hope"}, "got basis 'hope'"),
+        ({"base": 3}, "got base 3"),
+        ({"form": 2}, "got form 2"),
+        ({"precisions": [10, 54, 60]}, r"got \[54, 60\] digits of base 2; needed at most 53"),
+        ({"z": Z[:0]}, "got 0 measurements"),
+        ({"z": Z[:, 0]}, "write z.reshape"),
+        ({"z": Z * math.inf}, "inf for measurement 0 of step 1"),
+    ],
+)
+def test_what_a_survey_refuses(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        precision.survey(**({"model": MODEL, "z": Z, "goal": 1e-3, "precisions": [10]} | arguments))
+
+
+def test_an_answer_says_why_fewer_digits_were_refused():
+    """A state without a variance, in which no run can go on; and a Q of rank one, which few bits make indefinite."""
+    known = LinearModel(MODEL.Phi, MODEL.H, [[0, 0], [0, 0]], MODEL.R, MODEL.x0, [[2, 0], [0, 0]])
+    found = required_precision(known, 5, 1e-3, z=Z[:5])
+    assert found.fmt is None
+    assert "in 53 digits a computed variance was not positive at step 1; " in str(found)
+    thin = Fraction("0.35") * np.array([[Fraction(1, 2500), Fraction(1, 50)], [Fraction(1, 50), Fraction(1)]])
+    single = LinearModel(MODEL.Phi, MODEL.H, thin, MODEL.R, MODEL.x0, MODEL.P0)
+    with pytest.raises(ValueError, match=r"; it misses that by no more than roundings may: .* to its diagonal, \d"):
+        single.rounded(FloatFormat(2, 24, Rounding.NEAREST))
+    ratios = precision.survey(single, Z, 1e-3, range(2, 54), basis="bound")
+    refused = {digits for digits, ratio in ratios if math.isinf(ratio)}
+    assert 24 in refused
+    found = required_precision(single, STEPS, 1e-3, z=Z, basis="bound")
+    below = found.fmt.precision - 1
+    assert (below in refused) == (f"; in {below} digits got Q with a least eigenvalue near -" in str(found))
+    assert required_precision(MODEL, STEPS, 1e-3, z=Z).why == ""

@@ -69,31 +69,6 @@ def test_the_order():
     ]
 
 
-@pytest.mark.parametrize(
-    ("value", "figures", "text"),
-    [(82, 2, r"$8.2\times10^{1}$"), (Fraction(1, 3), 3, r"$3.33\times10^{-1}$"), (1, 2, "$1.0$")],
-)
-def test_numbers(value, figures, text):
-    assert tables.scientific(value, figures) == text
-
-
-@pytest.mark.parametrize(
-    ("value", "figures", "text"),
-    [
-        (0.0, 2, "0"),
-        (131.2, 2, "130"),
-        (0.00021, 2, "0.00021"),
-        (-0.831, 2, "-0.83"),
-        (999999.0, 2, r"$1.0\times10^{6}$"),
-        (12500000.0, 3, r"$1.25\times10^{7}$"),
-        (-1.13e-8, 2, r"$-1.1\times10^{-8}$"),
-        (float("inf"), 2, "inf"),
-    ],
-)
-def test_short_numbers(value, figures, text):
-    assert tables.short(value, figures) == text
-
-
 def test_the_mildest_noise():
     fmt = FloatFormat(2, 5)
     rows = cells(tables.mildest([fmt]))

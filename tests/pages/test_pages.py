@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from html.parser import HTMLParser
+from itertools import pairwise
 from urllib.parse import unquote, urljoin, urlsplit
 
 import pytest
@@ -11,6 +12,15 @@ import pytest
 from . import browser as tools
 
 PAGES = tools.pages()
+FOCUS = """() => {
+  const e = document.activeElement;
+  const box = e.getBoundingClientRect();
+  const style = getComputedStyle(e);
+  const marked = style.outlineStyle !== "none" || style.boxShadow !== "none";
+  const inside = box.bottom > 0 && box.top < innerHeight && box.width > 0;
+  return { place: `${e.tagName} ${box.left} ${box.top + scrollY} ${e.textContent.trim().slice(0, 40)}`,
+    shown: marked && inside, main: document.querySelector("main").contains(e) };
+}"""
 
 
 def test_loads_from_this_machine_alone(page):
@@ -56,6 +66,69 @@ def test_never_scrolls_sideways(page):
     assert page.evaluate("[document.documentElement.scrollWidth, window.scrollX]") == [page.viewport_size["width"], 0]
 
 
+def test_on_a_desktop_only_formulas_scroll(page):
+    """Code, outputs and tables fit the column; a formula scrolls only where it has no place left to break."""
+    if page.viewport_size != tools.SIZES["desktop"]:
+        pytest.skip("a phone scrolls")
+    scrolling = page.locator("article :is(div, pre)").evaluate_all(
+        "all => all.filter(e => e.scrollWidth > e.clientWidth + 1 && /auto|scroll/.test(getComputedStyle(e).overflowX))"
+        ".map(e => e.textContent.trim().slice(0, 80))"
+    )
+    assert scrolling == []
+
+
+def test_only_what_scrolls_is_a_stop_of_the_keyboard(page):
+    idle = page.locator("article :is(div, pre, mjx-container)[tabindex='0']").evaluate_all(
+        "all => all.filter(e => (e.querySelector(':scope > mjx-math') ?? e).scrollWidth <= e.clientWidth)"
+        ".map(e => e.textContent.trim().slice(0, 80))"
+    )
+    assert idle == []
+
+
+def test_every_formula_can_be_heard(page):
+    assert page.locator("mjx-container:not(:has(mjx-assistive-mml math))").count() == 0
+
+
+def test_headings_step_down_by_one(page):
+    levels = page.locator("main :is(h1, h2, h3, h4, h5, h6)").evaluate_all(
+        "all => all.filter(h => h.checkVisibility()).map(h => Number(h.tagName[1]))"
+    )
+    assert levels[:1] == [1]
+    assert levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_columns_of_tables_have_names(page):
+    nameless = page.locator("article table.table, article .ledger-table, article .calculator table").evaluate_all(
+        "all => all.filter(t => { const names = [...t.querySelectorAll('thead th')];"
+        " return !names.length || names.some(n => !n.textContent.trim()) }).map(t => t.textContent.trim().slice(0, 80))"
+    )
+    assert nameless == []
+
+
+CUT = """() => {
+  const paper = document.querySelector("article").getBoundingClientRect().right + 1;
+  const ends = (e) => e.getBoundingClientRect().right;
+  const all = [...document.querySelectorAll("article :is(p, pre, img, svg, td, th, li, dt, dd, h1, h2, h3, mjx-math)")];
+  const within = (e) => (e.matches("mjx-math") && e.closest("td, th") ? ends(e.closest("td, th")) + 1 : paper);
+  const cut = all.filter((e) => e.checkVisibility() && ends(e) > Math.min(paper, within(e)));
+  return cut.map((e) => e.textContent.slice(0, 80));
+}"""
+
+
+def test_nothing_is_cut_on_paper(page):
+    if page.viewport_size != tools.SIZES["desktop"]:
+        pytest.skip("paper is as wide for all")
+    try:
+        page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        page.set_viewport_size({"width": 688, "height": 974})  # A4 without margins, at 96 dots an inch
+        page.emulate_media(media="print")
+        assert page.evaluate(CUT) == []
+    finally:
+        page.emulate_media(media="screen")
+        page.set_viewport_size(tools.SIZES["desktop"])
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_violation(page, axe, scheme):
     page.emulate_media(color_scheme=scheme)
@@ -78,6 +151,49 @@ def test_the_colour_mode_can_be_chosen(open_page):
             seen.add(page.locator("html").get_attribute("data-mode"))
         assert seen == {"light", "dark", "auto"}
         assert page.faults == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_button_back_to_the_top_can_be_read(open_page, axe, scheme):
+    with open_page("book/rounding.html") as page:
+        page.emulate_media(color_scheme=scheme)
+        page.locator("#pst-back-to-top").evaluate("button => { button.style.display = 'block' }")
+        assert axe.run(page, context="#pst-back-to-top").response["violations"] == []
+
+
+def test_the_keyboard_skips_to_the_text_and_shows_where_it_is(open_page):
+    with open_page("book/rounding.html") as page:
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
+        assert page.evaluate("document.activeElement.getBoundingClientRect().top") >= 0
+        page.keyboard.press("Enter")
+        seen = []
+        for _ in range(40):
+            page.keyboard.press("Tab")
+            seen.append(page.evaluate(FOCUS))
+        # No two stops one after the other are the same, all are seen, and the first is in the text.
+        assert all(a["place"] != b["place"] for a, b in pairwise(seen))
+        assert [each["place"] for each in seen if not each["shown"]] == []
+        assert seen[0]["main"]
+
+
+def test_the_keyboard_gets_through_a_page(open_page):
+    with open_page("book/geometry.html") as page:
+        stops = page.evaluate("[...document.querySelectorAll('a[href], button, input, [tabindex=\"0\"]')].length")
+        for _ in range(stops + 5):
+            page.keyboard.press("Tab")
+            if page.evaluate("document.activeElement === document.body"):
+                break
+        assert page.evaluate("document.activeElement === document.body")
+
+
+def test_chapters_show_the_ledger_as_the_complete_one_does(open_page):
+    with open_page("book/rounding.html") as page:
+        tables = page.locator(".ledger > div > table, .ledger > table")
+        assert tables.count() >= 2
+        for table in tables.all():
+            assert table.locator("thead th").all_inner_texts() == ["Item", "Verdict", "Printed", "Recomputed, and note"]
+            assert table.locator("tbody tr th").count() == table.locator("tbody tr").count()
 
 
 def test_search_finds_a_word(open_page):

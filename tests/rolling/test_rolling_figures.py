@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from drawn import colour
 from matplotlib.container import ErrorbarContainer
 
 from gpbnb import plotting
@@ -16,13 +15,10 @@ from gpbnb.rolling import checks, experiment, figures, theory
 
 
 @pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
-    for name in (axes[0].get_xlabel(), axes[0].get_ylabel()):
+def ax(ax):
+    yield ax
+    for name in (ax.get_xlabel(), ax.get_ylabel()):
         assert re.search(r"\(.+\)$", name)
-    plt.close("all")
 
 
 def xy(artist):
@@ -31,9 +27,7 @@ def xy(artist):
 
 
 def theory_lines(artists):
-    return [
-        a for a in artists if not isinstance(a, ErrorbarContainer) and to_hex(a.get_color()).upper() == plotting.BOUND
-    ]
+    return [a for a in artists if not isinstance(a, ErrorbarContainer) and colour(a) == plotting.BOUND]
 
 
 def test_density_and_residual(ax):
@@ -129,7 +123,7 @@ def test_rotations(ax):
         assert xy(artists[2 * i])[1] == pytest.approx(scale * result.size)
         assert xy(artists[2 * i + 1])[1] == pytest.approx(scale * result.bound)
     assert [t.get_text() for t in ax.get_legend().get_texts()] == ["6 decimal digits", "8 decimal digits"]
-    with pytest.raises(ValueError, match="got 6 results; needed at most 5, or colours repeat; draw two figures"):
+    with pytest.raises(ValueError, match="got 6 curves; needed at most 5, or colours repeat; draw two figures"):
         figures.rotations(results * 3, 6600.0, ax)
 
 

@@ -123,8 +123,6 @@ def test_derolled_noise_is_that_of_both_sidebands():
     assert found[0] == pytest.approx(LEVEL * 77.5)
     roll = 1 / 77.5
     assert found == pytest.approx(LEVEL / 2 * (1 / (roll - f) + 1 / (roll + f)))
-    power = integrate.quad(lambda x: float(theory.derolled_density(LEVEL, 77.5, x)), 0, 1e-3)[0]
-    assert theory.rectified_power(LEVEL, 77.5, 1e-3) == pytest.approx(power, rel=1e-9)
 
 
 # -- sums of noise -----------------------------------------------------------------------------------------
@@ -309,7 +307,6 @@ REFUSED = [
     (theory.largest_phase, (DRIFTS, 1e5), "got an error of 100000.0"),
     (theory.roll_rate, (0.0,), "got a roll period of 0.0 s; needed a positive number; leave rolling out for none"),
     (theory.roll_rate, (math.inf,), "got a roll period of inf s"),
-    (theory.rectified_power, (LEVEL, 600.0, 1 / 600), "needed less than the roll frequency 0.00166667 Hz"),
     (theory.variance_of_sum, ([[1.0]], LEVEL), r"got weights of shape \(1, 1\); needed \(n,\)"),
     (theory.variance_of_sum, ([], LEVEL), r"got weights of shape \(0,\)"),
     (theory.slope_weights, (1,), "got 1 samples; needed at least 2 to fit a line"),

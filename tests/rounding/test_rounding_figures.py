@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from drawn import colour, legend_of
 
 from gpbnb import plotting
 from gpbnb.bounds import column_sum_norm
@@ -18,26 +17,10 @@ NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 TWO = FloatFormat(10, 2)
 
 
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
-    plt.close("all")
-
-
-def legend_of(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
-
-
 def check_names(ax, x, y):
     assert x in ax.get_xlabel()
     assert y in ax.get_ylabel()
     assert "no unit" in ax.get_ylabel()
-
-
-def colour(artist):
-    return to_hex(artist.get_color()).upper()
 
 
 @pytest.mark.parametrize("rule", Rounding)

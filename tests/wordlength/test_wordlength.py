@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import replace
+from decimal import ROUND_DOWN, ROUND_HALF_UP, Context, Decimal, localcontext
 from fractions import Fraction
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -15,7 +16,8 @@ from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration.theory import needed_precision
 from gpbnb.inversion.bounds import smallest_precision
 from gpbnb.kalman import year
-from gpbnb.kalman.experiment import Form, emulate, log_spaced, reference
+from gpbnb.kalman.experiment import Form, Run, emulate, log_spaced, reference
+from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision, survey
 from gpbnb.kalman.theory import coefficients
 from gpbnb.wordlength import examples, figures, study, tables
@@ -25,14 +27,6 @@ Z = examples.tilt_measurements(300)
 GOAL = (0.01, math.inf, math.inf)
 FOUND = Requirement(FloatFormat(2, 17), "emulation", 300, ((16, 2.0), (17, 0.5), (18, 0.4)))
 NONE = replace(FOUND, fmt=None)
-
-
-@pytest.fixture
-def ax():
-    _, axes = plotting.figure()
-    yield axes[0]
-    axes[0].figure.canvas.draw()
-    plt.close("all")
 
 
 # -- examples -----------------------------------------------------------------------------------------
@@ -48,6 +42,10 @@ def test_the_models_are_what_their_docstrings_say():
     for model in (examples.tracker(), examples.precise()):
         t = model.Phi[0, 0, 1]  # between measurements; white noise of the acceleration, 0.1 m²/s³
         assert model.Q[0].tolist() == [[t**3 / 30, t**2 / 20], [t**2 / 20, t / 10]]
+    Q, more = examples.altimeter().Q[0], examples.altimeter("1e-12").Q[0]
+    assert Q[0, 0] * Q[1, 1] == Q[0, 1] ** 2 > 0
+    assert Q[1, 1] == Fraction("0.35") ** 2 / 2500
+    assert (more - Q == np.diag([Fraction("1e-12")] * 3)).all()
 
 
 def test_measurements_begin_alike_and_are_multiples_of_their_resolution():
@@ -93,6 +91,12 @@ def test_growth_answers_for_the_first_steps():
     goal = [1] * 4 + [math.inf] * 6
     (found,) = study.growth(model, z, goal, [12], form=Form.UD)
     assert found == required_precision(model, 12, goal, form=Form.UD, z=z)
+
+
+def test_growth_refuses_steps_that_were_not_measured():
+    for steps in ([0], [10, 301]):
+        with pytest.raises(ValueError, match="and 300 measurements; needed from 1 to 300 steps"):
+            study.growth(TILT, Z, GOAL, steps)
 
 
 def test_growth_grows():
@@ -154,6 +158,20 @@ def test_deafness_is_that_of_the_runs():
     assert study.hidden_bits(TILT, Z, 2) == pytest.approx(math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12)
 
 
+def test_what_the_watch_of_a_state_refuses():
+    for state in (-1, 3):
+        with pytest.raises(ValueError, match="needed an index from 0 to 2"):
+            study.deafness(TILT, Z, state, [FloatFormat(2, 12)])
+        with pytest.raises(ValueError, match="needed an index from 0 to 2"):
+            study.hidden_bits(TILT, Z, state)
+    for last in (0, 300):
+        with pytest.raises(ValueError, match=f"got {last} steps to watch of 300"):
+            study.deafness(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
+    assert study.hidden_bits(TILT, Z, 0) == math.inf
+    with pytest.raises(ValueError, match="NaN or infinity"):
+        study.spans(TILT, Z * math.nan)
+
+
 def test_largest_estimate():
     kept = reference(TILT, Z, log_spaced(300, 16))
     assert study.largest_estimate(TILT, Z) == max(abs(x) for x in kept.x.ravel())
@@ -175,6 +193,170 @@ def test_a_companion_where_the_running_bound_says_nothing():
     error, bound = study.companion(model, z, FloatFormat(2, 40))
     assert (error <= bound).all()
     assert bound[0] < 0.01
+
+
+def test_what_the_inverse_refuses():
+    for matrix in ([[2, 1], [0, 2]], [[1, 2, 3], [2, 1, 3]], [[0, 1], [1, 2]]):
+        with pytest.raises(ValueError, match=r"fit: got shape .* needed a symmetric matrix with a positive diagonal"):
+            study.inverse("fit", matrix, 1e-3)
+    for goal in (0, -1.0, math.nan, math.inf):
+        with pytest.raises(ValueError, match="needed a relative error above 0"):
+            study.inverse("fit", [[2, 1], [1, 2]], goal)
+
+
+def test_a_sensor_that_is_silent_is_a_row_of_zeros():
+    """Whatever stands for its measurement; and as if there were no such sensor."""
+    kept = {"x0": TILT.x0, "P0": TILT.P0, "Phi": TILT.Phi, "Q": TILT.Q}
+    H, R = np.stack([TILT.H[0], TILT.H[0]]), TILT.R
+    H[1, 1] = 0
+    told, alone = LinearModel(H=H, R=R, **kept), LinearModel(H=TILT.H[:, :1], R=R[:, :1, :1], **kept)
+    z = Z[:2].copy()
+    states = []
+    for value in (0.0, 77.0):
+        z[1, 1] = value
+        states.append([emulated(told, z, FloatFormat(2, 24), form).tolist() for form in Form])
+    assert states[0] == states[1]
+    first = reference(TILT, z, (1,))
+    after = LinearModel(alone.Phi, alone.H, alone.Q, alone.R, first.x[0], (first.P[0] + first.P[0].T) / 2)
+    assert reference(told, z, (2,)).x[0].astype(float) == pytest.approx(
+        reference(after, z[1:, :1], (1,)).x[0].astype(float), rel=1e-12
+    )
+
+
+def test_a_known_input_is_a_column_for_a_state_of_one():
+    pushes = np.round(np.sin(np.arange(50) / 7), 3)
+    step = Fraction(1, 50)
+    Phi = [[[1, step, 0], [0, 1, step * Fraction(u)], [0, 0, 1]] for u in pushes.tolist()]
+    Q = np.diag([Fraction("1e-6"), Fraction("1e-4"), Fraction(0)])
+    P0 = np.diag([Fraction(9), Fraction(1), Fraction(1, 2**60)])
+    z = Z[:50, :1]
+    found = reference(LinearModel(Phi, [[1, 0, 0]], Q, [["0.25"]], [0, 0, 1], P0), z, range(1, 51)).x.astype(float)
+    x, P, A = np.zeros(2), np.diag([9.0, 1.0]), np.array([[1, 0.02], [0, 1]])
+    for k, u in enumerate(pushes):
+        x, P = A @ x + [0, 0.02 * u], A @ P @ A.T + np.diag([1e-6, 1e-4])
+        K = P[:, 0] / (P[0, 0] + 0.25)
+        x, P = x + K * (z[k, 0] - x[0]), P - np.outer(K, P[0])
+        assert found[k, :2] == pytest.approx(x, rel=1e-9, abs=1e-12)
+    assert found[:, 2] == pytest.approx(1, abs=1e-12)
+
+
+class Single:
+    """NumPy's float32 with ties away from zero, as in the documents; `moved` counts the results that this changed."""
+
+    moved = 0
+    away = True
+
+    def __init__(self, value):
+        self.value = np.float32(value)
+
+    def rounded(self, other, operation):
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        a, b = self.value, other.value if isinstance(other, Single) else np.float32(other)
+        result = operation(a, b)
+        assert result.dtype == np.float32
+        exact = operation(Fraction(float(a)), Fraction(float(b)))
+        beyond = np.nextafter(result, np.float32(math.copysign(math.inf, exact)))
+        if self.away and Fraction(float(result)) + Fraction(float(beyond)) == 2 * exact:  # a tie, rounded towards zero
+            Single.moved += 1
+            result = beyond
+        return type(self)(result)
+
+    def __add__(self, other):
+        return self.rounded(other, operator.add)
+
+    def __sub__(self, other):
+        return self.rounded(other, operator.sub)
+
+    def __rsub__(self, other):
+        return type(self)(other) - self
+
+    def __mul__(self, other):
+        return self.rounded(other, operator.mul)
+
+    def __rmul__(self, other):
+        return type(self)(other) * self
+
+    def __truediv__(self, other):
+        return self.rounded(other, operator.truediv)
+
+    def __rtruediv__(self, other):
+        return type(self)(other) / self
+
+
+class Even(Single):
+    """NumPy's float32."""
+
+    away = False
+
+
+def in_numbers(model, number):
+    """What :func:`study.innovation` is told, in numbers of another kind."""
+    letters = ("Phi", "H", "Q", "R", "x0", "P0")
+    return {letter: np.frompyfunc(number, 1, 1)(getattr(model, letter)) for letter in letters}
+
+
+def emulated(model, z, fmt, form=Form.USUAL):
+    run = Run(model, fmt, form, range(1, len(z) + 1))
+    run.take(z)
+    return run.kept().x
+
+
+def test_the_emulation_is_the_processors_float32_but_for_ties(monkeypatch):
+    """Digit for digit, operation by operation; and with ties to even as well, until the first tie."""
+    monkeypatch.setattr(Single, "moved", 0)
+    fmt, z = FloatFormat(2, 24), Z[:100]
+    stored = TILT.rounded(fmt)
+    ours = emulated(stored, z, fmt)
+    plain = study.native(stored, z, np.float32)
+    told = in_numbers(stored, lambda entry: Single(float(entry)))
+    first = study.innovation(told, np.frompyfunc(Single, 1, 1)(z[:1]))
+    assert Single.moved == 0  # no tie in the first step
+    assert [float(x.value) for x in first[0]] == plain[0].tolist()
+    assert list(map(Fraction, plain[0].tolist())) == ours[0].tolist()
+    found = study.innovation(told, np.frompyfunc(Single, 1, 1)(z))
+    assert [[Fraction(float(x.value)) for x in row] for row in found] == ours.tolist()
+    assert Single.moved > 100
+    assert (plain[1:] != ours[1:].astype(float)).any()
+
+
+def test_arrays_of_a_type_are_computed_as_its_numbers_one_by_one():
+    rng = np.random.default_rng(3)
+    dense = LinearModel(
+        rng.standard_normal((3, 3)) / 3, rng.standard_normal((2, 3)), np.eye(3), 2 * np.eye(2), [1, 2, 3], np.eye(3)
+    )
+    found = study.innovation(in_numbers(dense, lambda entry: Even(float(entry))), np.frompyfunc(Even, 1, 1)(Z[:40]))
+    assert [[float(x.value) for x in row] for row in found] == study.native(dense, Z[:40], np.float32).tolist()
+
+
+def test_a_type_of_numpy_has_a_range_and_the_errors_of_its_digits(capsys):
+    single, marks = study.native_error(TILT, Z, np.float32), np.array(log_spaced(300, 16))
+    true = reference(TILT, Z, marks.tolist()).x.astype(float)
+    assert single.tolist() == np.abs(study.native(TILT, Z, np.float32)[marks - 1] - true).max(axis=0).tolist()
+    assert (study.native_error(TILT, Z, np.float64) < 1e-12).all()
+    assert ((single > 1e-8) & (single < 1e-4)).all()
+    assert capsys.readouterr().err == ""
+    study.native(TILT, Z, np.float16, progress=True)
+    assert "300/300" in capsys.readouterr().err
+    # A variance of 4e2 and 1e6 units, squared, is beyond binary16: 65504.
+    assert not np.isfinite(study.native(study.in_units(TILT, (1, 1000, 1)), Z, np.float16)).all()
+    assert np.isfinite(study.native(study.in_units(TILT, (1, 1000, 1)), Z, np.float32)).all()
+
+
+@pytest.mark.parametrize(
+    ("rounding", "name"), [(Rounding.NEAREST, ROUND_HALF_UP), (Rounding.CHOP, ROUND_DOWN)], ids=["nearest", "chop"]
+)
+def test_the_emulation_is_that_of_decimal(rounding, name):
+    fmt, z = FloatFormat(10, 8, rounding), np.round(Z[:100], 4)
+    stored = TILT.rounded(fmt)
+    measured = fmt.array([[repr(each) for each in row] for row in z.tolist()])
+
+    def number(entry):
+        return Decimal(entry.numerator) / Decimal(entry.denominator)
+
+    with localcontext(Context(prec=8, rounding=name)):
+        found = study.innovation(in_numbers(stored, number), np.frompyfunc(number, 1, 1)(measured.to_fractions()))
+    assert [list(map(Fraction, row)) for row in found] == emulated(stored, measured, fmt).tolist()
 
 
 def test_inverse_knows_its_condition():
@@ -224,9 +406,22 @@ def test_cells():
     deaf = tables.deaf([study.Deafness(FloatFormat(2, 12), 0.5, 0.25, 0.03)], 0.01)
     assert deaf.body == (("12 bits", "0.5", "25 %", "3"),)
     spans = tables.spans([study.Span("gain", -20, 3), study.Span("all", -2000, 2000), study.Span("x", -14, 15)])
-    assert [row[-1] for row in spans.body] == ["binary32, binary64", "none", "binary16, binary32, binary64"]
+    assert [row[-1] for row in spans.body] == [
+        "binary32, binary64, bfloat16, TF32",
+        "none",
+        "binary16, binary32, binary64, bfloat16, TF32",
+    ]
     inverses = tables.inverses([study.Inverse("fit", 123.0, 45.0, 6, 7)])
     assert inverses.body == (("fit", "120", "45", "6", "7"),)
+
+
+def test_processors():
+    table = tables.processors()
+    told = {row[0]: row[1:] for row in table.body}
+    assert told["binary16"] == ("FloatFormat(2, 11)", "0.00049", "$2^{-14}$", "$2^{16}$")
+    assert told["bfloat16"] == ("FloatFormat(2, 8)", "0.0039", "$2^{-126}$", "$2^{128}$")
+    assert told["TF32"][0] == told["binary16"][0]
+    assert set(told) == set(examples.NORMAL)
 
 
 def test_integrator():

@@ -1,0 +1,146 @@
+"""What is asked of the checks of every topic, and faults to seed beneath them: each check must be able to differ.
+
+A change takes pytest's monkeypatch, which undoes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace as changed
+from types import ModuleType
+from typing import Any
+
+import pytest
+import sympy as sp
+
+from gpbnb import ledger
+from gpbnb.derivation import Derivation
+from gpbnb.findings import Checks, Finding, Verdict
+from gpbnb.ledger.checking import Row, load_checks
+
+Change = Callable[[pytest.MonkeyPatch], None]
+
+INVENTORY = ledger.load_inventory()
+
+
+# -- what the checks found ------------------------------------------------------------------------
+
+
+def functions(checks: Checks) -> dict[str, Callable[[], Finding]]:
+    """The checks of a topic by their names."""
+    return {check.__name__: check for check in checks.values()}
+
+
+def examined(entries: Iterable[ledger.Entry]) -> tuple[Row, ...]:
+    """What the checks of all topics find of some entries; none fails and none is missing."""
+    rows = ledger.examine(entries, load_checks(INVENTORY))
+    assert [row.entry.id for row in rows if row.error is not None or row.finding is None] == []
+    return rows
+
+
+def finding(rows: Iterable[Row], key: str) -> Finding:
+    """That of an entry."""
+    return next(row.finding for row in rows if row.entry.id == key)
+
+
+def findings_of(rows: Iterable[Row], checks: Checks, name: str) -> list[Finding]:
+    """Those of the entries that one function checks."""
+    return [row.finding for row in rows if row.entry.id in checks and checks[row.entry.id].__name__ == name]
+
+
+def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
+    """Ids of the entries with each verdict."""
+    return {verdict: {row.entry.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
+
+
+def check_texts(rows: Iterable[Row]) -> None:
+    """What differs has a note, and what was compared a number."""
+    for row in rows:
+        assert row.finding.note or row.finding.verdict is Verdict.VERIFIED, row.entry.id
+        assert row.finding.recomputed or row.finding.agrees is None, row.entry.id
+
+
+def check_again(rows: Iterable[Row], checks: Checks, *names: str) -> None:
+    """Some checks find the same when they are run anew."""
+    for name in names:
+        before = findings_of(rows, checks, name)
+        assert before == [functions(checks)[name]()] * len(before) != []
+
+
+def check_disagrees(function: Callable[[], Finding]) -> None:
+    found = function()
+    assert found.agrees is False
+    assert found.verdict not in (Verdict.VERIFIED, Verdict.ANSWERED)
+
+
+def check_agrees(function: Callable[[], Finding]) -> None:
+    found = function()
+    assert found.agrees is True
+    assert found.verdict is Verdict.VERIFIED
+
+
+# -- changes --------------------------------------------------------------------------------------
+
+
+def forget(*modules: ModuleType) -> None:
+    """Forget what the functions of some modules remember."""
+    for module in modules:
+        for value in vars(module).values():
+            getattr(value, "cache_clear", lambda: None)()
+
+
+@contextmanager
+def forgetting(monkeypatch: pytest.MonkeyPatch, *modules: ModuleType) -> Iterator[pytest.MonkeyPatch]:
+    """Change the code with nothing remembered; undone, and forgotten, afterwards."""
+    forget(*modules)
+    try:
+        yield monkeypatch
+    finally:
+        monkeypatch.undo()
+        forget(*modules)
+
+
+def replace(place: Any, name: str, value: Any) -> Change:
+    """Put another value in the place of an attribute."""
+    return lambda patch: patch.setattr(place, name, value)
+
+
+def all_of(*changes: Change) -> Change:
+    """One change after the other."""
+
+    def apply(patch: pytest.MonkeyPatch) -> None:
+        for change in changes:
+            change(patch)
+
+    return apply
+
+
+def always(value: Any) -> Callable[..., Any]:
+    """A function that returns a value, whatever it is called with."""
+    return lambda *_, **__: value
+
+
+def times(place: Any, name: str, factor: Any) -> Change:
+    """Multiply what a function returns."""
+    original = getattr(place, name)
+    return replace(place, name, lambda *arguments, **named: original(*arguments, **named) * factor)
+
+
+def plus(place: Any, name: str, amount: Any) -> Change:
+    """Add to what a function returns."""
+    original = getattr(place, name)
+    return replace(place, name, lambda *arguments, **named: original(*arguments, **named) + amount)
+
+
+def breaks(module: ModuleType, name: str, place: int | None = None) -> Change:
+    """Make a step of a derivation wrong, or every step."""
+    original = getattr(module, name)
+
+    def broken() -> Derivation:
+        steps = list(original().steps)
+        for i in range(len(steps)) if place is None else (place,):
+            steps[i] = changed(steps[i], right=steps[i].right + sp.Symbol("wrong", positive=True))
+        return Derivation(tuple(steps))
+
+    return replace(module, name, broken)
