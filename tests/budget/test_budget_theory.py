@@ -106,6 +106,7 @@ def test_allowance_fills_the_goal():
     assert budget.allowance() == pytest.approx(0.8)
     assert theory.root_sum_square((budget.total, budget.allowance(2.5))) == pytest.approx(2.5)
     assert math.isnan(made(1.253).allowance())
+    assert made(1.0).allowance() == 0.0
 
 
 @settings(SEEDED)
@@ -201,6 +202,8 @@ def test_files(tmp_path):
 
 
 def test_columns_in_any_order_and_only_those_that_are_needed():
+    spread = theory.parse(f'{HEADER}\na,random constant,bias,x,,,,,"two\nlines"\nb,random constant,bias,y,,,,,\n')
+    assert [row.line for row in spread.refused] == [2, 4]  # where each begins
     reading = theory.parse("error_mas,form,name,kind\n.5,noise, b ,random process\n")
     assert reading.budget.sources == (Source("b", Kind.PROCESS, ErrorForm.NOISE, 0.5),)
 

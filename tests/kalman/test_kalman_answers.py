@@ -58,8 +58,23 @@ def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
 
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
     assert answers.find(100.0).observed[Rounding.NEAREST] < answers.find().observed[Rounding.NEAREST]
-    with pytest.raises(ValueError, match="needed one that some year meets: the best rounds to"):
+    runs = answers.find().runs
+    best = max(min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
+    with pytest.raises(ValueError, match=f"needed one that some year meets: the best rounds to {best:.2g}"):
         answers.find(1e-12)
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+def test_the_goal_itself_is_met_and_what_is_just_below_is_not(rounding):
+    found = answers.find()
+    digits = found.observed[rounding]
+    enough = [run for run in found.runs if run.case.rounding is rounding]
+    error = min(answers.largest(run) for run in enough if answers.decimal_digits(run.case.fmt) == digits)
+    looser = max(error, min(answers.largest(run) for run in found.runs if run.case.rounding is not rounding))
+    assert answers.find(looser).observed[rounding] <= digits
+    assert error > 0
+    assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, error) is not None
+    assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, 0.999 * error) is None
 
 
 def test_only_the_usual_model_counts():

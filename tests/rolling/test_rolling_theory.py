@@ -11,7 +11,7 @@ import pytest
 from scipy import integrate, signal, special
 
 from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.rolling import theory
+from gpbnb.rolling import derivation, theory
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
 
 CHOP = Rounding.CHOP
@@ -321,3 +321,11 @@ REFUSED = [
 def test_refused_with_what_came_and_what_was_needed(function, arguments, message):
     with pytest.raises(ValueError, match=message):
         function(*arguments)
+
+
+def test_a_wandering_roll_rate_has_the_derived_coefficients():
+    """Of unit drift, intensity and duration: a variance of 383/1260, and with resets every P of 38/35 P²/4."""
+    steps = derivation.roll_rate().steps
+    free, reset = (step.right.subs(dict.fromkeys(step.right.free_symbols, 1)) for step in (steps[1], steps[3]))
+    assert theory.rate_walk_error(1.0, 1.0, 1.0) ** 2 == pytest.approx(float(free), rel=1e-14)
+    assert theory.rate_walk_error(1.0, 1.0, 1.0, reset=1.0) ** 2 == pytest.approx(float(reset), rel=1e-14)

@@ -39,6 +39,9 @@ def test_the_models_are_what_their_docstrings_say():
     assert examples.tilt("1e-6").Q[0, 2, 2] == Fraction("1e-6")
     assert examples.tracker("1000").x0[0] == 1000
     assert examples.precise().R[0, 0, 0] == Fraction("1e-12")
+    for model in (examples.tracker(), examples.precise()):
+        t = model.Phi[0, 0, 1]  # between measurements; white noise of the acceleration, 0.1 m²/s³
+        assert model.Q[0].tolist() == [[t**3 / 30, t**2 / 20], [t**2 / 20, t / 10]]
     Q, more = examples.altimeter().Q[0], examples.altimeter("1e-12").Q[0]
     assert Q[0, 0] * Q[1, 1] == Q[0, 1] ** 2 > 0
     assert Q[1, 1] == Fraction("0.35") ** 2 / 2500
@@ -118,6 +121,14 @@ def test_years_needed_against_each_run():
     assert found[year.YEAR] == 32
     with pytest.raises(ValueError, match="got runs of 2 kinds; needed one"):
         study.years_needed([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
+
+
+def test_a_run_that_left_the_goal_does_not_come_back():
+    (first, *_) = year.load()
+    one = first.steps.tolist()[:3]
+    drift = np.array([[0.5, 0.0], [0.0, -2.0], [0.5, 0.0]])
+    run = replace(first, steps=first.steps[:3], drift=drift, rate=np.zeros((3, 2)))
+    assert study.years_needed([run], 1.0) == ((one[0], run.case.precision),)
 
 
 def test_spans_hold_every_number():
@@ -454,5 +465,6 @@ def test_overview(ax):
         "theory": [[17, 1]],
     }
     assert [text.get_text() for text in ax.get_yticklabels()] == ["tilt", "gyro"]
+    assert ax.yaxis_inverted()  # the first on top
     with pytest.raises(ValueError, match=r"got the kinds \['guess'\]; needed some of emulation"):
         figures.overview({"tilt": {"guess": 3}}, ax)
