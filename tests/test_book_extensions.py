@@ -207,11 +207,15 @@ def table(*rows):
 
 def test_a_chapters_part_of_the_ledger_has_the_columns_of_the_whole():
     document = new_document("page")
-    document += [table(ledger.HEADER, ("(20)", "wrong", "a*b*c", "b", "not *why*")), table(("Item", "x"), ("1", "2"))]
+    document += [
+        table(ledger.HEADER, ("(20)", "wrong", "a*b*c", "b", "not *why*"), ("(21)", "open", "d", "", "why")),
+        table(("Item", "x"), ("1", "2")),
+    ]
     ledger.join_columns(None, document)
     (box,) = document.findall(nodes.container)
     assert box["classes"] == ["ledger"]
-    head, row = box.findall(nodes.row)
+    head, row, short = box.findall(nodes.row)
+    assert [part["classes"] for part in short[2]] == [["printed"], ["note"]]
     assert [cell.astext() for cell in head] == ["Item", "Verdict", "Printed, recomputed, and note"]
     assert [cell.astext() for cell in row[:2]] == ["(20)", "wrong"]
     assert [(part.astext(), part["classes"]) for part in row[2]] == [

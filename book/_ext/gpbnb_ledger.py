@@ -45,10 +45,13 @@ def join_columns(app: Sphinx, doctree: nodes.document) -> None:
             if row.parent is head:
                 wide.children = [nodes.paragraph("", "Printed, recomputed, and note")]
                 continue
+            parts = []
             for name, cell in zip(("printed", "recomputed", "note"), (wide, *others), strict=True):
+                parts += [paragraph for paragraph in cell if paragraph.astext()]
                 for paragraph in cell:
                     paragraph["classes"].append(name)
-            wide.extend(child for cell in others for child in cell.children)
+            wide.children = []
+            wide.extend(parts)
         for text in list(group.findall(nodes.Text)):
             # Stars in the notes are the ledger's own, which Markdown was not to read.
             parts = EMPHASIS.split(text.astext())
