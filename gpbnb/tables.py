@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from gpbnb.formats import FloatFormat
 
+POWER = re.compile(r"(?<![\w.])(\d[\d.]*)e([+-]?\d+)(?!\w)")
+"""A number with a power of ten as Python writes it, such as ``1.5e-08``."""
+
 
 @dataclass(frozen=True)
 class Table:

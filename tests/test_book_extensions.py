@@ -197,6 +197,18 @@ def test_powers_of_ten_are_written_as_such(typed, written):
     assert shown == f"{written} 1e-08"
 
 
+def test_powers_of_ten_in_tables_too_but_not_in_code_and_formulas():
+    document = new_document("page")
+    document += [table(("a", "b"), ("1e-05 to 2e3, x2e3", "")), nodes.paragraph("", "1e-05")]
+    (code, math) = nodes.literal("", "1e-05"), nodes.math("", "1e-05")
+    list(document.findall(nodes.entry))[-1] += nodes.paragraph("", "", code, math)
+    book.write_powers(None, document, "book/page")
+    cells = [cell.astext().replace("\N{NO-BREAK SPACE}", " ") for cell in document.findall(nodes.entry)]
+    assert cells[2:] == ["1 × 10−5 to 2 × 103, x2e3", "\n\n1e-051e-05"]
+    assert [part.astext() for part in document.findall(nodes.superscript)] == ["−5", "3"]
+    assert document[1].astext() == "1e-05"
+
+
 def table(*rows):
     """A table as MyST makes it of Markdown, the first row its head."""
     group = nodes.tgroup("", *(nodes.colspec() for _ in rows[0]), cols=len(rows[0]))

@@ -13,6 +13,8 @@ from sphinx.addnodes import start_of_file
 from sphinx.application import Sphinx
 from sphinx.util.fileutil import copy_asset
 
+from gpbnb.tables import POWER
+
 # A tenth of the 24 MB in the package: TeX input, CHTML output, and the speech rules of English.
 MATHJAX_PARTS = (
     "tex-chtml.js",
@@ -88,12 +90,20 @@ def hide_enum_arguments(app, what, name, obj, options, signature, returns):
 
 
 def write_powers(app: Sphinx, doctree: nodes.document, docname: str) -> None:
-    """Write numbers that notebooks put into the text, such as 1.5e-08, as 1.5 × 10⁻⁸."""
-    for node in doctree.findall(lambda each: isinstance(each, nodes.inline) and "pasted-text" in each["classes"]):
-        text = node.astext()
-        if number := re.fullmatch(r"(-?[\d.]+)e([+-]\d+)", text):
-            power = nodes.superscript("", str(int(number[2])).replace("-", "−"))
-            node.children = [nodes.Text(f"{number[1]}\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10"), power]
+    """Write numbers in tables, and those that notebooks put into the text, as 1.5 × 10⁻⁸ instead of 1.5e-08."""
+    glued = [each for each in doctree.findall(nodes.inline) if "pasted-text" in each["classes"]]
+    for box in [*glued, *doctree.findall(nodes.entry)]:
+        for text in list(box.findall(nodes.Text)):
+            if isinstance(text.parent, (nodes.literal, nodes.math)) or not POWER.search(text.astext()):
+                continue
+            written = []
+            end = 0
+            for number in POWER.finditer(text.astext()):
+                before = text.astext()[end : number.start()]
+                written.append(nodes.Text(f"{before}{number[1]}\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10"))
+                written.append(nodes.superscript("", str(int(number[2])).replace("-", "−")))
+                end = number.end()
+            text.parent.replace(text, [*written, nodes.Text(text.astext()[end:])])
 
 
 def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:

@@ -13,7 +13,7 @@ from gpbnb.findings import Verdict
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, in_reading_order, load_checks
 from gpbnb.ledger.inventory import Entry, load_inventory
 from gpbnb.ledger.render import OUTCOMES, describe, section_name
-from gpbnb.tables import Table, one_line
+from gpbnb.tables import POWER, Table, one_line
 
 CHAPTERS = {
     "rounding": "Rounding bounds",
@@ -312,11 +312,17 @@ def _chapter_link(title: str) -> str:
 def _text(text: str) -> str:
     r"""Turn prose with math between dollar signs into HTML; a chapter's title between stars becomes a link."""
     parts = one_line(text).split("$")
-    parts[::2] = [EMPHASIS.sub(_emphasis, escape(prose, quote=False)) for prose in parts[::2]]
+    prose = [POWER.sub(_power, escape(part, quote=False)) for part in parts[::2]]
+    parts[::2] = [EMPHASIS.sub(_emphasis, part) for part in prose]
     parts[1::2] = [
         rf'<span class="math notranslate nohighlight">\({escape(math, quote=False)}\)</span>' for math in parts[1::2]
     ]
     return "".join(parts)
+
+
+def _power(match: re.Match[str]) -> str:
+    exponent = str(int(match[2])).replace("-", "−")
+    return f"{match[1]}&nbsp;×&nbsp;10<sup>{exponent}</sup>"
 
 
 def _emphasis(match: re.Match[str]) -> str:

@@ -271,3 +271,9 @@ def test_titles_of_chapters_are_those_of_the_book():
 
 def test_every_topic_has_a_chapter():
     assert set(ledger.topics().values()) <= set(ledger.CHAPTERS)
+
+
+def test_powers_of_ten_in_prose_are_written_as_such():
+    row = Row(Entry("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", "1.5e-08 and $1e-8$, 2e3x"), None)
+    assert r"1.5&nbsp;×&nbsp;10<sup>−8</sup> and <span" in ledger.searchable([row]).html
+    assert r"\(1e-8\)</span>, 2e3x" in ledger.searchable([row]).html
