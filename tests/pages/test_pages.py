@@ -192,7 +192,7 @@ def test_chapters_show_the_ledger_as_the_complete_one_does(open_page):
         tables = page.locator(".ledger > div > table, .ledger > table")
         assert tables.count() >= 2
         for table in tables.all():
-            assert table.locator("thead th").all_inner_texts() == ["Item", "Verdict", "Printed", "Recomputed, and note"]
+            assert table.locator("thead th").all_inner_texts() == ["Item", "Verdict", "Printed, recomputed, and note"]
             assert table.locator("tbody tr th").count() == table.locator("tbody tr").count()
 
 
