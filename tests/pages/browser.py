@@ -38,6 +38,13 @@ def pages() -> list[str]:
     return found
 
 
+def opened() -> list[str]:
+    """The pages that tests open: all but the listings of source, of which the longest stands for the others."""
+    listings = [address for address in pages() if address.startswith("_modules/gpbnb/")]
+    others = set(listings) - set(sorted(listings, key=lambda address: (HTML / address).stat().st_size)[-1:])
+    return [address for address in pages() if address not in others]
+
+
 def chromium() -> str:
     """Path of the machine's Chromium; the environment variable CHROMIUM overrides the search."""
     for name in (os.environ.get("CHROMIUM"), "chromium", "chromium-browser", "google-chrome"):

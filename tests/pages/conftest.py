@@ -33,7 +33,7 @@ def open_page():
 
 
 # One page is opened at a time, and serves all tests of it.
-@pytest.fixture(scope="module", params=[(a, s) for a in tools.pages() for s in tools.SIZES], ids="-".join)
+@pytest.fixture(scope="module", params=[(a, s) for a in tools.opened() for s in tools.SIZES], ids="-".join)
 def page(request, open_page):
     with open_page(*request.param) as page:
         yield page

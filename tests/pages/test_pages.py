@@ -129,11 +129,24 @@ def test_nothing_is_cut_on_paper(page):
         page.set_viewport_size(tools.SIZES["desktop"])
 
 
+EMPTY = (
+    "window.formulas = [...document.querySelectorAll('mjx-container')].map(each => [each, [...each.childNodes]]);"
+    "for (const [each] of formulas) each.replaceChildren()"
+)
+FILL = "for (const [each, parts] of formulas) each.replaceChildren(...parts)"
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_no_violation(page, axe, scheme):
     page.emulate_media(color_scheme=scheme)
     page.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")
+    # Formulas are most of a page and the same in each look: one is enough.
+    every = (page.viewport_size, scheme) == (tools.SIZES["desktop"], "light")
+    if not every:
+        page.evaluate(EMPTY)
     found = axe.run(page).response["violations"]
+    if not every:
+        page.evaluate(FILL)
     assert [f"{v['id']}: {node['target']} {node['html'][:160]}" for v in found for node in v["nodes"]] == []
 
 
