@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from datetime import date
+from fractions import Fraction
 from types import SimpleNamespace
 
 import faults
@@ -78,6 +79,7 @@ DISAGREE = [
     ("chapters", ledger, "quote", lambda key: "Chapter I, Chapter III"),
     ("deterministic", checks, "compensated", lambda part: 1e-9),
     ("random_variables", theory, "cycles_factor", lambda cycles: 0.5),
+    ("random_variables", theory, "cycles_factor", lambda cycles, true=theory.cycles_factor: true(cycles) or 1e-9),
     ("random_processes", theory, "correlated_factor", lambda time, tau: 0.3),
     ("random_processes", experiment, "correlated_means", lambda *given: np.ones(9)),
     ("scale_factor", checks, "identifiable", lambda amplitude: False),
@@ -115,6 +117,17 @@ def test_what_disagrees_could_agree(monkeypatch, name, target, attribute, value)
     assert FUNCTIONS[name]().agrees is False
     monkeypatch.setattr(target, attribute, value)
     assert FUNCTIONS[name]().agrees is True
+
+
+def test_a_reference_to_another_chapter_disagrees(monkeypatch):
+    monkeypatch.setattr(ledger, "quote", quoted("Measurement geometry ... in Chapter V"))
+    assert FUNCTIONS["chapter_reference"]().agrees is False
+
+
+def test_a_sum_that_exceeds_both_bounds_shows_no_revision(monkeypatch):
+    assert checks.revised_sum()
+    monkeypatch.setattr(checks.FloatFormat, "unit_roundoff", Fraction(1, 200))  # a tenth of what it is
+    assert not checks.revised_sum()
 
 
 def test_the_claim_on_corrections_needs_all_three(monkeypatch):

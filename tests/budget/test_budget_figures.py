@@ -54,6 +54,7 @@ def test_table_of_sources():
     assert [row[0] for row in rows] == [source.name for source in BUDGET.sources]
     for source, row in zip(BUDGET.sources, rows, strict=True):
         assert row[1:3] == (source.kind.value, source.form.value)
+        assert (row[3], row[5]) == (f"{source.error:.3g}", source.group)
         assert row[6] == f"{source.residual:.3g}"
         assert row[7] == f"{100 * BUDGET.share(source):.1f} %"
     assert rows[0][4] == "roll × 0.0005"

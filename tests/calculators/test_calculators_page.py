@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from fractions import Fraction
 from html.parser import HTMLParser
 
@@ -113,6 +114,13 @@ def test_what_is_written_into_a_script_stays_in_it(calculator):
     spec = json.loads(source[len("gpbnbCalculators.add(") : source.index(",\n(given)")])
     assert spec["id"] == calculator.id
     assert [each["name"] for each in spec["inputs"]] == [each.name for each in calculator.inputs]
+
+
+def test_not_even_a_sentence_ends_the_script():
+    ending = "</script><!-- {beta} -->"
+    source = page.script(replace(forms.ROUNDING, sentence=ending))
+    assert "<" not in source[: source.index(",\n(given)")]
+    assert json.loads(source[len("gpbnbCalculators.add(") : source.index(",\n(given)")])["sentence"] == ending
 
 
 @CALCULATORS

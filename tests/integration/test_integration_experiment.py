@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
+from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise
 
@@ -294,6 +295,32 @@ def test_a_meeting_collects_its_emulations():
             expected = theory.two_errors(1.0, 64.0, f, 4.0, run.fmt)
             assert met.theory(run.fmt, met.rates)[:, j].tolist() == [*expected, expected.total]
             assert met.ratios()[i, j] == run.rms.rounding / expected.rounding
+
+
+def test_both_errors_are_what_came_minus_what_should_come():
+    fmt = FloatFormat(2, 11)
+    (run,) = experiment.emulate(64.0, 32.0, 4.0, [fmt], rng(22), 3)
+    (piece,) = experiment.pieces(theory.first_order(1.0, 64.0), 32.0, 128, rng(22), 3)
+    running = experiment.Accumulator(fmt, 1 / 32, 3)
+    running.feed(piece.x)
+    trapezoids = (piece.x[:-1] + piece.x[1:]).sum(axis=0) / 64
+    assert np.array_equal(run.discretization, piece.d.sum(axis=0))
+    assert run.rounding == pytest.approx(running.value - trapezoids, abs=1e-12)
+    assert np.abs(run.rounding).min() > 1e-6
+    assert run.rms.rounding == math.sqrt(np.mean(run.rounding**2))
+    # Of one sign on purpose: their sum is what is wrong with the integral.
+    other = replace(run, discretization=np.array([3.0, 0.0]), rounding=np.array([1.0, 0.0]))
+    assert (*other.rms, other.rms_total) == (math.sqrt(4.5), math.sqrt(0.5), math.sqrt(8))
+
+
+def test_the_standard_error_of_a_meeting_is_that_of_a_walk():
+    """Of a random walk of n steps, whose squares have the mean i and the mean of products ij + 2 min(i, j)²."""
+    i = np.arange(1, 2001)
+    least = np.minimum.outer(i, i)
+    ratio = np.sum(np.multiply.outer(i, i) + 2 * least**2) / np.sum(i) ** 2
+    assert ratio == pytest.approx(7 / 3, rel=1e-3)
+    met = experiment.meet(64.0, 1.0, [FloatFormat(2, 11)], [64.0], rng(25), 6)
+    assert met.standard_error == pytest.approx(math.sqrt((3 * ratio - 1) / 6) / 2, rel=1e-3)
 
 
 def test_beyond_the_stall_rate_the_integral_is_lost():

@@ -471,6 +471,16 @@ def test_measurements_are_the_same_in_blocks_and_at_once():
     assert not np.array_equal(z, Simulation(model(), (1.0, 2.0, 3.0), seed=4, resolution=0.25).measurements(BLOCK + 10))
 
 
+def test_a_cycle_and_the_noise_go_on_from_block_to_block():
+    """A truth that stays at 5, seen through 1, 2 and 3 in turn; 4096 is no multiple of 3. And noise alone."""
+    turning = LinearModel([[1]], [[[1]], [[2]], [[3]]], [[0]], [["1e-20"]], [5], [[1]])
+    z = Simulation(turning, (5.0,), seed=1, resolution=1.0).measurements(2 * BLOCK + 10)
+    assert z[:, 0].tolist() == [5 * (1 + k % 3) for k in range(2 * BLOCK + 10)]
+    z = Simulation(scalar(1), (0.0,), seed=1, resolution=2.0**-20).measurements(2 * BLOCK)
+    assert not np.array_equal(z[:BLOCK], z[BLOCK:])
+    assert abs(np.corrcoef(z[:BLOCK, 0], z[BLOCK:, 0])[0, 1]) < 5 / math.sqrt(BLOCK)
+
+
 def test_measurements_are_those_of_the_model():
     """The filter that knows the model finds its innovations white, with the covariance that it predicts."""
     told = model()

@@ -7,6 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from gpbnb.formats import FloatFormat
 from gpbnb.rolling import checks, experiment, theory
@@ -94,6 +95,34 @@ def test_bands_have_the_mean_of_one_over_f_without_bias():
         experiment.Spectrum(found.frequency, 5 * found.frequency**-1.5, np.full(12, 1e12)), 1e-9
     )
     assert exact.value == pytest.approx(-1.5, abs=1e-9)
+
+
+def test_a_slope_is_exact_where_its_corrections_are():
+    """Means of few values have low logarithms, and samples a higher density: both are taken off, band by band."""
+    f, m, interval = np.geomspace(1e-3, 3e-2, 9), np.array([2.0, 30, 4, 7, 100, 3, 11, 2, 50]), 10.0
+    angle = np.pi * f * interval
+    density = 5 * f**-1.5 * np.exp(-1 / (2 * m)) * angle / np.sin(angle)
+    found = experiment.fit_slope(experiment.Spectrum(f, density, m), interval)
+    assert found.value == pytest.approx(-1.5, abs=1e-12)
+    assert found.decades == pytest.approx(math.log10(30), rel=1e-12)
+    # Of the weighted fit, with the variance 1/m of each natural logarithm.
+    x = np.log(f) - np.average(np.log(f), weights=m)
+    assert found.error == pytest.approx(math.sqrt(np.sum((m * x) ** 2 / m)) / np.sum(m * x**2), rel=1e-12)
+
+
+def test_an_estimate_is_worth_what_its_windows_leave():
+    """Segments that overlap by half, and neighbouring frequencies: both correlations computed from the window."""
+    samples, channels, segment = 5 * 64 + 7, 3, 64
+    window = signal.get_window("hann", segment)
+    whole = np.sum(window**2)
+    overlap = (np.sum(window[: segment // 2] * window[segment // 2 :]) / whole) ** 2
+    neighbours = np.abs(np.fft.fft(window**2)[1 : segment // 2] / whole) ** 2
+    f, p, averages = experiment.welch(rng(1).standard_normal((samples, channels)), 10.0, segment)
+    segments = 9
+    expected = channels * segments / (1 + 2 * (segments - 1) / segments * overlap) / (1 + 2 * np.sum(neighbours))
+    assert averages == pytest.approx(expected, rel=1e-12)
+    assert f == pytest.approx(np.arange(3, 33) / 640, rel=1e-12)
+    assert p.shape == f.shape
 
 
 # -- drift rates --------------------------------------------------------------------------------------------

@@ -67,6 +67,19 @@ def test_the_lines_pass_through_the_points(ax):
     x, y = xy(drift)
     assert np.interp(x[:4], *xy(drift_line)) == pytest.approx(y[:4], rel=0.02)
     assert np.mean(xy(noise_line)[1]) == pytest.approx(np.mean(found.base_noise), rel=0.4)
+    near = np.abs(found.offset) <= 5
+    ax.clear()
+    *_, drift_line = figures.around_roll(found, ax)
+    there = np.interp(found.offset[near], *xy(drift_line))
+    assert there == pytest.approx(found.line_signal[near], rel=0.02)
+    ax.clear()
+    *_, left, right = figures.after_rolling(found, ax)
+    for line, side in ((left, -1), (right, 1)):
+        x, y = xy(line)
+        distance = side * (x - 1 / found.period) * found.duration
+        chosen = near & (side * found.offset > 0)
+        there = np.interp(np.abs(found.offset[chosen]), distance, y)
+        assert there == pytest.approx(found.line_signal[chosen], rel=0.05)  # between the points of the line, too
 
 
 def test_trace(ax):
@@ -93,7 +106,8 @@ def test_drift_errors(ax):
 
 def test_bandwidths(ax):
     study = checks.filter_study()
-    pole, average, line, *_ = figures.bandwidths(study, theory.FLOWN_DENSITY, ax)
+    pole, average, line, lag, noise, _ = figures.bandwidths(study, theory.FLOWN_DENSITY, ax)
+    assert xy(line)[1] == pytest.approx(np.hypot(xy(lag)[1], xy(noise)[1]), rel=1e-13)
     assert np.array_equal(xy(pole), (study.bandwidth[:3], np.sqrt(study.error[:3])))
     assert np.array_equal(xy(average), (study.bandwidth[3:], np.sqrt(study.error[3:])))
     assert xy(line)[1].min() == pytest.approx(

@@ -93,6 +93,19 @@ def test_growth_answers_for_the_first_steps():
     assert found == required_precision(model, 12, goal, form=Form.UD, z=z)
 
 
+def test_growth_knows_nothing_of_what_comes_later():
+    """Neither a last measurement far off, nor a last Q of rank one, which few bits make indefinite."""
+    Phi, H, R, P0 = [["0.99", "0.1"], [0, "0.97"]], [[1, "0.3"]], [["0.4"]], [[2, 0], [0, 1]]
+    calm, thin = [["1e-3", 0], [0, "2e-3"]], [["1.4e-4", "7e-3"], ["7e-3", "0.35"]]
+    model, z = LinearModel(Phi, H, calm, R, [3, -1], P0), Z[:7, :1].copy()
+    z[6] = 1e6
+    later = LinearModel(Phi, H, [calm] * 6 + [thin], R, [3, -1], P0)
+    for basis in ("emulation", "bound"):
+        alone = [required_precision(model, k, 1e-4, basis=basis, z=z[:k]) for k in (2, 6)]
+        assert study.growth(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
+        assert study.growth(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
+
+
 def test_growth_refuses_steps_that_were_not_measured():
     for steps in ([0], [10, 301]):
         with pytest.raises(ValueError, match="and 300 measurements; needed from 1 to 300 steps"):
@@ -153,8 +166,14 @@ def test_deafness_is_that_of_the_runs():
     assert coarse.still > 0
     assert fine.still == 0
     assert coarse.variance == pytest.approx(1 + history.covariance[-1, 2, 2] / float(true.P[-1, 2, 2]), rel=1e-12)
-    assert coarse.error <= np.abs(history.state[:, 0]).max()
+    watched = np.array(sorted({*log_spaced(300, 16), *range(100, 301)})) - 1
+    assert coarse.error == np.abs(history.state[watched, 0]).max()
     assert abs(fine.variance - 1) < 1e-6
+    # Of the last steps, each is compared with the one before it, the first of them as well.
+    steady = [bool(step) for step in np.abs(np.diff(bias)) < 1e-9]
+    for last in (next(k for k in range(1, 300) if steady[-k]), 299):
+        (found,) = study.deafness(TILT, Z, 2, [fmt], last=last)
+        assert found.still == sum(steady[-last:]) / last
     assert study.hidden_bits(TILT, Z, 2) == pytest.approx(math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12)
 
 
@@ -178,9 +197,9 @@ def test_largest_estimate():
 
 
 def test_a_companion_bounds_closely():
-    error, bound = study.companion(TILT, Z, FloatFormat(2, 20))
-    marks = log_spaced(300, 16)
-    history = emulate(TILT, Z, FloatFormat(2, 20), Form.USUAL, marks)
+    thirds, marks = Z / 3, log_spaced(300, 16)  # which no format of base 2 holds
+    error, bound = study.companion(TILT, thirds, FloatFormat(2, 20))
+    history = emulate(TILT, thirds, FloatFormat(2, 20), Form.USUAL, marks)
     assert error == pytest.approx(np.abs(history.state).max(axis=0), rel=1e-12)
     assert (error > 0).all()
     assert (error <= bound).all()
@@ -190,6 +209,10 @@ def test_a_companion_bounds_closely():
 def test_a_companion_where_the_running_bound_says_nothing():
     model, z = examples.precise(), np.full((20, 1), 1.0)
     assert survey(model, z, 0.01, [40], basis="bound") == ((40, math.inf),)
+    found = required_precision(model, 20, 0.01, basis="bound", z=z)
+    last = max(digits for digits, ratio in found.tried if math.isinf(ratio))
+    assert last >= 40
+    assert found.why == f"in {last} digits the bound says nothing"
     error, bound = study.companion(model, z, FloatFormat(2, 40))
     assert (error <= bound).all()
     assert bound[0] < 0.01
