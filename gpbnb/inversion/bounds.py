@@ -5,6 +5,8 @@ Each bounds :math:`\|X - A^{-1}\|`, with the column sum norm (22), where X is th
 nothing. They differ in what they look at:
 
 ============================  =========================================================================
+bound                         looks at
+============================  =========================================================================
 :func:`wilkinson`             the size of the numbers that occurred
 :func:`higham`                the computed factors
 :func:`higham_probabilistic`  the same; holds but for a probability, if roundings are random
