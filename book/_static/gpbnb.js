@@ -101,6 +101,11 @@ window.addEventListener("beforeprint", shrinkToCells);
 window.addEventListener("load", async () => {
   await window.MathJax?.startup?.promise;
   breakFormulas();
-  markScrolling();
-  window.addEventListener("resize", markScrolling);
+  // Not when the window is resized: the sidebars slide, and the text has its width only after that.
+  let width = null;
+  const marked = new ResizeObserver(([{ contentRect }]) => {
+    if (contentRect.width !== width) markScrolling();
+    width = contentRect.width;
+  });
+  for (const article of document.querySelectorAll("article")) marked.observe(article);
 });

@@ -107,7 +107,7 @@ def test_columns_of_tables_have_names(page):
 
 
 CUT = """() => {
-  const paper = document.querySelector("article").getBoundingClientRect().right + 1;
+  const paper = document.querySelector("article, main").getBoundingClientRect().right + 1;
   const ends = (e) => e.getBoundingClientRect().right;
   const all = [...document.querySelectorAll("article :is(p, pre, img, svg, td, th, li, dt, dd, h1, h2, h3, mjx-math)")];
   const within = (e) => (e.matches("mjx-math") && e.closest("td, th") ? ends(e.closest("td, th")) + 1 : paper);
@@ -178,7 +178,7 @@ def test_the_keyboard_skips_to_the_text_and_shows_where_it_is(open_page):
     with open_page("book/rounding.html") as page:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
-        assert page.evaluate("document.activeElement.getBoundingClientRect().top") >= 0
+        page.wait_for_function("document.activeElement.getBoundingClientRect().top >= 0")  # it slides in
         page.keyboard.press("Enter")
         seen = []
         for _ in range(40):
@@ -213,6 +213,7 @@ def test_search_finds_a_word(open_page):
     with open_page("search.html?q=rounding") as page:
         first = page.locator("#search-results li a").first
         first.wait_for(timeout=10_000)
+        page.wait_for_load_state("networkidle")  # it loads the pages found, to show what surrounds the word
         first.click()
         page.wait_for_load_state("load")
         assert "search.html" not in page.url
