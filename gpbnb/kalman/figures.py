@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
 from gpbnb.formats import Rounding
 from gpbnb.kalman import theory
@@ -34,6 +35,7 @@ _QUANTITIES = {
     "gain": "error / gain, norms (no unit)",
     "covariance": "error / covariance, norms (no unit)",
 }
+_DIGITS = np.linspace(3.5, 23, 50)
 _MARKERS = {Form.REPORT: "o", Form.SECOND: "P", Form.USUAL: "^", Form.JOSEPH: "s", Form.UD: "D"}
 
 
@@ -111,15 +113,12 @@ def year_end(
     looks = [(form, rounding) for rounding in Rounding for form in Form]
     for form, rounding in looks:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), largest(run)) for run in group if (fmt := run.case.fmt) is not None]
-        if points:
+        if points := _points(group):
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
             name = f"{form}, {rounding.value}"
             artists += ax.plot(*zip(*sorted(points), strict=True), _MARKERS[form], color=colour, label=name, alpha=0.7)
-    t = np.linspace(3.5, 23, 50)
-    beta = 0.5 * 10.0 ** (1 - t)
     for (name, each), style in zip(counts, ("-", "--", "-."), strict=False):
-        artists += ax.plot(t, beta * (each.first + each.second), color=BOUND, ls=style, label=name)
+        artists += ax.plot(_DIGITS, _allowed(each), color=BOUND, ls=style, label=name)
     artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
     for (name, places), marker in zip(answers[:-1], "os^", strict=False):
         colour = BOUND if marker == "o" else STRICT
@@ -155,17 +154,14 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         (Rounding.NEAREST, OBSERVED, "emulated, rounded"),
     ):
         group = [run for run in found.runs if run.case.rounding is rounding]
-        points = [(decimal_digits(fmt), largest(run)) for run in group if (fmt := run.case.fmt) is not None]
-        artists += ax.plot(*zip(*points, strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
-    t = np.linspace(3.5, 23, 50)
+        artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style in (
         ("(125) as printed", {}, "-"),
         ("(125) with its faults mended", theory.MENDINGS["and errors carried on"], "--"),
     ):
-        each = theory.coefficients(*theory.EXAMPLE, **faults)
-        height = 0.5 * 10.0 ** (1 - t) * (each.first + each.second)
-        artists += ax.plot(t, height, color=BOUND, ls=style)
-        artists.append(_beside(ax, word, (t[12], height[12]), (6, 6), BOUND))
+        height = _allowed(theory.coefficients(*theory.EXAMPLE, **faults))
+        artists += ax.plot(_DIGITS, height, color=BOUND, ls=style)
+        artists.append(_beside(ax, word, (_DIGITS[12], height[12]), (6, 6), BOUND))
     artists.append(ax.axhline(found.goal, color=REFERENCE, ls=":"))
     artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.goal), (0, -14), REFERENCE))
     artists += ax.plot(found.printed, [found.goal] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
@@ -180,6 +176,16 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     legend(ax, loc="lower left")
     label(ax, "decimal digits that the computer carries", "largest error in a year (mas, mas/yr)")
     return artists
+
+
+def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
+    """Digits of each run that has a format, and its largest error in the year."""
+    return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
+
+
+def _allowed(each: theory.Coefficients) -> NDArray[np.float64]:
+    """What (125) allows with :data:`_DIGITS` decimal digits, for a norm of the state and a B of 1."""
+    return 0.5 * 10.0 ** (1 - _DIGITS) * (each.first + each.second)
 
 
 def _beside(
