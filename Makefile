@@ -25,7 +25,7 @@ export JUPYTER_PREFER_ENV_PATH := 1
 export PYTEST_DEBUG_TEMPROOT := $(HERE)/.cache/tmp
 export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
 # numba sees when the file of a compiled function changes, but not when those of the kernels that it calls do.
-export NUMBA_CACHE_DIR := $(HERE)/.cache/numba/$(shell cat gpbnb/_kernels/*.py | cksum | cut -d' ' -f1)
+export NUMBA_CACHE_DIR := $(HERE)/.cache/numba/$(shell cat gpbnb/arithmetic/kernels/*.py | cksum | cut -d' ' -f1)
 export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
 export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from gpbnb._kernels import carriers
-from gpbnb.tables import Table
+from gpbnb.arithmetic.kernels import backends
+from gpbnb.display.tables import Table
 
 PRECISIONS = {2: range(1, 54), 10: range(1, 19), 16: range(1, 14)}
 OPERATIONS = ("add", "subtract", "multiply", "divide", "sqrt", "round")
@@ -303,7 +303,7 @@ def binary_oracle(job: Job) -> Callable[..., list[float]]:
 
 def compare(job: Job) -> Outcome:
     """Run a batch through the kernel and the oracle."""
-    carrier = carriers.carrier(job.base, job.precision, job.nearest)
+    backend = backends.backend(job.base, job.precision, job.nearest)
     if job.operation == "round":
         operands: list[tuple[Integers, Integers]] = [(long_numbers(job), np.zeros(job.count, object))]
     elif job.operation == "sqrt":
@@ -314,12 +314,12 @@ def compare(job: Job) -> Outcome:
             m2 = np.where(m2 == 0, job.base ** (job.precision - 1), m2)
         operands = [(m1, e1), (m2, e2)]
     run = _decimal if job.base == 10 else _binary
-    return Outcome(job, job.count, run(job, carrier, operands))
+    return Outcome(job, job.count, run(job, backend, operands))
 
 
-def _decimal(job: Job, carrier: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
+def _decimal(job: Job, backend: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
     compiled = [(m.astype(np.int64), e.astype(np.int64)) for m, e in operands]
-    m, e = carrier.apply("round_" if job.operation == "round" else job.operation, *compiled)
+    m, e = backend.apply("round_" if job.operation == "round" else job.operation, *compiled)
     wide = decimal.Context(prec=60, Emax=decimal.MAX_EMAX, Emin=decimal.MIN_EMIN)
 
     def decimals(m: Any, e: Any) -> list[decimal.Decimal]:
@@ -337,11 +337,11 @@ def _decimal(job: Job, carrier: Any, operands: list[tuple[Integers, Integers]]) 
     ][:SHOWN]
 
 
-def _binary(job: Job, carrier: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
+def _binary(job: Job, backend: Any, operands: list[tuple[Integers, Integers]]) -> list[str]:
     scale = 4 if job.base == 16 and job.operation != "round" else 1
     compiled = [np.ldexp(m.astype(np.float64), (scale * e).astype(np.int64)) for m, e in operands]
     name = "round_" if job.operation == "round" else job.operation
-    (result,) = carrier.apply(name, *((x,) for x in compiled))
+    (result,) = backend.apply(name, *((x,) for x in compiled))
     inputs = [x.tolist() for x in compiled]
     expected = np.array(binary_oracle(job)(*inputs))
     wrong = np.flatnonzero((result != expected) | np.signbit(result) & (result == 0))

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 
 from benchmarks.timing import Row
-from gpbnb.plotting import BOUND, OBSERVED, STRICT, figure, label, legend
+from gpbnb.display.style import BOUND, OBSERVED, STRICT, figure, label, legend
 
 
 def draw(table: Sequence[Row], path: Path) -> None:

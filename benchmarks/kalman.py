@@ -12,11 +12,11 @@ import numpy as np
 from numba import njit
 
 from benchmarks.timing import Row, medians, rows
-from gpbnb._kernels.carriers import Compiled
-from gpbnb._kernels.matrices import difference, total
-from gpbnb._kernels.scalar import divide, load, matmul, multiply, negative, store, subtract
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.kernels.matrices import difference, total
+from gpbnb.arithmetic.kernels.scalar import divide, load, matmul, multiply, negative, store, subtract
 
 N, M = 10, 2
 STEPS = 20  # in one call of the compiled loop
@@ -112,17 +112,17 @@ def model() -> tuple[Any, ...]:
 
 def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
     """A call of the compiled loop in a format, and its operands as nested lists of Fractions."""
-    carrier = fmt.carrier
-    if not isinstance(carrier, Compiled):
+    backend = fmt.backend
+    if not isinstance(backend, Compiled):
         raise TypeError(f"got {fmt}; needed a format with compiled loops")
     given, x0, P0 = model()
     arrays = [fmt.array(a) for a in (*given, x0, P0)]
-    packed = [carrier.pack(a._parts) for a in arrays]
+    packed = [backend.pack(a._parts) for a in arrays]
     x, P = np.empty_like(packed[-2]), np.empty_like(packed[-1])
 
     def run(steps: int) -> Any:
-        compiled_steps(carrier.tag, tuple(packed[:-2]), packed[-2], packed[-1], x, P, steps)
-        return tuple(FloatArray._wrap(carrier, carrier.unpack(p), fmt).to_fractions() for p in (x, P))
+        compiled_steps(backend.tag, tuple(packed[:-2]), packed[-2], packed[-1], x, P, steps)
+        return tuple(FloatArray.from_components(backend, backend.unpack(p), fmt).to_fractions() for p in (x, P))
 
     return run, [a.to_fractions().tolist() for a in arrays]
 

@@ -10,7 +10,7 @@ import mpmath
 import numpy as np
 
 from benchmarks.timing import Row, medians, rows
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
 
 COUNT = 1_000_000
 REACH = {8: 8, 17: 4}

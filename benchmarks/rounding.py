@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import Row, medians, rows
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
 
 COUNT = 1_000_000
 EXPONENT_BITS = {11: 5, 24: 8}

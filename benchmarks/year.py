@@ -17,10 +17,10 @@ from tqdm import tqdm
 
 from benchmarks.kalman import numpy_step
 from benchmarks.timing import machine
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.display.tables import Table
 from gpbnb.kalman import year
 from gpbnb.kalman.experiment import BLOCK, TRUTH, Form, Run
-from gpbnb.tables import Table
 
 RESULTS = Path(__file__).parent / "results"
 NUMPY_TAKES = 20  # one block of so many

@@ -1,6 +1,46 @@
-"""Rounding and data-reduction errors of Gravity Probe B, number by number.
+"""Rounding errors in recursive filters, integrators and matrix computations, bounded and emulated digit for digit.
 
-Start with :class:`gpbnb.formats.FloatFormat`; each topic of the book has a sub-package of its name.
+The public interface::
+
+    FloatFormat, Rounding      a number format: base, precision, rounding
+    linalg                     dot, matmul, lu, solve, inv with every operation rounded
+    LinearModel                a linear dynamic model for a Kalman filter
+    required_precision         the smallest precision that keeps a filter within a tolerance
+
+Each chapter of the book has a sub-package: rounding, inversion, kalman, rolling, integration, budget, geometry and
+wordlength. ``gpbnb.ledger`` judges every statement printed in the three documents.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gpbnb.arithmetic import linalg
+    from gpbnb.arithmetic.array import FloatArray
+    from gpbnb.arithmetic.formats import FloatFormat, Rounding
+    from gpbnb.kalman.model import LinearModel
+    from gpbnb.kalman.precision import required_precision
+
 __version__ = "0.1.0"
+__all__ = ["FloatArray", "FloatFormat", "LinearModel", "Rounding", "linalg", "required_precision"]
+
+_HOME = {
+    "FloatArray": "gpbnb.arithmetic.array",
+    "FloatFormat": "gpbnb.arithmetic.formats",
+    "LinearModel": "gpbnb.kalman.model",
+    "Rounding": "gpbnb.arithmetic.formats",
+    "required_precision": "gpbnb.kalman.precision",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used, so that ``import gpbnb`` stays light."""
+    if name == "linalg":
+        return import_module("gpbnb.arithmetic.linalg")
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'gpbnb' has no attribute {name!r}; the public names are {', '.join(__all__)}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -15,9 +15,9 @@ def ax():
     """An empty panel of a figure."""
     import matplotlib.pyplot as plt
 
-    from gpbnb import plotting
+    from gpbnb.display import style
 
-    figure, axes = plotting.figure()
+    figure, axes = style.figure()
     yield axes[0]
     figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
     plt.close("all")

@@ -13,5 +13,5 @@ def legend_of(ax: Axes) -> list[str]:
 
 
 def colour(artist: Artist) -> str:
-    """As written in gpbnb.plotting."""
+    """As written in gpbnb.display.style."""
     return to_hex(artist.get_color()).upper()

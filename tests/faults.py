@@ -15,9 +15,9 @@ import pytest
 import sympy as sp
 
 from gpbnb import ledger
-from gpbnb.derivation import Derivation
-from gpbnb.findings import Checks, Finding, Verdict
+from gpbnb.display.derivation import Derivation
 from gpbnb.ledger.checking import Row, load_checks
+from gpbnb.ledger.finding import Checks, Finding, Verdict
 
 Change = Callable[[pytest.MonkeyPatch], None]
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step
+from gpbnb.display.derivation import Derivation, Step
 
 AMOUNT = sp.Symbol("amount", positive=True)
 

@@ -13,7 +13,7 @@ from sphinx.addnodes import start_of_file
 from sphinx.application import Sphinx
 from sphinx.util.fileutil import copy_asset
 
-from gpbnb.tables import POWER
+from gpbnb.display.tables import POWER
 
 # A tenth of the 24 MB in the package: TeX input, CHTML output, and the speech rules of English.
 MATHJAX_PARTS = (

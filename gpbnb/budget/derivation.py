@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, held, over
+from gpbnb.display.derivation import Derivation, Step, held, over
 
 N, J = sp.symbols("N j", integer=True, positive=True)
 E, T, TAU, B = sp.symbols("e T tau b", positive=True)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from gpbnb.budget import theory
 from gpbnb.budget.experiment import Draws
 from gpbnb.budget.theory import Budget, ErrorForm
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog
+from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog
 
 
 def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes, most: int = 100) -> list[Artist]:

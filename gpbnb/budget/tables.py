@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gpbnb.budget.theory import METHODS, Budget, Reading
-from gpbnb.tables import Table
+from gpbnb.display.tables import Table
 
 
 def sources(budget: Budget) -> Table:

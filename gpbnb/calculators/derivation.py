@@ -9,7 +9,7 @@ import sympy as sp
 from sympy.codegen.cfunctions import expm1
 
 from gpbnb.calculators.javascript import Definition, stable, symbol
-from gpbnb.derivation import Derivation, Step, over
+from gpbnb.display.derivation import Derivation, Step, over
 from gpbnb.integration import derivation as integration
 from gpbnb.kalman import derivation as kalman
 from gpbnb.rolling import derivation as rolling

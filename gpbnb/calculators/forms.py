@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from gpbnb.bounds import gamma
+from gpbnb.arithmetic.bounds import gamma
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.calculators import derivation
 from gpbnb.calculators.javascript import Definition
-from gpbnb.formats import FloatFormat, Rounding
 from gpbnb.integration import theory as integration
 from gpbnb.kalman import theory as kalman
 from gpbnb.measurement import YEAR

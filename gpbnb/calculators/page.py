@@ -14,7 +14,7 @@ import sympy as sp
 
 from gpbnb.calculators.forms import Calculator, Input
 from gpbnb.calculators.javascript import Definition, print_function
-from gpbnb.derivation import Step
+from gpbnb.display.derivation import Step
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

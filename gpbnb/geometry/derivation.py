@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, held, over
+from gpbnb.display.derivation import Derivation, Step, held, over
 
 P = sp.Symbol("psi", real=True)
 """The roll phase ωt."""

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
 from gpbnb.geometry import theory
 from gpbnb.geometry.experiment import Year
 from gpbnb.measurement import ARCSEC, MAS, deroll, roll, rotation, theta_of
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
 
 Frames = Mapping[str, NDArray[np.float64]]
 FRAME_COLOURS = dict(

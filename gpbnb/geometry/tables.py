@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from gpbnb.display.tables import Table
 from gpbnb.geometry.experiment import Part, Year
 from gpbnb.geometry.theory import effect
 from gpbnb.measurement import ARCSEC, MAS
-from gpbnb.tables import Table
 
 
 def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:

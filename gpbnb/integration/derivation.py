@@ -9,7 +9,7 @@ from functools import cache
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, held, over, together
+from gpbnb.display.derivation import Derivation, Step, held, over, together
 
 OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
 MU = sp.Symbol("mu", positive=True)

@@ -13,10 +13,10 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb._kernels.carriers import Compiled
-from gpbnb._kernels.scalar import add, load, multiply, round_, store
-from gpbnb._kernels.tags import Double
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
+from gpbnb.arithmetic.kernels.tags import Double
 from gpbnb.integration import theory
 from gpbnb.integration.theory import Process, Rule, Step
 
@@ -351,25 +351,25 @@ class Accumulator:
     """
 
     def __init__(self, fmt: FloatFormat, period: float, paths: int) -> None:
-        carrier = fmt.carrier
-        if not isinstance(carrier, Compiled):
+        backend = fmt.backend
+        if not isinstance(backend, Compiled):
             raise ValueError(f"got {fmt}; needed base 2 to 53 bits, base 10 to 18 digits, or base 16 to 13 digits")
-        self.fmt, self.carrier = fmt, carrier
-        self._half = carrier.pack(fmt.array([period / 2])._parts)
-        self._total = carrier.pack(fmt.array(np.zeros(paths))._parts)
+        self.fmt, self.backend = fmt, backend
+        self._half = backend.pack(fmt.array([period / 2]).components)
+        self._total = backend.pack(fmt.array(np.zeros(paths)).components)
 
     def feed(self, x: Floats) -> None:
         """Go on with the samples x, (samples, paths); the first row is the last one of the piece before."""
         if self.fmt.base == 10:
-            packed = self.carrier.pack(self.fmt.array(x)._parts)
-            _integrate(self.carrier.tag, self._half, packed, self._total)
+            packed = self.backend.pack(self.fmt.array(x).components)
+            _integrate(self.backend.tag, self._half, packed, self._total)
         else:
-            _integrate_rounding(self.carrier.tag, self._half, x, self._total)
+            _integrate_rounding(self.backend.tag, self._half, x, self._total)
 
     @property
     def value(self) -> Floats:
         """The integrals so far, (paths,), nearest float64."""
-        return self.carrier.to_float(self.carrier.unpack(self._total))
+        return self.backend.to_float(self.backend.unpack(self._total))
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display.style import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend, loglog, looks
+from gpbnb.display.tables import arithmetic
 from gpbnb.integration import theory
 from gpbnb.integration.experiment import Accuracy, Meeting, Simulation, Sweep
-from gpbnb.plotting import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend, loglog, looks
-from gpbnb.tables import arithmetic
 
 
 def block_diagram(ax: Axes) -> list[Artist]:

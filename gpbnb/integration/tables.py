@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display.tables import Table, digits
 from gpbnb.integration import derivation, theory
 from gpbnb.integration.theory import Process
-from gpbnb.tables import Table, digits
 
 
 def sensor(sigma_x: float, bandwidth_hz: float, unit: str, rates: Sequence[float]) -> Table:

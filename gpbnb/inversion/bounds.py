@@ -1,8 +1,8 @@
 r"""Bounds of the error of a computed inverse that can be trusted, from a priori to a posteriori.
 
 Each bounds :math:`\|X - A^{-1}\|`, with the column sum norm (22), where X is the inverse of the t-digit matrix A as
-:func:`gpbnb.linalg.inv` computes it. Each is a float64 above the value of its formula, or ValueError where it proves
-nothing. They differ in what they look at:
+:func:`gpbnb.arithmetic.linalg.inv` computes it. Each is a float64 above the value of its formula, or ValueError where
+it proves nothing. They differ in what they look at:
 
 ============================  =========================================================================
 bound                         looks at
@@ -29,11 +29,11 @@ import flint
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb import linalg
-from gpbnb.bounds import exact, gamma, gamma_probabilistic
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat, Rounding
-from gpbnb.linalg import LU
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounds import exact, gamma, gamma_probabilistic
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.linalg import LU
 
 # -- a priori: from the count of roundings --------------------------------------------------------
 
@@ -49,7 +49,7 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
 
     Parameters
     ----------
-    factors : what :func:`gpbnb.linalg.lu` made of A.
+    factors : what :func:`gpbnb.arithmetic.linalg.lu` made of A.
     x : (n, n), the computed inverse.
 
     Raises

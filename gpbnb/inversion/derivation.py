@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, errors, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, errors, first_order, held, over, together
 
 EPSILON = sp.Symbol("epsilon")
 N, J, K = sp.symbols("n j k", integer=True, positive=True)

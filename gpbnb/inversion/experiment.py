@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb import linalg
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import bounds, procedure, theory
 
 # -- one inverse beside its bounds ----------------------------------------------------------------

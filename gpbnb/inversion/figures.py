@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import MaxNLocator
 
+from gpbnb.display.style import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend
 from gpbnb.inversion.example import PLACES, PRINTED, Column
 from gpbnb.inversion.experiment import Frozen, Trial
 from gpbnb.inversion.tables import in_math
-from gpbnb.plotting import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend
 
 
 class Box(NamedTuple):

@@ -17,8 +17,8 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import exact
-from gpbnb.floatarray import FloatArray
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounds import exact
 from gpbnb.inversion import theory
 from gpbnb.inversion.theory import Norm, Perturbation, Reduction
 
@@ -46,7 +46,7 @@ class Triangularization(NamedTuple):
 
 
 def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
-    """Box "Triangularization of A into A_T", (45)-(58); the digits are those of :func:`gpbnb.linalg.lu`.
+    """Box "Triangularization of A into A_T", (45)-(58); the digits are those of :func:`gpbnb.arithmetic.linalg.lu`.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
     ValueError : `a` is not a square matrix.
     numpy.linalg.LinAlgError : a pivot is zero.
     """
-    from gpbnb import linalg
+    from gpbnb.arithmetic import linalg
 
     found = linalg.lu(a, pivot)
     n, order = len(a), found.permutation
@@ -107,7 +107,7 @@ def substitute(upper: FloatArray, right: FloatArray) -> FloatArray:
     -------
     solution : (n, p).
     """
-    from gpbnb import linalg
+    from gpbnb.arithmetic import linalg
 
     return linalg.solve(upper, right)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from gpbnb.display.tables import Table, digits, scientific
 from gpbnb.inversion.example import PLACES, PRINTED, Claim, Column, Possible, Search
 from gpbnb.inversion.experiment import Frozen, Trial
-from gpbnb.tables import Table, digits, scientific
 
 
 def table1(readings: Sequence[tuple[Column, Column]]) -> Table:

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import exact, gamma
+from gpbnb.arithmetic.bounds import exact, gamma
 
 Norm = Callable[[NDArray[Any]], Any]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import theory, year
 
 

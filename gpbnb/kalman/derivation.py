@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, first_order, held, over, together
 
 N, M, K = sp.symbols("n m k", integer=True, positive=True)
 NTH, J = sp.symbols("i j", integer=True, positive=True)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import theory
 from gpbnb.kalman.experiment import Bounded, Form, bounded
 from gpbnb.kalman.model import LinearModel

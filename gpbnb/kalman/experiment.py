@@ -1,7 +1,7 @@
 """What does happen: a Kalman filter with each of its operations rounded, beside the same in double-double.
 
-The filter is written once, for every arithmetic of :mod:`gpbnb._kernels.scalar`, and runs without the interpreter's
-lock.
+The filter is written once, for every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar`, and releases the
+interpreter's lock.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
-from gpbnb._kernels import doubledouble
-from gpbnb._kernels.carriers import Compiled, double_doubles
-from gpbnb._kernels.matrices import (
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.matrices import (
     copy,
     difference,
     factor_ud,
@@ -32,8 +34,7 @@ from gpbnb._kernels.matrices import (
     total,
     transpose,
 )
-from gpbnb._kernels.scalar import (
-    _put,
+from gpbnb.arithmetic.kernels.scalar import (
     add,
     compare,
     divide,
@@ -41,13 +42,12 @@ from gpbnb._kernels.scalar import (
     multiply,
     negative,
     one,
+    put,
     store,
     subtract,
     zero,
 )
-from gpbnb._kernels.tags import Decimal, DoubleDouble, ShortDecimal, Tag
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal, Tag
 from gpbnb.kalman.model import LinearModel, factor
 from gpbnb.kalman.theory import (
     contraction_start,
@@ -111,26 +111,26 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
     fine = True
     for i in range(n):
         for j in range(n):
-            _put(fmt, T, (i, j), load(fmt, U, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
-            _put(fmt, W, (i, n + j), load(fmt, UQ, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
-        _put(fmt, D, (i, 0), load(fmt, U, (i, i)))
-        _put(fmt, D, (n + i, 0), load(fmt, UQ, (i, i)))
+            put(fmt, T, (i, j), load(fmt, U, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
+            put(fmt, W, (i, n + j), load(fmt, UQ, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
+        put(fmt, D, (i, 0), load(fmt, U, (i, i)))
+        put(fmt, D, (n + i, 0), load(fmt, UQ, (i, i)))
     product(fmt, Phi, T, W[:, :n])
     for j in range(n - 1, -1, -1):
         d = zero(fmt)
         for k in range(2 * n):
             w = load(fmt, W, (j, k))
             if is_zero(fmt, w):
-                _put(fmt, C, (k, 0), zero(fmt))
+                put(fmt, C, (k, 0), zero(fmt))
             else:
                 c = multiply(fmt, load(fmt, D, (k, 0)), w)
-                _put(fmt, C, (k, 0), c)
+                put(fmt, C, (k, 0), c)
                 d = add(fmt, d, multiply(fmt, w, c))
         store(fmt, U, (j, j), d)
         sign = compare(fmt, d, zero(fmt))
         fine = fine and sign > 0
         for i in range(j):
-            _put(fmt, U, (j, i), zero(fmt))
+            put(fmt, U, (j, i), zero(fmt))
             s = zero(fmt)
             if sign != 0:
                 for k in range(2 * n):
@@ -168,7 +168,7 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
             if not is_zero(fmt, c):
                 s = add(fmt, s, multiply(fmt, load(fmt, U, (k, j)), c))
         s = add(fmt, s, load(fmt, h, j))
-        _put(fmt, F, (j, 0), s)
+        put(fmt, F, (j, 0), s)
         store(fmt, G, (j, 0), multiply(fmt, load(fmt, U, (j, j)), s))
     a = r
     for j in range(n):
@@ -190,7 +190,7 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
                 store(fmt, K, (k, i), add(fmt, c, multiply(fmt, g, u)))
         if compare(fmt, load(fmt, U, (j, j)), zero(fmt)) < 0:
             answer = -1
-        _put(fmt, K, (j, i), g)
+        put(fmt, K, (j, i), g)
     for j in range(n):
         g = divide(fmt, load(fmt, K, (j, i)), a)
         store(fmt, K, (j, i), g)
@@ -454,7 +454,7 @@ class Run:
     Raises
     ------
     ValueError : a format without compiled loops; marks that do not rise.
-    OverflowError : the model has entries beyond the range of the format's carrier.
+    OverflowError : the model has entries beyond the range of the format's backend.
     """
 
     def __init__(self, model: LinearModel, fmt: FloatFormat | None, form: Form, marks: Sequence[int]) -> None:
@@ -462,7 +462,7 @@ class Run:
         self.marks = np.array(marks, dtype=np.int64).reshape(-1)
         if np.any(np.diff(self.marks, prepend=0) <= 0):
             raise ValueError(f"got marks {list(marks)[:5]} …; needed steps of 1 or more, each above the one before")
-        if fmt is not None and not isinstance(fmt.carrier, Compiled):
+        if fmt is not None and not isinstance(fmt.backend, Compiled):
             raise ValueError(
                 f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
             )
@@ -489,7 +489,7 @@ class Run:
 
     @property
     def tag(self) -> Tag:
-        return DoubleDouble() if self.fmt is None else cast(Compiled, self.fmt.carrier).tag
+        return DoubleDouble() if self.fmt is None else cast(Compiled, self.fmt.backend).tag
 
     @property
     def steps(self) -> int:
@@ -503,7 +503,7 @@ class Run:
 
     @property
     def stopped(self) -> int | None:
-        """The step that a division by zero, or a number beyond the range of the carrier, ended."""
+        """The step that a division by zero, or a number beyond the range of the backend, ended."""
         return int(self.notes[_STOPPED]) or None
 
     def take(self, z: Any) -> None:
@@ -530,19 +530,21 @@ class Run:
                 return np.stack([entries, np.zeros_like(entries)], axis=-1)
             return double_doubles(entries)
         array = self.fmt.array(values)
-        if not isinstance(array._carrier, Compiled):
+        if not isinstance(array.backend, Compiled):
             raise OverflowError(
                 f"got numbers beyond the range of the compiled loops of {self.fmt}; scale the states, or use base 10"
             )
-        return array._carrier.pack(array._parts)
+        return array.backend.pack(array.components)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Exact Fractions of what the compiled loops gave."""
         if self.fmt is None:
             high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
             return np.asarray(np.frompyfunc(lambda h, s: Fraction(h) + Fraction(s), 2, 1)(high, low), dtype=object)
-        carrier = cast(Compiled, self.fmt.carrier)
-        return np.asarray(FloatArray._wrap(carrier, carrier.unpack(packed), self.fmt).to_fractions(), dtype=object)
+        backend = cast(Compiled, self.fmt.backend)
+        return np.asarray(
+            FloatArray.from_components(backend, backend.unpack(packed), self.fmt).to_fractions(), dtype=object
+        )
 
     def kept(self) -> Kept:
         """Estimate, gain and covariance at the marked steps that were reached."""
@@ -603,7 +605,7 @@ class History:
     gain, covariance : (c, n, m) and (c, n, n), likewise.
     reference : of the same steps.
     indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
-    stopped : the step that a division by zero, or a number beyond the carrier's range, ended, if any.
+    stopped : the step that a division by zero, or a number beyond the backend's range, ended, if any.
     """
 
     model: LinearModel
@@ -764,16 +766,16 @@ def _widen(fmt: Any, form: int, a: Any, c: Any, U: Any, UD: Any) -> None:
             for j in range(n):
                 d = _widened(fmt, load(fmt, a, (j, j)))
                 u = _widened(fmt, load(fmt, a, (i, j))) if i < j else one(exactly) if i == j else zero(exactly)
-                _put(exactly, U, (j, i), u)
-                _put(exactly, UD, (i, j), multiply(exactly, u, d))
+                put(exactly, U, (j, i), u)
+                put(exactly, UD, (i, j), multiply(exactly, u, d))
         product(exactly, UD, U, c)
         return
     for i in range(n):
         for j in range(i + 1):
             x = add(exactly, _widened(fmt, load(fmt, a, (i, j))), _widened(fmt, load(fmt, a, (j, i))))
             x = multiply(exactly, x, half)
-            _put(exactly, c, (i, j), x)
-            _put(exactly, c, (j, i), x)
+            put(exactly, c, (i, j), x)
+            put(exactly, c, (j, i), x)
 
 
 @njit(nogil=True)
@@ -782,8 +784,8 @@ def _symmetrize(a: Any) -> None:
     for i in range(a.shape[0]):
         for j in range(i):
             x = multiply(exactly, add(exactly, load(exactly, a, (i, j)), load(exactly, a, (j, i))), (0.5, 0.0))
-            _put(exactly, a, (i, j), x)
-            _put(exactly, a, (j, i), x)
+            put(exactly, a, (i, j), x)
+            put(exactly, a, (j, i), x)
 
 
 @njit(nogil=True)
@@ -793,12 +795,12 @@ def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U
     exactly = DoubleDouble()
     for i in range(n):
         for j in range(m):
-            _put(exactly, c, (i, j), _widened(fmt, load(fmt, K, (i, j))))
+            put(exactly, c, (i, j), _widened(fmt, load(fmt, K, (i, j))))
     if form != _UD:
         return
     for i in range(m):
         for j in range(m):
-            _put(exactly, U, (i, j), _widened(fmt, load(fmt, UR, (i, j))))
+            put(exactly, U, (i, j), _widened(fmt, load(fmt, UR, (i, j))))
     _decorrelated(exactly, U, H, HD)
     for i in range(m):
         for j in range(i):
@@ -807,13 +809,13 @@ def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U
                 s = add(exactly, s, multiply(exactly, load(exactly, HD, (i, k)), load(exactly, c, (k, j))))
             for k in range(n):
                 x = multiply(exactly, _widened(fmt, load(fmt, K, (k, i))), s)
-                _put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
+                put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
     for j in range(1, m):
         for i in range(j):
             u = load(exactly, U, (i, j))
             for k in range(n):
                 x = multiply(exactly, load(exactly, c, (k, i)), u)
-                _put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
+                put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
 
 
 @njit(cache=True, nogil=True)
@@ -852,7 +854,7 @@ def follow(
     for step in range(z.shape[0]):
         k = first + step
         for i in range(n):
-            _put(exactly, xe, (i, 0), _widened(fmt, load(fmt, x, (i, 0))))
+            put(exactly, xe, (i, 0), _widened(fmt, load(fmt, x, (i, 0))))
         _widen(fmt, form, P, Pe, U, UD)
         before = xe[:, 0, 0].copy()
         for i in range(n):

@@ -9,13 +9,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from gpbnb.formats import Rounding
-from gpbnb.kalman import theory
-from gpbnb.kalman.answers import Answers, decimal_digits, largest
-from gpbnb.kalman.ensembles import Summary
-from gpbnb.kalman.experiment import Bounded, Form
-from gpbnb.kalman.year import Year
-from gpbnb.plotting import (
+from gpbnb.arithmetic.formats import Rounding
+from gpbnb.display.style import (
     BOUND,
     COLOURS,
     OBSERVED,
@@ -27,7 +22,12 @@ from gpbnb.plotting import (
     legend,
     loglog,
 )
-from gpbnb.tables import arithmetic
+from gpbnb.display.tables import arithmetic
+from gpbnb.kalman import theory
+from gpbnb.kalman.answers import Answers, decimal_digits, largest
+from gpbnb.kalman.ensembles import Summary
+from gpbnb.kalman.experiment import Bounded, Form
+from gpbnb.kalman.year import Year
 
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb._kernels.carriers import LARGEST_PRECISION
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 from gpbnb.kalman.experiment import Followed, Form, Kept, Run, Simulation, compare_runs, log_spaced, reference
 from gpbnb.kalman.model import LinearModel
 

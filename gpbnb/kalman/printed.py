@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman import theory
 from gpbnb.kalman.experiment import Kept
 from gpbnb.kalman.model import LinearModel

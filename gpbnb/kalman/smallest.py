@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import exact, max_norm
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.bounds import exact, max_norm
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman import theory
 
 

@@ -8,13 +8,13 @@ from fractions import Fraction
 
 import numpy as np
 
-from gpbnb.formats import FloatFormat, prints_as
+from gpbnb.arithmetic.formats import FloatFormat, prints_as
+from gpbnb.display.tables import Table, arithmetic, scientific, short
 from gpbnb.kalman import smallest, theory, year
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.model import STATES, LinearModel
 from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
-from gpbnb.tables import Table, arithmetic, scientific, short
 
 DOUBLE = FloatFormat(2, 53)
 

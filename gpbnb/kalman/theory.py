@@ -39,8 +39,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gpbnb.bounds import column_sum_norm, exact, inverse_of, max_norm
-from gpbnb.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.bounds import column_sum_norm, exact, inverse_of, max_norm
+from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
 
 # -- the counts of the report -----------------------------------------------------------------------------------------
 
@@ -425,7 +425,7 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
     ----------
     Phi, H, Q, R : the model. x (n,), P (n, n) : where the step starts. z (m,) : measurement.
     K (n, m), S (m, m) : gain and innovation covariance of this step.
-    unit : unit roundoff of one operation of the evaluation, 2**-102 for :mod:`gpbnb._kernels.doubledouble`.
+    unit : unit roundoff of one operation of the evaluation, 2**-102 for :mod:`gpbnb.arithmetic.kernels.doubledouble`.
 
     Returns
     -------

@@ -10,7 +10,6 @@
 """
 
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, rows, summary
-from gpbnb.ledger.inventory import Entry, load_inventory, quote, select
 from gpbnb.ledger.page import (
     CHAPTERS,
     Html,
@@ -25,6 +24,7 @@ from gpbnb.ledger.page import (
     topics,
 )
 from gpbnb.ledger.render import summary_table, table
+from gpbnb.ledger.statements import Entry, load_inventory, quote, select
 
 __all__ = [
     "CHAPTERS",

@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, examine, load_checks
-from gpbnb.ledger.inventory import Entry, load_inventory, select
 from gpbnb.ledger.render import FORMATS, describe
+from gpbnb.ledger.statements import Entry, load_inventory, select
 
 COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # 2 is argparse's, for misuse
 _EPILOG = (

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import NamedTuple
 
-from gpbnb.findings import Check, Checks, Finding, Verdict
-from gpbnb.ledger.inventory import Entry, load_inventory, select
+from gpbnb.ledger.finding import Check, Checks, Finding, Verdict
+from gpbnb.ledger.statements import Entry, load_inventory, select
 
 TOPICS = (
-    "gpbnb.rounding.checks",
-    "gpbnb.inversion.checks",
-    "gpbnb.kalman.checks",
-    "gpbnb.rolling.checks",
-    "gpbnb.integration.checks",
-    "gpbnb.budget.checks",
-    "gpbnb.geometry.checks",
+    "gpbnb.ledger.checks.rounding",
+    "gpbnb.ledger.checks.inversion",
+    "gpbnb.ledger.checks.kalman",
+    "gpbnb.ledger.checks.rolling",
+    "gpbnb.ledger.checks.integration",
+    "gpbnb.ledger.checks.budget",
+    "gpbnb.ledger.checks.geometry",
 )
 """The modules that hold checks, each as ``CHECKS``; imported when checks are run."""
 

@@ -9,11 +9,11 @@ from html import escape
 from importlib import import_module
 from itertools import groupby
 
-from gpbnb.findings import Verdict
+from gpbnb.display.tables import POWER, Table, one_line
 from gpbnb.ledger.checking import TOPICS, Row, counts, examine, in_reading_order, load_checks
-from gpbnb.ledger.inventory import Entry, load_inventory
+from gpbnb.ledger.finding import Verdict
 from gpbnb.ledger.render import OUTCOMES, describe, section_name
-from gpbnb.tables import POWER, Table, one_line
+from gpbnb.ledger.statements import Entry, load_inventory
 
 CHAPTERS = {
     "rounding": "Rounding bounds",
@@ -55,7 +55,7 @@ class Html:
 
 def topics() -> dict[str, str]:
     """Name the topic that checks each entry, as in ``{"hung1984.II.eq20": "rounding"}``."""
-    return {key: topic.split(".")[-2] for topic in TOPICS for key in import_module(topic).CHECKS}
+    return {key: topic.split(".")[-1] for topic in TOPICS for key in import_module(topic).CHECKS}
 
 
 def of_topic(rows: Iterable[Row], topic: str, *verdicts: str) -> tuple[Row, ...]:

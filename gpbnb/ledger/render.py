@@ -7,9 +7,9 @@ import io
 import json
 from collections.abc import Iterable
 
+from gpbnb.display.tables import Table, one_line
 from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order, summary
-from gpbnb.ledger.inventory import Entry
-from gpbnb.tables import Table, one_line
+from gpbnb.ledger.statements import Entry
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
 _AGREES = {True: "true", False: "false", None: ""}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, held
+from gpbnb.display.derivation import Derivation, Step, held
 
 T = sp.Symbol("T", positive=True)
 TIME, THETA = sp.symbols("t theta", real=True)

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from scipy import signal
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb._kernels.carriers import LARGEST_PRECISION, Compiled
-from gpbnb._kernels.scalar import add, load, multiply, store, subtract
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
+from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
 from gpbnb.rolling.flicker import flicker, record
@@ -613,15 +613,15 @@ def recursion(
     marks = np.asarray(steps, dtype=np.int64)
     if marks.ndim != 1 or not len(marks) or marks[0] < 0 or np.any(np.diff(marks) <= 0):
         raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
-    carrier = fmt.carrier
-    if not isinstance(carrier, Compiled):
+    backend = fmt.backend
+    if not isinstance(backend, Compiled):
         raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer")
     angle = fmt.array(list(_exact_turn(1, period, interval)))
     start = fmt.array([1, 0])
-    step, state = (carrier.pack(a._parts) for a in (angle, start))
+    step, state = (backend.pack(a.components) for a in (angle, start))
     out = np.empty((len(marks), *step.shape), dtype=step.dtype)
-    _rotate(carrier.tag, step, state, marks, out)
-    values = FloatArray._wrap(carrier, carrier.unpack(out), fmt).to_fractions()
+    _rotate(backend.tag, step, state, marks, out)
+    values = FloatArray.from_components(backend, backend.unpack(out), fmt).to_fractions()
     bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
     return _compared(fmt, period, interval, "recursion", marks, values, bounds)
 

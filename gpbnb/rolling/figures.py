@@ -9,11 +9,11 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 
+from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, colours, label, legend, loglog
+from gpbnb.display.tables import digits
 from gpbnb.measurement import YEAR
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, colours, label, legend, loglog
 from gpbnb.rolling import theory
 from gpbnb.rolling.experiment import DriftStudy, FilterStudy, Rotation, Slope, Spectra, Spectrum
-from gpbnb.tables import digits
 
 DENSITY = "density (mas²/Hz)"
 Drawn = Artist | ErrorbarContainer

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.display.tables import Table, arithmetic
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import experiment, theory
-from gpbnb.tables import Table, arithmetic
 
 
 def registers(period: float, formats: Sequence[FloatFormat]) -> Table:

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, special
 
-from gpbnb.bounds import gamma
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.bounds import gamma
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.measurement import YEAR
 
 DRIFTS = (6600.0, 40.0)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from gpbnb.derivation import Derivation, Step, errors, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, errors, first_order, held, over, together
 
 BETA = sp.Symbol("beta", positive=True)
 N, M, J, K = sp.symbols("n m j k", integer=True, positive=True)

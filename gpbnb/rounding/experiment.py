@@ -15,9 +15,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import column_sum_norm, integers
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounds import column_sum_norm, integers
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rounding import theory
 
 Bounds = Mapping[str, Callable[[], Fraction]]

@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.bounds import column_sum_norm
-from gpbnb.formats import Rounding
-from gpbnb.plotting import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
+from gpbnb.arithmetic.bounds import column_sum_norm
+from gpbnb.arithmetic.formats import Rounding
+from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
+from gpbnb.display.tables import digits
 from gpbnb.rounding import theory
 from gpbnb.rounding.experiment import Growth, Sawtooth, Trial
-from gpbnb.tables import digits
 
 
 def sawtooth(result: Sawtooth, ax: Axes) -> list[Artist]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gpbnb.bounds import exact
-from gpbnb.floatarray import FloatArray
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounds import exact
+from gpbnb.display.tables import Table, digits
 from gpbnb.rounding.experiment import Trial
 from gpbnb.rounding.experiment import tally as count
-from gpbnb.tables import Table, digits
 
 
 def tallies(trials: Mapping[str, Sequence[Trial]]) -> Table:

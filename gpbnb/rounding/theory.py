@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.bounds import column_sum_norm, exact, gamma, gamma_probabilistic, integers
+from gpbnb.arithmetic.bounds import column_sum_norm, exact, gamma, gamma_probabilistic, integers
 
 # -- sums: errors in the units of the terms -------------------------------------------------------
 
@@ -86,7 +86,7 @@ def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> f
 
     Raises
     ------
-    ValueError : no term; and as :func:`gpbnb.bounds.gamma_probabilistic`.
+    ValueError : no term; and as :func:`gpbnb.arithmetic.bounds.gamma_probabilistic`.
 
     References
     ----------

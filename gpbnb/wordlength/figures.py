@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.plotting import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, looks
+from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, looks
 from gpbnb.wordlength.examples import STANDARD
 
 #: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).

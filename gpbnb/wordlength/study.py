@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.bounds import exact
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.bounds import exact
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion.bounds import column_sum, rationals, smallest_precision, true_inverse
 from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
 from gpbnb.kalman.model import LinearModel

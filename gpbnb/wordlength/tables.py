@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display.tables import Table, arithmetic, digits, short
 from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.kalman.precision import Requirement
-from gpbnb.tables import Table, arithmetic, digits, short
 from gpbnb.wordlength.examples import ACCELERATORS, NORMAL, STANDARD
 from gpbnb.wordlength.study import Deafness, Inverse, Span
 

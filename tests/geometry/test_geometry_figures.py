@@ -6,7 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from gpbnb import plotting
+from gpbnb.display import style
 from gpbnb.geometry import experiment, figures, tables, theory
 from gpbnb.measurement import ARCSEC, MAS, deroll, spin_in_readout, theta_of
 
@@ -15,7 +15,7 @@ CASE = theory.Case().with_angle("gamma1", 20 * ARCSEC).with_angle("gamma2", 10 *
 
 @pytest.fixture
 def axes():
-    fig, axes = plotting.figure(columns=2)
+    fig, axes = style.figure(columns=2)
     yield axes
     fig.canvas.draw()
     plt.close("all")

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.integration import experiment, theory
 
 FIRST = theory.first_order(1.7, 3.0)

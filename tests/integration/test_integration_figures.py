@@ -10,8 +10,8 @@ import pytest
 from drawn import legend_of
 from matplotlib.patches import Circle, Rectangle
 
-from gpbnb import plotting
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display import style
 from gpbnb.integration import experiment, figures, tables, theory
 
 
@@ -170,7 +170,7 @@ def test_totals(ax, met):
 
 
 def test_design_figures():
-    _, axes = plotting.figure(columns=2)
+    _, axes = style.figure(columns=2)
     durations = {"1 minute": 60.0, "1 hour": 3600.0}
     figures.best_rates(628.0, durations, [16, 24], axes[0])
     assert line(axes[0], "1 hour").get_ydata()[1] == theory.best_rate(628.0, 3600.0, FloatFormat(2, 24))

@@ -9,8 +9,8 @@ import flint
 import numpy as np
 import pytest
 
-from gpbnb import linalg
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import bounds
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

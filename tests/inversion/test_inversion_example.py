@@ -9,9 +9,9 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import linalg
-from gpbnb.bounds import inverse_of
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.bounds import inverse_of
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import example, procedure
 from gpbnb.inversion.example import PLACES, PRINTED, Wordlength
 from gpbnb.inversion.procedure import Reading

@@ -8,8 +8,8 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb import linalg
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import __main__ as command
 from gpbnb.inversion import bounds, experiment, procedure, theory
 from gpbnb.inversion.procedure import Reading

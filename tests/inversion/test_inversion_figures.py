@@ -7,8 +7,8 @@ import pytest
 from drawn import colour, legend_of
 from matplotlib.patches import FancyArrowPatch
 
-from gpbnb import plotting
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.display import style
 from gpbnb.inversion import example, experiment, figures
 from gpbnb.inversion.experiment import Frozen
 
@@ -50,8 +50,8 @@ def test_table1(ax):
         assert sorted(points.get_ydata()) == sorted(v for c in columns for v in c.values)
         assert [float(v) for v in example.PRINTED[name]] == list(printed.get_ydata())
         assert printed.get_markerfacecolor() == "white"
-    assert colour(drawn[0]) == plotting.BOUND
-    assert colour(drawn[2]) == plotting.OBSERVED
+    assert colour(drawn[0]) == style.BOUND
+    assert colour(drawn[2]) == style.OBSERVED
     assert [label.get_text() for label in ax.get_xticklabels()] == ["3", "5", "8"]
     assert ax.get_yscale() == "log"
     assert legend_of(ax) == ["bounds, every reading", "bounds as printed", "errors, every reading", "errors as printed"]
@@ -82,7 +82,7 @@ class TestRatios:
             expected = [np.median([one.ratio(name) for one in trials if one.n == n]) for n in (2, 4)]
             assert list(line.get_ydata()) == expected
         assert list(drawn[-1].get_ydata()) == [1, 1]
-        assert colour(drawn[-1]) == plotting.BOUND
+        assert colour(drawn[-1]) == style.BOUND
         assert ax.get_yscale() == "log"
         assert (ax.get_xlabel(), ax.get_ylabel()) == ("rows $n$", "bound / error (no unit)")
 

@@ -8,8 +8,8 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb import linalg
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import procedure
 from gpbnb.inversion.procedure import FORMS, NORMS, Reading
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.inversion import example, experiment, tables
 from gpbnb.inversion.experiment import Frozen
 

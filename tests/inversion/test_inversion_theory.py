@@ -9,8 +9,8 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb.bounds import column_sum_norm, exact, gamma, row_sum_norm
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.bounds import column_sum_norm, exact, gamma, row_sum_norm
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import theory
 from gpbnb.inversion.theory import Perturbation, Reduction
 

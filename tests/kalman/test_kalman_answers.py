@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpbnb import plotting
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display import style
 from gpbnb.kalman import answers, figures, theory, year
 
 
@@ -82,7 +82,7 @@ def test_only_the_usual_model_counts():
 
 
 def test_the_picture_shows_each_answer_on_the_goal():
-    _, axes = plotting.figure()
+    _, axes = style.figure()
     found = answers.find()
     figures.digits_needed(found, axes[0])
     shown = {line.get_label(): line for line in axes[0].lines}
@@ -95,7 +95,7 @@ def test_the_picture_shows_each_answer_on_the_goal():
 
 
 def test_the_headline_says_beside_each_mark_what_it_is():
-    _, axes = plotting.figure()
+    _, axes = style.figure()
     ax, found = axes[0], answers.find()
     figures.headline(found, ax)
     words = {text.get_text(): text.xy for text in ax.texts}

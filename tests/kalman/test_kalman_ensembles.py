@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles
 from gpbnb.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
 from gpbnb.kalman.experiment import Form, bounded, emulate

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from drawn import colour, legend_of
 
-from gpbnb import plotting
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display import style
 from gpbnb.kalman import ensembles, figures, smallest, theory, year
 from gpbnb.kalman.answers import decimal_digits
 from gpbnb.kalman.experiment import Form, bounded
@@ -67,7 +67,7 @@ def test_lines_and_levels(ax):
     curves = [("a", [1, 2], [3, 4]), ("b", [1, 2], [5, 6]), ("c", [1, 2], [7, 8])]
     artists = figures.lines(curves, ax)
     assert [(a.get_label(), list(a.get_ydata())) for a in artists] == [(name, y) for name, _, y in curves]
-    assert [colour(a) for a in artists] == [plotting.BOUND, plotting.BOUND, plotting.STRICT]
+    assert [colour(a) for a in artists] == [style.BOUND, style.BOUND, style.STRICT]
     assert artists[0].get_linestyle() != artists[1].get_linestyle()
     assert list(figures.level("d", 9.0, ax).get_ydata()) == [9, 9]
 
@@ -82,8 +82,8 @@ def test_year_end(ax, runs):
     assert np.allclose(rounded.get_xdata(), [decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)
     assert list(rounded.get_ydata()) == ends[:2]
     assert list(chopped.get_ydata()) == ends[2:]
-    assert colour(rounded) == plotting.OBSERVED != colour(chopped)
-    assert colour(line) == plotting.BOUND
+    assert colour(rounded) == style.OBSERVED != colour(chopped)
+    assert colour(line) == style.BOUND
     crossing = float(np.interp(0, -np.log10(line.get_ydata()), line.get_xdata()))
     assert int(np.ceil(crossing)) == theory.required_precision(sum(counts[0][1]))
     assert list(goal.get_ydata()) == [1, 1]
@@ -104,7 +104,7 @@ def test_contraction(ax):
     assert list(points.get_ydata()) == [e for e in error if e > 0]
     assert np.array_equal(line.get_ydata(), found.state[:, 0])
     assert points.get_linestyle() == "None"
-    assert (colour(points), colour(line)) == (plotting.OBSERVED, plotting.BOUND)
+    assert (colour(points), colour(line)) == (style.OBSERVED, style.BOUND)
     assert ax.get_ylabel() == "error of x (m)"
 
 

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.model import STATES, YEAR, LinearModel, factor, gravity_probe_b
 
 GOOD = {

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import precision
 from gpbnb.kalman.experiment import Form, Simulation, bounded, emulate, log_spaced, reference
 from gpbnb.kalman.model import LinearModel

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles, printed, smallest, tables, theory, year
 from gpbnb.kalman.experiment import Form
 from gpbnb.kalman.model import gravity_probe_b

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from gpbnb.bounds import exact
-from gpbnb.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.bounds import exact
+from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
 from gpbnb.kalman import derivation, smallest, theory
 
 UNIT = 2.0**-102

@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import answers, theory, year
 from gpbnb.kalman.experiment import TRUTH, Followed, Form, emulate, reference
 from gpbnb.kalman.model import YEAR

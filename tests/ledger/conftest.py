@@ -14,7 +14,9 @@ def topic(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
 
     def make(name, body):
-        source = "from gpbnb.findings import Checks, Verdict, answer, compare, unverifiable\n\nCHECKS = Checks()\n\n"
+        source = (
+            "from gpbnb.ledger.finding import Checks, Verdict, answer, compare, unverifiable\n\nCHECKS = Checks()\n\n"
+        )
         (tmp_path / f"{name}.py").write_text(source + textwrap.dedent(body), encoding="utf-8")
         return name
 

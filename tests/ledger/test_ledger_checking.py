@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from gpbnb.findings import Verdict, compare
 from gpbnb.ledger import TOPICS, Row, counts, load_inventory, rows, summary
 from gpbnb.ledger.checking import Place, in_reading_order, load_checks
-from gpbnb.ledger.inventory import Entry
+from gpbnb.ledger.finding import Verdict, compare
+from gpbnb.ledger.statements import Entry
 
 INVENTORY = load_inventory()
 

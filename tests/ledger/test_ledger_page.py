@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from gpbnb import ledger
-from gpbnb.findings import Finding, Verdict, answer, compare, unverifiable
 from gpbnb.ledger import Row, load_inventory, page
-from gpbnb.ledger.inventory import DOCUMENTS, Entry
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.statements import DOCUMENTS, Entry
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FINDINGS = (

@@ -10,10 +10,10 @@ import pytest
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-from gpbnb.findings import Verdict, answer, compare, unverifiable
 from gpbnb.ledger import Row, load_inventory, summary_table, table
-from gpbnb.ledger.inventory import Entry
+from gpbnb.ledger.finding import Verdict, answer, compare, unverifiable
 from gpbnb.ledger.render import to_csv, to_json, to_markdown, to_text
+from gpbnb.ledger.statements import Entry
 
 ENTRY = Entry("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
 FINDINGS = {

@@ -12,9 +12,9 @@ import pytest
 import sympy as sp
 from mpmath import mp
 
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.calculators import forms
 from gpbnb.calculators.page import show
-from gpbnb.formats import FloatFormat, Rounding
 
 from . import browser as tools
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gpbnb.formats import FloatFormat
-from gpbnb.rolling import checks, experiment, theory
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.ledger.checks import experiment, theory
+from gpbnb.ledger.checks import rolling as checks
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
 
 

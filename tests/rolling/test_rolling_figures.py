@@ -9,9 +9,10 @@ import pytest
 from drawn import colour
 from matplotlib.container import ErrorbarContainer
 
-from gpbnb import plotting
-from gpbnb.formats import FloatFormat
-from gpbnb.rolling import checks, experiment, figures, theory
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.display import style
+from gpbnb.ledger.checks import experiment, figures, theory
+from gpbnb.ledger.checks import rolling as checks
 
 
 @pytest.fixture
@@ -27,7 +28,7 @@ def xy(artist):
 
 
 def theory_lines(artists):
-    return [a for a in artists if not isinstance(a, ErrorbarContainer) and colour(a) == plotting.BOUND]
+    return [a for a in artists if not isinstance(a, ErrorbarContainer) and colour(a) == style.BOUND]
 
 
 def test_density_and_residual(ax):

@@ -10,7 +10,7 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rolling import experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rolling import experiment, tables, theory
 
 

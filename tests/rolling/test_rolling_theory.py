@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import integrate, signal, special
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rolling import derivation, theory
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
 

@@ -8,7 +8,7 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.derivation import first_order
+from gpbnb.display.derivation import first_order
 from gpbnb.rounding import derivation, theory
 
 DERIVATIONS = steps.collected(

@@ -10,9 +10,9 @@ import oracles
 import pytest
 import sympy as sp
 
-from gpbnb.bounds import column_sum_norm
-from gpbnb.floatarray import FloatArray
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounds import column_sum_norm
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rounding import derivation, experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

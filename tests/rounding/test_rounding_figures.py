@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from drawn import colour, legend_of
 
-from gpbnb import plotting
-from gpbnb.bounds import column_sum_norm
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.bounds import column_sum_norm
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display import style
 from gpbnb.rounding import experiment, figures, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -30,10 +30,10 @@ def test_sawtooth(ax, rule):
     assert np.array_equal(points.get_xdata(), result.x)
     assert np.array_equal(points.get_ydata(), result.error)
     assert points.get_linestyle() == "None"
-    assert colour(points) == plotting.OBSERVED
+    assert colour(points) == style.OBSERVED
     beta = float(result.fmt.unit_roundoff)
     assert list(line.get_ydata()) == [beta, beta]
-    assert colour(line) == plotting.BOUND
+    assert colour(line) == style.BOUND
     assert ax.get_xscale() == "log"
     assert ax.get_ylim()[0] == 0
     assert max(result.error.max(), beta) < ax.get_ylim()[1]
@@ -58,7 +58,7 @@ def test_worst_ratios(ax):
         assert line.get_marker() not in ("", "None")
     assert len({colour(line) for line in lines}) == 2
     assert list(bound.get_ydata()) == [1, 1]
-    assert colour(bound) == plotting.BOUND
+    assert colour(bound) == style.BOUND
     assert legend_of(ax) == ["1 decimal digit", "4 bits", "bound"]
     check_names(ax, "factors $n$", "worst error / bound (20)")
 
@@ -113,7 +113,7 @@ def test_pessimism(ax):
         np.median([trial.ratio("strict") for trial in trials]) for _, trials in groups
     ]
     assert [label.get_text() for label in ax.get_xticklabels()] == ["3", "8"]
-    assert any(colour(line) == plotting.BOUND and list(line.get_ydata()) == [1, 1] for line in ax.lines)
+    assert any(colour(line) == style.BOUND and list(line.get_ydata()) == [1, 1] for line in ax.lines)
     assert ax.get_yscale() == "log"
     check_names(ax, "products $n$", "error / the strict bound")
 

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.rounding import experiment, tables
 
 TWO = FloatFormat(10, 2)

@@ -11,8 +11,8 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb.bounds import column_sum_norm, gamma
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.bounds import column_sum_norm, gamma
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rounding import theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

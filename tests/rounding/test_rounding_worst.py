@@ -10,7 +10,7 @@ from functools import cache
 import oracles
 import pytest
 
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rounding import experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

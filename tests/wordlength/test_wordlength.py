@@ -11,8 +11,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import plotting
-from gpbnb.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.display import style
 from gpbnb.integration.theory import needed_precision
 from gpbnb.inversion.bounds import smallest_precision
 from gpbnb.kalman import year
@@ -473,7 +473,7 @@ def test_growth(ax):
     points, line, *rest = figures.growth({"run": [(10, 9), (1000, 24)]}, {"bound": [(10, 20), (1000, 60)]}, ax)
     assert points.get_xydata().tolist() == [[10, 9], [1000, 24]]
     assert line.get_xydata().tolist() == [[10, 20], [1000, 60]]
-    assert line.get_color() == plotting.BOUND
+    assert line.get_color() == style.BOUND
     assert [text.get_text() for text in rest[1::2]] == ["binary16", "binary32", "binary64"]
     assert ax.get_xscale() == "log"
 

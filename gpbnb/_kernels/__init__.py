@@ -1,1 +1,0 @@
-"""Loops behind the arrays, one module a carrier."""

@@ -1,0 +1,1 @@
+"""Loops behind the arrays, one module a backend."""

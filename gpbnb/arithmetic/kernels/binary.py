@@ -1,0 +1,136 @@
+"""Base 2 with 1 to 53 digits, and base 16 with 1 to 13, on float64.
+
+Conditions are joined by & and |, which do not branch: no branch on a rounding can be foretold.
+
+The float64 result p of an operation and the sign of what it lacks of the exact one say where the exact result lies
+between two neighbouring float64. Seen as integers, float64 of one sign are evenly spaced, over powers of two too:
+stepping down from p when the exact magnitude is less than that of p gives the exact result chopped to 53 bits.
+Midpoints between numbers of fewer bits are float64, so adding half a unit and clearing the dropped bits rounds it
+rightly to nearest, half away from zero.
+
+A result below 2**-960, whose residual might be lost, or from 2**1023 on becomes NaN, and stays so.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
+from gpbnb.arithmetic.kernels.tags import Binary, Hexadecimal
+
+_SIGN = np.int64(-(2**63))
+_MAGNITUDE = np.int64(2**63 - 1)
+_EXPONENT = np.int64(0x7FF << 52)
+_LEAST = np.int64((1023 - 960) << 52)
+_LIMIT = np.int64((1023 + 1023) << 52)
+_HALF_ULP = np.int64(53 << 52)
+LEAST, LIMIT = 2.0**-960, 2.0**1023
+
+EXACT_PRODUCT = 26  # digits up to which a product has at most 53
+SAFE_TWICE = 25  # digits up to which rounding a float64 result, itself rounded to nearest, goes right
+
+
+def _clear_binary(fmt: Any, u: Any) -> Any:
+    unit = np.int64(1) << (53 - fmt.precision)
+    half = unit >> 1 if fmt.nearest else np.int64(0)
+    return (u + half) & -unit
+
+
+def _clear_hexadecimal(fmt: Any, u: Any) -> Any:
+    # The first digit of 2**e * 1.f has 1 + e mod 4 bits.
+    unit = np.int64(1) << (56 - 4 * fmt.precision - (((u >> 52) + 1) & 3))
+    half = unit >> 1 if fmt.nearest else np.int64(0)
+    return (u + half) & -unit
+
+
+def operations(clear: Any, ties: bool) -> dict[str, Any]:
+    """The scalar operations on float64 for one way to clear the dropped bits.
+
+    Parameters
+    ----------
+    clear : rounds the integer view of a magnitude, already chopped to 53 bits, to the digits of a format.
+    ties : whether the format may have 53 bits, where nothing is cleared but float64 rounds ties to even.
+    """
+    clear = njit(forceinline=True)(clear)
+
+    @njit(forceinline=True)
+    def fit(fmt: Any, p: Any, shift: Any, exact_zero: Any) -> Any:
+        u = bits(p)
+        v = clear(fmt, (u & _MAGNITUDE) + shift)
+        held = ((v >= _LEAST) & (v < _LIMIT)) | (exact_zero & (v == 0))
+        return from_bits(v | (u & _SIGN)) if held else np.nan
+
+    @njit(forceinline=True)
+    def direction(fmt: Any, p: Any, r: Any) -> Any:
+        """From p, the nearest float64 to the exact p + r, to that with the further digits dropped (or the tie up)."""
+        if ties and fmt.precision == 53 and fmt.nearest:
+            half = from_bits((bits(p) & _EXPONENT) - _HALF_ULP)
+            return np.int64(r == (half if p > 0 else -half))
+        return -np.int64(((r < 0) & (p > 0)) | ((r > 0) & (p < 0)))
+
+    def total(fmt: Any, a: Any, b: Any) -> Any:
+        s = a + b
+        if ties and fmt.nearest and fmt.precision <= SAFE_TWICE:
+            return fit(fmt, s, np.int64(0), True)
+        c = s - a
+        r = (a - (s - c)) + (b - c)
+        return fit(fmt, s, direction(fmt, s, r), True)
+
+    add = njit(forceinline=True)(total)
+
+    @njit(forceinline=True)
+    def subtract(fmt: Any, a: Any, b: Any) -> Any:
+        return add(fmt, a, 0.0 - b)
+
+    @njit(forceinline=True)
+    def multiply(fmt: Any, a: Any, b: Any) -> Any:
+        p = a * b + 0.0  # no negative zero
+        zero = (a == 0.0) | (b == 0.0)
+        if ties and fmt.precision <= EXACT_PRODUCT:
+            return fit(fmt, p, np.int64(0), zero)
+        return fit(fmt, p, direction(fmt, p, fma(a, b, -p)), zero)
+
+    @njit(error_model="numpy", forceinline=True)
+    def divide(fmt: Any, a: Any, b: Any) -> Any:
+        if b == 0.0:
+            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+        q = a / b + 0.0
+        if ties and fmt.precision <= SAFE_TWICE:
+            return fit(fmt, q, np.int64(0), a == 0.0)
+        r = fma(-q, b, a)
+        if b < 0.0:
+            r = 0.0 - r
+        # A quotient of 53-bit numbers is never halfway between two: no tie to mend.
+        down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, q, r)
+        return fit(fmt, q, down, a == 0.0)
+
+    @njit(forceinline=True)
+    def sqrt(fmt: Any, a: Any) -> Any:
+        if a < 0.0:
+            raise ValueError("got the square root of a negative number; needed x >= 0")
+        s = math.sqrt(a)
+        if ties and fmt.precision <= SAFE_TWICE:
+            return fit(fmt, s, np.int64(0), a == 0.0)
+        # Nor is a root.
+        down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, s, fma(-s, s, a))
+        return fit(fmt, s, down, a == 0.0)
+
+    @njit(forceinline=True)
+    def round_(fmt: Any, x: Any) -> Any:
+        return fit(fmt, x + 0.0, np.int64(0), x == 0.0)
+
+    return {
+        "add": add,
+        "subtract": subtract,
+        "multiply": multiply,
+        "divide": divide,
+        "sqrt": sqrt,
+        "round_": round_,
+    }
+
+
+OPERATIONS = {Binary: operations(_clear_binary, True), Hexadecimal: operations(_clear_hexadecimal, False)}

@@ -1,0 +1,301 @@
+"""Base 10 with 1 to 18 digits, on pairs of int64.
+
+A number is ``(m, e)`` and means ``m * 10**e``; zero is ``(0, 0)``, any other has ``10**(t-1) <= abs(m) < 10**t``.
+Magnitudes are uint64, in which 10**19 fits; only products, and dividends of 10 to 18 digits, need 128 bits. Up to 8
+digits :mod:`gpbnb.arithmetic.kernels.shortdecimal` does the same faster.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
+
+NARROW = 9  # digits up to which the dividend fits into 64 bits
+LARGEST_EXPONENT = 2**60
+
+_U0, _U1 = np.uint64(0), np.uint64(1)
+_U5, _U10, _U50, _U100 = np.uint64(5), np.uint64(10), np.uint64(50), np.uint64(100)
+_LOW = np.uint64(2**32 - 1)
+_TWO_64 = 2.0**64
+
+POWER = np.array([10**k for k in range(20)], np.uint64)
+HALF = POWER // np.uint64(2)
+
+# n // d for n < 2**61 and d = 10**k, k > 0, is the high half of n * INVERSE[k], shifted right by LENGTH[k]: with
+# l = floor(log2 d) and c = ceil(2**(63 + l) / d), c * d exceeds 2**(63 + l) by less than d < 2**(l + 1), and that times
+# n is less than 2**(63 + l); INVERSE[k] = 2c is less than 2**64.
+_LENGTHS = [(10**k).bit_length() - 1 for k in range(19)]
+LENGTH = np.array(_LENGTHS, np.uint64)
+INVERSE = np.array([0] + [-2 * ((-1 << (63 + n)) // 10**k) for k, n in enumerate(_LENGTHS) if k > 0], np.uint64)
+
+# Divisors with their first bit set, and their reciprocals, for quotients of 128 by 64 bits.
+_SHIFT = np.array([63 - n for n in _LENGTHS], np.int64)
+_NORMAL = np.array([10**k << (63 - n) for k, n in enumerate(_LENGTHS)], np.uint64)
+_RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in enumerate(_LENGTHS)], np.uint64)
+
+
+@njit(forceinline=True)
+def _power(k: Any) -> Any:
+    """10**k; an unsigned index spares the question whether it counts from the end."""
+    return POWER[np.uint64(k)]
+
+
+@njit(forceinline=True)
+def _quotient(n: Any, k: Any) -> Any:
+    """``n // 10**k`` for n < 2**61, k > 0."""
+    return high_product(n, INVERSE[np.uint64(k)]) >> LENGTH[np.uint64(k)]
+
+
+@njit(forceinline=True)
+def _wide_by_power(high: Any, low: Any, k: Any) -> Any:
+    """Quotient and remainder by 10**k of a 128-bit number, for a quotient that fits into 64 bits.
+
+    Moeller and Granlund, Improved division by invariant integers (2011), algorithm 4.
+    """
+    index = np.uint64(k)
+    s = _SHIFT[index]
+    d = _NORMAL[index]
+    u1 = (high << s) | (low >> (64 - s))
+    u0 = low << s
+    v = _RECIPROCAL[index]
+    q1, q0 = high_product(v, u1), v * u1
+    q0 += u0
+    q1 += u1 + _U1 + (_U1 if q0 < u0 else _U0)
+    r = u0 - q1 * d
+    if r > q0:
+        q1 -= _U1
+        r += d
+    if r >= d:
+        q1 += _U1
+        r -= d
+    return q1, r >> s
+
+
+@njit
+def _wide_by_any(high: Any, low: Any, d: Any) -> Any:
+    """Quotient and remainder of a 128-bit number by d < 2**63, for a quotient that fits into 64 bits.
+
+    Knuth, The art of computer programming 2, 4.3.1, algorithm D, in digits of 32 bits.
+    """
+    s = leading_zeros(d)
+    d <<= s
+    d1, d0 = d >> np.int64(32), d & _LOW
+    r = (high << s) | ((low >> _U1) >> (63 - s))
+    low = low << s
+    q = _U0
+    for part in (low >> np.int64(32), low & _LOW):
+        digit = r // d1
+        rest = r - digit * d1
+        while digit > _LOW or digit * d0 > ((rest << np.int64(32)) | part):
+            digit -= _U1
+            rest += d1
+            if rest > _LOW:
+                break
+        r = ((r << np.int64(32)) | part) - digit * d
+        q = (q << np.int64(32)) | digit
+    return q, r >> s
+
+
+@njit(forceinline=True)
+def _digits(n: Any) -> Any:
+    """Number of decimal digits of n > 0; one for zero."""
+    count = ((64 - leading_zeros(n | _U1)) * 1233) >> 12  # that number or one less
+    return count + np.int64(n >= _power(count))
+
+
+@njit(forceinline=True)
+def check(e: Any) -> None:
+    """OverflowError for an exponent that the next operations could not compute with."""
+    if e > LARGEST_EXPONENT or e < -LARGEST_EXPONENT:
+        raise OverflowError(
+            "got a result with an exponent beyond 2**60; needed one that int64 holds; scale the numbers"
+        )
+
+
+@njit(forceinline=True)
+def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
+    """The pair of a magnitude of t digits, or one that rounding carried to t + 1."""
+    carried = m == _power(fmt.precision)
+    m = _power(fmt.precision - 1) if carried else m
+    e += np.int64(carried)
+    check(e)
+    return (-np.int64(m) if negative else np.int64(m)), e
+
+
+@njit(forceinline=True)
+def _filled(fmt: Any, n: Any, e: Any, negative: Any) -> Any:
+    """The pair of an exact n of less than t digits."""
+    if n == _U0:
+        return np.int64(0), np.int64(0)
+    k = fmt.precision - _digits(n)
+    return _number(fmt, n * _power(k), e - k, negative)
+
+
+@njit(forceinline=True)
+def add(fmt: Any, a: Any, b: Any) -> Any:
+    m1, e1 = a
+    m2, e2 = b
+    if m1 == 0:
+        return b
+    if m2 == 0:
+        return a
+    if e1 < e2:
+        m1, e1, m2, e2 = m2, e2, m1, e1
+    t = fmt.precision
+    d = e1 - e2
+    x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
+    negative = m1 < 0
+    same = negative == (m2 < 0)
+    beyond_half: Any = False  # of what lies below the last digit of n
+    if d <= 1:
+        x *= _power(d)
+        e = e2
+        if same:
+            n = x + y
+        elif x >= y:
+            n = x - y
+        else:
+            n = y - x
+            negative = not negative
+        if n < _power(t - 1):
+            return _filled(fmt, n, e, negative)
+    else:
+        # One more digit of the larger number, and the smaller one cut off there: its rest only decides the
+        # direction, and the sum has t digits at least.
+        k = d - 1
+        e = e1 - 1
+        if k > t:
+            whole, rest, unit = _U0, _U1, _U10
+        else:
+            whole, unit = _quotient(y, k), _power(k)
+            rest = y - whole * unit
+        if same:
+            n = x * _U10 + whole
+            beyond_half = rest + rest >= unit
+        else:
+            n = x * _U10 - whole
+            if rest != _U0:
+                n -= _U1
+                beyond_half = rest + rest <= unit
+    if n >= _power(t + 1):
+        m = n // _U100
+        up: Any = n - m * _U100 >= _U50
+        e += 2
+    elif n >= _power(t):
+        m = n // _U10
+        up = n - m * _U10 >= _U5
+        e += 1
+    else:
+        m = n
+        up = beyond_half
+    m += np.uint64(up & fmt.nearest)
+    return _number(fmt, m, e, negative)
+
+
+@njit(forceinline=True)
+def subtract(fmt: Any, a: Any, b: Any) -> Any:
+    return add(fmt, a, (-b[0], b[1]))
+
+
+@njit(forceinline=True)
+def multiply(fmt: Any, a: Any, b: Any) -> Any:
+    m1, e1 = a
+    m2, e2 = b
+    if m1 == 0 or m2 == 0:
+        return np.int64(0), np.int64(0)
+    t = fmt.precision
+    k = t - 1
+    x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
+    m, rest = _wide_by_power(high_product(x, y), x * y, k)
+    up = rest + rest >= _power(k)
+    if m >= _power(t):
+        n = m
+        m = n // _U10
+        up = n - m * _U10 >= _U5
+        k = t
+    m += np.uint64(up & fmt.nearest)
+    return _number(fmt, m, e1 + e2 + k, (m1 < 0) != (m2 < 0))
+
+
+@njit
+def divide(fmt: Any, a: Any, b: Any) -> Any:
+    m1, e1 = a
+    m2, e2 = b
+    if m2 == 0:
+        raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+    if m1 == 0:
+        return np.int64(0), np.int64(0)
+    t = fmt.precision
+    x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
+    k = t - 1 if x >= y else t
+    if t <= NARROW:
+        n = x * _power(k)
+        m = n // y
+        rest = n - m * y
+    else:
+        m, rest = _wide_by_any(high_product(x, _power(k)), x * _power(k), y)
+    m += np.uint64(fmt.nearest & (rest + rest >= y))
+    return _number(fmt, m, e1 - e2 - k, (m1 < 0) != (m2 < 0))
+
+
+@njit
+def sqrt(fmt: Any, a: Any) -> Any:
+    m, e = a
+    if m < 0:
+        raise ValueError("got the square root of a negative number; needed x >= 0")
+    if m == 0:
+        return np.int64(0), np.int64(0)
+    # With 2t - 1 or 2t digits and an even exponent, the root has exactly t digits.
+    k = fmt.precision - ((e - fmt.precision) & 1)
+    x = np.uint64(m)
+    high, low = high_product(x, _power(k)), x * _power(k)
+    s = np.uint64(math.sqrt(np.float64(high) * _TWO_64 + np.float64(low)))
+    # One step of Newton's; the remainder then fits into 63 bits, and the root is one or two off at most.
+    square = s * s
+    upper = np.int64(high - high_product(s, s) - (_U1 if low < square else _U0))
+    remainder = np.float64(upper) * _TWO_64 + np.float64(low - square)
+    root = np.int64(s) + np.int64(remainder / (2.0 * np.float64(s)))
+    rest = np.int64(low - np.uint64(root) * np.uint64(root))
+    while rest < 0:
+        root -= 1
+        rest += 2 * root + 1
+    while rest > 2 * root:
+        rest -= 2 * root + 1
+        root += 1
+    # Never a tie, never a carry: as in the exact kernel.
+    if fmt.nearest and rest > root:
+        root += 1
+    return _number(fmt, np.uint64(root), (e - k) // 2, False)
+
+
+@njit
+def round_(fmt: Any, x: Any) -> Any:
+    """Round ``m * 10**e``, m any int64 but the least."""
+    m, e = x
+    if m == 0:
+        return np.int64(0), np.int64(0)
+    n = np.uint64(abs(m))
+    drop = _digits(n) - fmt.precision
+    if drop <= 0:
+        return _number(fmt, n * _power(-drop), e + drop, m < 0)
+    unit = _power(drop)
+    q = n // unit
+    rest = n - q * unit
+    if fmt.nearest and rest + rest >= unit:
+        q += _U1
+    return _number(fmt, q, e + drop, m < 0)
+
+
+@njit
+def compare(fmt: Any, a: Any, b: Any) -> Any:
+    m1, e1 = a
+    m2, e2 = b
+    if e1 == e2 or m1 == 0 or m2 == 0 or (m1 < 0) != (m2 < 0):
+        return (m1 > m2) - (m1 < m2)
+    # One sign, and the larger exponent is the larger magnitude.
+    return 1 if (e1 > e2) == (m1 > 0) else -1

@@ -1,0 +1,103 @@
+"""The reference arithmetic: sums of two float64, 106 bits, relative error of one operation below 2**-102.
+
+A number is ``(high, low)`` with high = fl(high + low). Algorithms and bounds, u = 2**-53: Joldes, Muller and Popescu,
+Tight and rigorous error bounds for basic building blocks of double-word arithmetic, ACM TOMS 44 (2017): sums 3 u**2,
+products 4 u**2, quotients 15 u**2; roots, Lefevre et al., ACM TOMS 49 (2023): 25/8 u**2.
+
+A result below 2**-850, which may be less accurate, or from 2**1000 on becomes NaN, and stays so.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gpbnb.arithmetic.kernels.bits import fma
+
+LEAST, LIMIT = 2.0**-850, 2.0**1000
+
+
+@njit(forceinline=True)
+def _two_sum(a: Any, b: Any) -> Any:
+    s = a + b
+    c = s - a
+    return s, (a - (s - c)) + (b - c)
+
+
+@njit(forceinline=True)
+def _fast_two_sum(a: Any, b: Any) -> Any:
+    s = a + b
+    return s, b - (s - a)
+
+
+@njit(forceinline=True)
+def _held(high: Any, low: Any, exact_zero: Any) -> Any:
+    size = abs(high)
+    if ((size >= LEAST) & (size < LIMIT)) | (exact_zero & (size == 0.0)):
+        return high + 0.0, low + 0.0
+    return np.nan, np.nan
+
+
+@njit(forceinline=True)
+def add(fmt: Any, a: Any, b: Any) -> Any:
+    s, e = _two_sum(a[0], b[0])
+    t, f = _two_sum(a[1], b[1])
+    s, e = _fast_two_sum(s, e + t)
+    s, e = _fast_two_sum(s, e + f)
+    return _held(s, e, True)
+
+
+@njit(forceinline=True)
+def subtract(fmt: Any, a: Any, b: Any) -> Any:
+    return add(fmt, a, (-b[0], -b[1]))
+
+
+@njit(forceinline=True)
+def multiply(fmt: Any, a: Any, b: Any) -> Any:
+    p = a[0] * b[0]
+    e = fma(a[0], b[0], -p)
+    e += fma(a[0], b[1], fma(a[1], b[0], a[1] * b[1]))
+    p, e = _fast_two_sum(p, e)
+    return _held(p, e, (a[0] == 0.0) | (b[0] == 0.0))
+
+
+@njit(error_model="numpy", forceinline=True)
+def divide(fmt: Any, a: Any, b: Any) -> Any:
+    if b[0] == 0.0:
+        raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+    q = a[0] / b[0]
+    p = b[0] * q
+    e = fma(b[0], q, -p)
+    p, e = _fast_two_sum(p, fma(b[1], q, e))
+    q, low = _fast_two_sum(q, ((a[0] - p) + (a[1] - e)) / b[0])
+    return _held(q, low, a[0] == 0.0)
+
+
+@njit(error_model="numpy", forceinline=True)
+def sqrt(fmt: Any, a: Any) -> Any:
+    if a[0] < 0.0:
+        raise ValueError("got the square root of a negative number; needed x >= 0")
+    if a[0] == 0.0:
+        return 0.0, 0.0
+    s = math.sqrt(a[0])
+    s, low = _fast_two_sum(s, (fma(-s, s, a[0]) + a[1]) / (2.0 * s))
+    return _held(s, low, False)
+
+
+@njit(forceinline=True)
+def round_(fmt: Any, x: Any) -> Any:
+    high, low = _two_sum(x[0], x[1])
+    return _held(high, low, x[0] == 0.0 and x[1] == 0.0)
+
+
+@njit(forceinline=True)
+def compare(fmt: Any, a: Any, b: Any) -> Any:
+    if a[0] != a[0] or b[0] != b[0]:
+        raise OverflowError(
+            "got a number beyond the backend's range; needed 2**-850 <= |x| < 2**1000; scale the numbers"
+        )
+    high = (a[0] > b[0]) - (a[0] < b[0])
+    return high if high != 0 else (a[1] > b[1]) - (a[1] < b[1])

@@ -1,0 +1,73 @@
+"""Compiled loops over whole arrays: entry by entry, folds, products of matrices.
+
+Each answers whether a result has left the range of its backend, or raises OverflowError there; its output is then void.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+from gpbnb.arithmetic.kernels import scalar
+from gpbnb.arithmetic.kernels.scalar import compare, load, lost, put
+
+
+def _two(operation: Any) -> Callable[..., bool]:
+    @njit(cache=True, nogil=True)
+    def loop(fmt: Any, n: int, a: Any, b: Any, c: Any) -> Any:
+        gone = False
+        for i in range(n):
+            x = operation(fmt, load(fmt, a, i), load(fmt, b, i))
+            gone |= lost(fmt, x)
+            put(fmt, c, i, x)
+        return gone
+
+    return loop
+
+
+def _one(operation: Any) -> Callable[..., bool]:
+    @njit(cache=True, nogil=True)
+    def loop(fmt: Any, n: int, a: Any, c: Any) -> Any:
+        gone = False
+        for i in range(n):
+            x = operation(fmt, load(fmt, a, i))
+            gone |= lost(fmt, x)
+            put(fmt, c, i, x)
+        return gone
+
+    return loop
+
+
+def _fold(operation: Any) -> Callable[..., bool]:
+    @njit(cache=True, nogil=True)
+    def loop(fmt: Any, n: int, width: int, a: Any, c: Any) -> Any:
+        gone = False
+        for j in range(width):
+            x = load(fmt, a, j)
+            for i in range(1, n):
+                x = operation(fmt, x, load(fmt, a, i * width + j))
+            gone |= lost(fmt, x)
+            put(fmt, c, j, x)
+        return gone
+
+    return loop
+
+
+ENTRIES = {name: _two(getattr(scalar, name)) for name in ("add", "subtract", "multiply", "divide")}
+ENTRIES |= {name: _one(getattr(scalar, name)) for name in ("sqrt", "round_")}
+FOLDS = {name: _fold(getattr(scalar, name)) for name in ("add", "multiply")}
+
+
+@njit(cache=True, nogil=True)
+def compared(fmt: Any, n: int, a: Any, b: Any, c: Any) -> None:
+    """c[i] = -1, 0 or 1 as a[i] is less than, equal to or greater than b[i]."""
+    for i in range(n):
+        c[i] = compare(fmt, load(fmt, a, i), load(fmt, b, i))
+
+
+@njit(cache=True, nogil=True)
+def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """The matrix product c = a b; OverflowError as :func:`gpbnb.arithmetic.kernels.scalar.matmul`."""
+    scalar.matmul(fmt, a, b, c)

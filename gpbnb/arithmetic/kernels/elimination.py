@@ -1,0 +1,82 @@
+"""Compiled Gaussian elimination, in every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar`.
+
+The order of operations, and so each digit, is that of the loops in :mod:`gpbnb.arithmetic.linalg`. Matrices are arrays
+of the tag, worked on in place; OverflowError where a number leaves the range of its backend: the arrays are then void.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+from gpbnb.arithmetic.kernels.scalar import (
+    absolute,
+    add,
+    compare,
+    divide,
+    less,
+    load,
+    multiply,
+    negative,
+    put,
+    store,
+    subtract,
+    zero,
+)
+
+
+@njit(cache=True, nogil=True)
+def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
+    """Factor a (n, n): the upper factor on and above the diagonal, below it the multipliers of the lower.
+
+    `order` (n,) goes with the rows. Returns the column of the first zero pivot, or -1 where there is none.
+    """
+    n = a.shape[0]
+    for k in range(n):
+        if pivot:
+            largest = k
+            for i in range(k + 1, n):
+                if less(fmt, absolute(fmt, load(fmt, a, (largest, k))), absolute(fmt, load(fmt, a, (i, k)))):
+                    largest = i
+            if largest != k:
+                order[k], order[largest] = order[largest], order[k]
+                for j in range(n):
+                    moved = load(fmt, a, (k, j))
+                    put(fmt, a, (k, j), load(fmt, a, (largest, j)))
+                    put(fmt, a, (largest, j), moved)
+        head = load(fmt, a, (k, k))
+        if compare(fmt, head, zero(fmt)) == 0:
+            return k
+        for i in range(k + 1, n):
+            ratio = divide(fmt, load(fmt, a, (i, k)), head)
+            store(fmt, a, (i, k), ratio)
+            m = negative(fmt, ratio)
+            for j in range(k + 1, n):
+                store(fmt, a, (i, j), add(fmt, load(fmt, a, (i, j)), multiply(fmt, m, load(fmt, a, (k, j)))))
+    return -1
+
+
+@njit(cache=True, nogil=True)
+def reduce(fmt: Any, factors: Any, b: Any) -> None:
+    """Reduce the right-hand sides b (n, p), rows in the order of the factors that :func:`lu` made."""
+    n = factors.shape[0]
+    for k in range(n):
+        for i in range(k + 1, n):
+            m = negative(fmt, load(fmt, factors, (i, k)))
+            for j in range(b.shape[1]):
+                store(fmt, b, (i, j), add(fmt, load(fmt, b, (i, j)), multiply(fmt, m, load(fmt, b, (k, j)))))
+
+
+@njit(cache=True, nogil=True)
+def substitute(fmt: Any, factors: Any, b: Any) -> None:
+    """Back substitution: from the reduced right-hand sides b (n, p) to the solutions."""
+    n = factors.shape[0]
+    for k in range(n - 1, -1, -1):
+        for i in range(k + 1, n):
+            upper = load(fmt, factors, (k, i))
+            for j in range(b.shape[1]):
+                store(fmt, b, (k, j), subtract(fmt, load(fmt, b, (k, j)), multiply(fmt, upper, load(fmt, b, (i, j)))))
+        head = load(fmt, factors, (k, k))
+        for j in range(b.shape[1]):
+            store(fmt, b, (k, j), divide(fmt, load(fmt, b, (k, j)), head))

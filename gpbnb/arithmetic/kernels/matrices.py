@@ -1,0 +1,171 @@
+"""Compiled loops over matrices for the topics' recursions, written once for every tag.
+
+They are compiled into the loops that call them. What a step multiplies by zero it leaves out: a product with zero and a
+sum with zero are exact, so no digit changes.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+from gpbnb.arithmetic.kernels.scalar import (
+    add,
+    check,
+    compare,
+    divide,
+    load,
+    multiply,
+    one,
+    put,
+    store,
+    subtract,
+    zero,
+)
+
+
+@njit(nogil=True)
+def is_zero(fmt: Any, x: Any) -> Any:
+    """Whether a number is zero."""
+    return compare(fmt, x, zero(fmt)) == 0
+
+
+@njit(nogil=True)
+def copy(fmt: Any, a: Any, c: Any) -> None:
+    """c = a."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            put(fmt, c, (i, j), load(fmt, a, (i, j)))
+
+
+@njit(nogil=True)
+def transpose(fmt: Any, a: Any, c: Any) -> None:
+    """c = a'; c is not a."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            put(fmt, c, (j, i), load(fmt, a, (i, j)))
+
+
+@njit(nogil=True)
+def total(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a + b."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+
+
+@njit(nogil=True)
+def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a - b."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+
+
+@njit(nogil=True)
+def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a b, each entry summed from left to right, over the entries of a that are not zero; c is neither a nor b."""
+    for i in range(a.shape[0]):
+        fresh = True
+        for k in range(a.shape[1]):
+            factor = load(fmt, a, (i, k))
+            if is_zero(fmt, factor):
+                continue
+            if fresh:
+                for j in range(b.shape[1]):
+                    put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (k, j))))
+                fresh = False
+            else:
+                for j in range(b.shape[1]):
+                    put(fmt, c, (i, j), add(fmt, load(fmt, c, (i, j)), multiply(fmt, factor, load(fmt, b, (k, j)))))
+        if fresh:
+            for j in range(b.shape[1]):
+                put(fmt, c, (i, j), zero(fmt))
+    check(fmt, c)
+
+
+@njit(nogil=True)
+def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """As :func:`product`, with the same digits, over the entries of b that are not zero."""
+    for j in range(b.shape[1]):
+        fresh = True
+        for k in range(a.shape[1]):
+            factor = load(fmt, b, (k, j))
+            if is_zero(fmt, factor):
+                continue
+            if fresh:
+                for i in range(a.shape[0]):
+                    put(fmt, c, (i, j), multiply(fmt, load(fmt, a, (i, k)), factor))
+                fresh = False
+            else:
+                for i in range(a.shape[0]):
+                    put(fmt, c, (i, j), add(fmt, load(fmt, c, (i, j)), multiply(fmt, load(fmt, a, (i, k)), factor)))
+        if fresh:
+            for i in range(a.shape[0]):
+                put(fmt, c, (i, j), zero(fmt))
+    check(fmt, c)
+
+
+@njit(nogil=True)
+def inverse(fmt: Any, a: Any, c: Any) -> Any:
+    """c = the inverse of a, by elimination without exchange of rows, which a covariance does not need; a is used up.
+
+    Returns 1 if all pivots are positive, -1 if one is negative, 0 if one is zero: then c is void.
+    """
+    m = a.shape[0]
+    answer = 1
+    for i in range(m):
+        for j in range(m):
+            put(fmt, c, (i, j), one(fmt) if i == j else zero(fmt))
+    for k in range(m):
+        pivot = load(fmt, a, (k, k))
+        sign = compare(fmt, pivot, zero(fmt))
+        if sign == 0:
+            return 0
+        if sign < 0:
+            answer = -1
+        for i in range(k + 1, m):
+            factor = divide(fmt, load(fmt, a, (i, k)), pivot)
+            for j in range(k + 1, m):
+                store(fmt, a, (i, j), subtract(fmt, load(fmt, a, (i, j)), multiply(fmt, factor, load(fmt, a, (k, j)))))
+            for j in range(m):
+                store(fmt, c, (i, j), subtract(fmt, load(fmt, c, (i, j)), multiply(fmt, factor, load(fmt, c, (k, j)))))
+    for j in range(m):
+        for k in range(m - 1, -1, -1):
+            s = load(fmt, c, (k, j))
+            for i in range(k + 1, m):
+                s = subtract(fmt, s, multiply(fmt, load(fmt, a, (k, i)), load(fmt, c, (i, j))))
+            store(fmt, c, (k, j), divide(fmt, s, load(fmt, a, (k, k))))
+    return answer
+
+
+@njit(nogil=True)
+def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
+    """u = the factors of a covariance a = U D U', D on the diagonal of u and U, with ones there, above; a is used up.
+
+    Returns whether no entry of D came out negative, nor one zero below a column that is not.
+    """
+    n = a.shape[0]
+    fine = True
+    for j in range(n - 1, -1, -1):
+        d = load(fmt, a, (j, j))
+        sign = compare(fmt, d, zero(fmt))
+        if sign < 0:
+            fine = False
+        put(fmt, u, (j, j), d)
+        for i in range(j):
+            put(fmt, u, (j, i), zero(fmt))
+            x = load(fmt, a, (i, j))
+            if sign == 0:
+                if not is_zero(fmt, x):
+                    fine = False
+                put(fmt, u, (i, j), zero(fmt))
+            else:
+                store(fmt, u, (i, j), divide(fmt, x, d))
+        if sign != 0:
+            for i in range(j):
+                for k in range(i + 1):
+                    x = multiply(fmt, load(fmt, u, (k, j)), load(fmt, a, (i, j)))
+                    store(fmt, a, (k, i), subtract(fmt, load(fmt, a, (k, i)), x))
+    return fine

@@ -1,0 +1,396 @@
+"""One set of scalar operations for compiled loops, in every arithmetic.
+
+A loop is written once, with a tag of :mod:`gpbnb.arithmetic.kernels.tags` as its first argument. numba compiles it
+for the type of the tag::
+
+    @njit(cache=True, nogil=True)
+    def decay(fmt, factor, x):
+        f = load(fmt, factor, 0)
+        for k in range(1, len(x)):
+            store(fmt, x, k, multiply(fmt, f, load(fmt, x, k - 1)))
+
+Each operation rounds the exact result once, like :class:`gpbnb.arithmetic.kernels.exact.ExactKernel`, digit for digit;
+``DoubleDouble`` has relative errors below 2**-102. What a backend cannot hold never goes on unseen: in base 10 the
+operation raises OverflowError; a float64 that leaves 2**-960 ... 2**1023 becomes NaN, further operations keep it, and
+``store``, ``compare`` and :func:`matmul` raise OverflowError on it.
+
+Callers hand in numbers of the format only; :mod:`gpbnb.arithmetic.kernels.backends` makes the arrays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+from numba.extending import overload
+
+from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, shortdecimal
+from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal, ShortDecimal
+
+_INLINE = {"forceinline": True}
+_OF_FLOATS = (Binary, Hexadecimal, Double)
+_OF_PAIRS = (Decimal, ShortDecimal)
+_MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, DoubleDouble: doubledouble}
+
+_BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
+
+
+def _tag(fmt: Any) -> Any:
+    """The class of a tag, from its numba type."""
+    return getattr(fmt, "instance_class", None)
+
+
+def _only_compiled(name: str) -> TypeError:
+    return TypeError(f"got a call of {name} from Python; needed one from a function compiled by numba")
+
+
+# -- operations of two numbers and one -------------------------------------------------------------
+
+
+def add(fmt: Any, a: Any, b: Any) -> Any:
+    """fl(a + b)."""
+    raise _only_compiled("add")
+
+
+def subtract(fmt: Any, a: Any, b: Any) -> Any:
+    """fl(a - b)."""
+    raise _only_compiled("subtract")
+
+
+def multiply(fmt: Any, a: Any, b: Any) -> Any:
+    """fl(a * b)."""
+    raise _only_compiled("multiply")
+
+
+def divide(fmt: Any, a: Any, b: Any) -> Any:
+    """fl(a / b); ZeroDivisionError for b = 0, but in ``Double``."""
+    raise _only_compiled("divide")
+
+
+def sqrt(fmt: Any, a: Any) -> Any:
+    """The square root, rounded; ValueError for a < 0, but in ``Double``."""
+    raise _only_compiled("sqrt")
+
+
+def round_(fmt: Any, x: Any) -> Any:
+    """Round a float64 (base 2, 16), a pair ``m * 10**e`` (base 10), or the sum of two float64 (DoubleDouble)."""
+    raise _only_compiled("round_")
+
+
+def negative(fmt: Any, a: Any) -> Any:
+    """-a, exact."""
+    raise _only_compiled("negative")
+
+
+def absolute(fmt: Any, a: Any) -> Any:
+    """The absolute value, exact."""
+    raise _only_compiled("absolute")
+
+
+def compare(fmt: Any, a: Any, b: Any) -> Any:
+    """-1, 0 or 1 as a is less than, equal to or greater than b; OverflowError if one is beyond the backend."""
+    raise _only_compiled("compare")
+
+
+def less(fmt: Any, a: Any, b: Any) -> Any:
+    """Whether a < b; see :func:`compare`."""
+    raise _only_compiled("less")
+
+
+def integer(fmt: Any, n: Any) -> Any:
+    """The integer n, rounded; abs(n) < 2**53."""
+    raise _only_compiled("integer")
+
+
+def zero(fmt: Any) -> Any:
+    """The number 0."""
+    raise _only_compiled("zero")
+
+
+def one(fmt: Any) -> Any:
+    """The number 1."""
+    raise _only_compiled("one")
+
+
+def load(fmt: Any, array: Any, index: Any) -> Any:
+    """The number at an index, an int or a tuple of them."""
+    raise _only_compiled("load")
+
+
+def store(fmt: Any, array: Any, index: Any, x: Any) -> None:
+    """Put a number at an index; OverflowError if it is beyond the backend."""
+    raise _only_compiled("store")
+
+
+def put(fmt: Any, array: Any, index: Any, x: Any) -> None:
+    """As :func:`store`, unchecked."""
+    raise _only_compiled("put")
+
+
+def lost(fmt: Any, x: Any) -> Any:
+    """Whether a number has left the range of its backend."""
+    raise _only_compiled("lost")
+
+
+def _multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """fl(c + fl(a * b)); a product that the backend could not hold is told by the sum, if it matters there."""
+    raise _only_compiled("_multiply_add")
+
+
+# -- plain float64 -----------------------------------------------------------------------------------
+
+
+@njit
+def _double_add(fmt: Any, a: Any, b: Any) -> Any:
+    return a + b
+
+
+@njit
+def _double_subtract(fmt: Any, a: Any, b: Any) -> Any:
+    return a - b
+
+
+@njit
+def _double_multiply(fmt: Any, a: Any, b: Any) -> Any:
+    return a * b
+
+
+@njit(error_model="numpy")
+def _double_divide(fmt: Any, a: Any, b: Any) -> Any:
+    return a / b
+
+
+@njit
+def _double_sqrt(fmt: Any, a: Any) -> Any:
+    return math.sqrt(a)
+
+
+@njit
+def _double_round(fmt: Any, x: Any) -> Any:
+    return x
+
+
+_DOUBLE = {
+    "add": _double_add,
+    "subtract": _double_subtract,
+    "multiply": _double_multiply,
+    "divide": _double_divide,
+    "sqrt": _double_sqrt,
+    "round_": _double_round,
+}
+
+
+def _implementation(fmt: Any, name: str) -> Any:
+    tag = _tag(fmt)
+    if tag in binary.OPERATIONS:
+        return binary.OPERATIONS[tag][name]
+    return _DOUBLE[name] if tag is Double else getattr(_MODULES.get(tag), name, None)
+
+
+def _overload_two(stub: Callable[..., Any]) -> None:
+    @overload(stub, strict=False, jit_options=_INLINE)
+    def choose(fmt: Any, a: Any, b: Any) -> Any:
+        function = _implementation(fmt, stub.__name__)
+        return None if function is None else lambda fmt, a, b: function(fmt, a, b)
+
+
+def _overload_one(stub: Callable[..., Any], argument: str) -> None:
+    if argument == "a":
+
+        @overload(stub, strict=False, jit_options=_INLINE)
+        def choose_a(fmt: Any, a: Any) -> Any:
+            function = _implementation(fmt, stub.__name__)
+            return None if function is None else lambda fmt, a: function(fmt, a)
+
+    else:
+
+        @overload(stub, strict=False, jit_options=_INLINE)
+        def choose_x(fmt: Any, x: Any) -> Any:
+            function = _implementation(fmt, stub.__name__)
+            return None if function is None else lambda fmt, x: function(fmt, x)
+
+
+for _operation in (add, subtract, multiply, divide):
+    _overload_two(_operation)
+_overload_one(sqrt, "a")
+_overload_one(round_, "x")
+
+
+@overload(negative, strict=False, jit_options=_INLINE)
+def _negative(fmt: Any, a: Any) -> Any:
+    if _tag(fmt) in _OF_PAIRS:
+        return lambda fmt, a: (-a[0], a[1])
+    if _tag(fmt) is DoubleDouble:
+        return lambda fmt, a: (0.0 - a[0], 0.0 - a[1])
+    if _tag(fmt) is Double:
+        return lambda fmt, a: -a
+    return lambda fmt, a: 0.0 - a
+
+
+@overload(absolute, strict=False, jit_options=_INLINE)
+def _absolute(fmt: Any, a: Any) -> Any:
+    if _tag(fmt) in _OF_PAIRS:
+        return lambda fmt, a: (abs(a[0]), a[1])
+    if _tag(fmt) is DoubleDouble:
+        return lambda fmt, a: a if a[0] >= 0.0 else (-a[0], -a[1])
+    return lambda fmt, a: abs(a)
+
+
+@overload(compare, strict=False, jit_options=_INLINE)
+def _compare(fmt: Any, a: Any, b: Any) -> Any:
+    if _tag(fmt) in _OF_FLOATS:
+
+        def of_floats(fmt: Any, a: Any, b: Any) -> Any:
+            if a != a or b != b:
+                raise OverflowError(_BEYOND)
+            return (a > b) - (a < b)
+
+        return of_floats
+    function = _implementation(fmt, "compare")
+    return lambda fmt, a, b: function(fmt, a, b)
+
+
+@overload(less, strict=False, jit_options=_INLINE)
+def _less(fmt: Any, a: Any, b: Any) -> Any:
+    return lambda fmt, a, b: compare(fmt, a, b) < 0
+
+
+@overload(integer, strict=False, jit_options=_INLINE)
+def _integer(fmt: Any, n: Any) -> Any:
+    if _tag(fmt) in _OF_PAIRS:
+        return lambda fmt, n: round_(fmt, (np.int64(n), np.int64(0)))
+    if _tag(fmt) is DoubleDouble:
+        return lambda fmt, n: (np.float64(n), 0.0)
+    return lambda fmt, n: round_(fmt, np.float64(n))
+
+
+@overload(zero, strict=False, jit_options=_INLINE)
+def _zero(fmt: Any) -> Any:
+    if _tag(fmt) in _OF_PAIRS:
+        return lambda fmt: (np.int64(0), np.int64(0))
+    if _tag(fmt) is DoubleDouble:
+        return lambda fmt: (0.0, 0.0)
+    return lambda fmt: 0.0
+
+
+@overload(one, strict=False, jit_options=_INLINE)
+def _one(fmt: Any) -> Any:
+    return lambda fmt: integer(fmt, 1)
+
+
+@overload(_multiply_add, strict=False, jit_options=_INLINE)
+def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    if _tag(fmt) is ShortDecimal:
+        return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
+    return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
+
+
+# -- arrays ------------------------------------------------------------------------------------------
+# A pair of arrays, (significands, exponents) or (high, low), serves as well as one with a last axis of two.
+
+
+@overload(load, strict=False, jit_options=_INLINE)
+def _load(fmt: Any, array: Any, index: Any) -> Any:
+    if _tag(fmt) in _OF_FLOATS:
+        return lambda fmt, array, index: array[index]
+    if isinstance(array, types.BaseTuple):
+        return lambda fmt, array, index: (array[0][index], array[1][index])
+    if isinstance(index, types.Integer):
+        return lambda fmt, array, index: (array[index, 0], array[index, 1])
+    return lambda fmt, array, index: (array[(*index, 0)], array[(*index, 1)])
+
+
+@overload(put, strict=False, jit_options=_INLINE)
+def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
+    def of_floats(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[index] = x
+
+    def in_two(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[0][index] = x[0]
+        array[1][index] = x[1]
+
+    def at_integer(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[index, 0] = x[0]
+        array[index, 1] = x[1]
+
+    def at_tuple(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        array[(*index, 0)] = x[0]
+        array[(*index, 1)] = x[1]
+
+    if _tag(fmt) in _OF_FLOATS:
+        return of_floats
+    if isinstance(array, types.BaseTuple):
+        return in_two
+    return at_integer if isinstance(index, types.Integer) else at_tuple
+
+
+@overload(lost, strict=False, jit_options=_INLINE)
+def _lost(fmt: Any, x: Any) -> Any:
+    if _tag(fmt) in _OF_PAIRS:
+        return lambda fmt, x: False
+    if _tag(fmt) is DoubleDouble:
+        return lambda fmt, x: x[0] != x[0]
+    if _tag(fmt) is Double:
+        return lambda fmt, x: not abs(x) <= np.inf or abs(x) == np.inf
+    return lambda fmt, x: x != x
+
+
+@overload(store, strict=False, jit_options=_INLINE)
+def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
+    def checked(fmt: Any, array: Any, index: Any, x: Any) -> None:
+        if lost(fmt, x):
+            raise OverflowError(_BEYOND)
+        put(fmt, array, index, x)
+
+    return checked
+
+
+# -- sums of products --------------------------------------------------------------------------------
+
+
+@njit(nogil=True)
+def dot(fmt: Any, x: Any, y: Any) -> Any:
+    """Inner product from left to right; the first product is not added to zero."""
+    n = len(x)
+    if n == 0:
+        return zero(fmt)
+    s = multiply(fmt, load(fmt, x, 0), load(fmt, y, 0))
+    for k in range(1, n):
+        s = _multiply_add(fmt, load(fmt, x, k), load(fmt, y, k), s)
+    return s
+
+
+@njit(nogil=True)
+def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a b, each entry the :func:`dot` of a row and a column; c is neither a nor b.
+
+    Row by row, and in a row one product after the other for all its entries at once: the order within each entry is
+    that of :func:`dot`.
+    """
+    for i in range(a.shape[0]):
+        if a.shape[1] == 0:
+            for j in range(b.shape[1]):
+                put(fmt, c, (i, j), zero(fmt))
+        else:
+            factor = load(fmt, a, (i, 0))
+            for j in range(b.shape[1]):
+                put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (0, j))))
+        for k in range(1, a.shape[1]):
+            factor = load(fmt, a, (i, k))
+            for j in range(b.shape[1]):
+                put(fmt, c, (i, j), _multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
+    check(fmt, c)
+
+
+@njit(nogil=True)
+def check(fmt: Any, c: Any) -> None:
+    """OverflowError if a number in the matrix c has left the range of its backend."""
+    gone = False
+    for i in range(c.shape[0]):
+        for j in range(c.shape[1]):
+            gone |= lost(fmt, load(fmt, c, (i, j)))
+    if gone:
+        raise OverflowError(_BEYOND)

@@ -1,0 +1,289 @@
+"""Linear algebra in t-digit arithmetic, each result with its order of operations stated.
+
+The order is the content: another order gives other digits. It is the order of hung1984, ch. II.
+Operands are FloatArrays of one format, and so are results. Where their backend has compiled loops, elimination runs in
+:mod:`gpbnb.arithmetic.kernels.elimination`; the loops here serve every format and every exponent, with the same digits.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.kernels.backends import Compiled
+
+
+class LU(NamedTuple):
+    """Triangular factors of a matrix with its rows in the order `permutation`."""
+
+    lower: FloatArray
+    upper: FloatArray
+    permutation: NDArray[np.intp]
+
+
+def dot(x: FloatArray, y: FloatArray) -> FloatArray:
+    r"""Inner product, from left to right.
+
+    .. math:: \mathrm{fl}(\dots\mathrm{fl}(\mathrm{fl}(x_1 y_1) + \mathrm{fl}(x_2 y_2)) + \dots)
+
+    Parameters
+    ----------
+    x, y : (n,) vectors of one format.
+
+    Returns
+    -------
+    A single number; zero for n = 0.
+
+    Raises
+    ------
+    TypeError : not FloatArrays.
+    ValueError : not two vectors of one length and format.
+
+    References
+    ----------
+    hung1984, ch. II, section 9.1.
+    """
+    _check(x, "x", 1)
+    _check(y, "y", 1)
+    return x @ y
+
+
+def matmul(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Matrix product; each entry is :func:`dot` of a row and a column. The same as ``a @ b``.
+
+    Parameters
+    ----------
+    a, b : (..., m, n) and (..., n, p), or a vector (n,) on either side.
+
+    Raises
+    ------
+    TypeError : not FloatArrays.
+    ValueError : interface dimensions or formats differ.
+
+    References
+    ----------
+    hung1984, ch. II, section 9.2; hung1982, ch. III, (27).
+    """
+    _check(a, "a")
+    _check(b, "b")
+    return a @ b
+
+
+def lu(a: FloatArray, pivot: bool = False) -> LU:
+    r"""Gaussian elimination, one column after the other.
+
+    For k = 1 … n − 1 and each row i > k:
+    :math:`m_{ik} = -\mathrm{fl}(a_{ik}/a_{kk})`, then for each j > k
+    :math:`a_{ij} \leftarrow \mathrm{fl}(a_{ij} + \mathrm{fl}(m_{ik} a_{kj}))`.
+
+    Parameters
+    ----------
+    a : (n, n).
+    pivot : partial pivoting: swap into row k the row from k on with the largest
+        :math:`|a_{ik}|`, the first of equals.
+
+    Returns
+    -------
+    lower, upper : (n, n); `lower` has ones on its diagonal and holds :math:`-m_{ik}`.
+    permutation : (n,); ``a[permutation]`` is what was factored.
+
+    Raises
+    ------
+    TypeError : not a FloatArray.
+    ValueError : `a` is not a square matrix.
+    numpy.linalg.LinAlgError : a pivot is zero.
+
+    References
+    ----------
+    hung1984, ch. II, (45)-(58).
+    """
+    n = _square(a)
+    if (compiled := _factored(a, pivot)) is not None:
+        factors, order = compiled
+        identity = a.format.array(np.eye(n, dtype=int))
+        lower = cast(FloatArray, np.where(np.tri(n, k=-1, dtype=bool), factors, identity))
+        return LU(lower, cast(FloatArray, np.triu(cast(Any, factors))), order)
+    order = np.arange(n)
+    work = a
+    uppers: list[FloatArray] = []
+    multipliers = [a.format.array([])] * n  # row i: its multipliers so far
+    for k in range(n):
+        if pivot:
+            work, order, multipliers = _swap_largest(work, order, multipliers, k)
+        head = work[0]
+        uppers.append(head)
+        if head[0] == 0:
+            raise np.linalg.LinAlgError(_zero_pivot(k, n, pivot))
+        if k == n - 1:
+            break
+        ratio = work[1:, 0] / head[0]
+        for i in range(k + 1, n):
+            multipliers[i] = _joined(multipliers[i], ratio[i - k - 1 : i - k])
+        work = work[1:, 1:] + (-ratio)[:, np.newaxis] * head[1:]
+    zeros, one = a.format.array([0] * n), a.format.array([1])
+    lowers = [_joined(row, one, zeros[i + 1 :]) for i, row in enumerate(multipliers)]
+    return LU(_rows(lowers), _rows([_joined(zeros[:i], row) for i, row in enumerate(uppers)]), order)
+
+
+def solve(a: FloatArray, b: FloatArray, pivot: bool = False) -> FloatArray:
+    r"""Solve a x = b by elimination and back substitution.
+
+    The right-hand side is reduced with the matrix,
+    :math:`b_i \leftarrow \mathrm{fl}(b_i + \mathrm{fl}(m_{ik} b_k))` for k = 1 … n − 1; then from
+    the last row up :math:`x_k = ((b_k - a_{k,k+1} x_{k+1}) - a_{k,k+2} x_{k+2} - \dots)/a_{kk}`,
+    from left to right, each operation rounded.
+
+    Parameters
+    ----------
+    a : (n, n).
+    b : (n,) or (n, p), a column for each right-hand side.
+    pivot : as in :func:`lu`.
+
+    Returns
+    -------
+    x : of the shape of `b`.
+
+    Raises
+    ------
+    TypeError : not FloatArrays.
+    ValueError : shapes do not fit, or formats differ.
+    numpy.linalg.LinAlgError : a pivot is zero.
+
+    References
+    ----------
+    hung1984, ch. II, (45)-(90).
+    """
+    n = _square(a)
+    _check(b, "b")
+    if b.ndim not in (1, 2) or b.shape[0] != n:
+        raise ValueError(f"b: got shape {b.shape} with a of shape {a.shape}; needed ({n},) or ({n}, p)")
+    columns = b if b.ndim == 2 else b[:, np.newaxis]
+    if (compiled := _solved(a, columns, pivot)) is not None:
+        return compiled if b.ndim == 2 else compiled[:, 0]
+    lower, upper, order = lu(a, pivot)
+    columns = columns[order]
+    reduced = []
+    for k in range(n):
+        reduced.append(columns[0])
+        columns = columns[1:] + (-lower[k + 1 :, k])[:, np.newaxis] * columns[0]
+    x: list[FloatArray] = []  # x_{k+1} ... x_n
+    for k in reversed(range(n)):
+        rest = reduced[k]
+        for j, solved in enumerate(x, start=k + 1):
+            rest = rest - upper[k, j] * solved
+        x.insert(0, rest / upper[k, k])
+    solution = _rows(x)
+    return solution if b.ndim == 2 else solution[:, 0]
+
+
+def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
+    """Invert a matrix: :func:`solve` for each column of the identity.
+
+    Parameters
+    ----------
+    a : (n, n).
+    pivot : as in :func:`lu`.
+
+    Raises
+    ------
+    TypeError : not a FloatArray.
+    ValueError : `a` is not a square matrix.
+    numpy.linalg.LinAlgError : a pivot is zero.
+
+    References
+    ----------
+    hung1984, ch. II, (33) and (93).
+    """
+    return solve(a, a.format.array(np.eye(_square(a), dtype=int)), pivot)
+
+
+def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
+    """Both factors in one array, and the order of the rows; None where the backend cannot do it."""
+    backend = a.backend
+    if not isinstance(backend, Compiled):
+        return None
+    factors, order = backend.pack(a.components), np.arange(len(a))
+    try:
+        column = _loops().lu(backend.tag, factors, order, pivot)
+    except OverflowError:
+        return None
+    if column >= 0:
+        raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot))
+    return FloatArray.from_components(backend, backend.unpack(factors), a.format), order
+
+
+def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
+    """Solutions for the columns of b (n, p); None where the backend cannot do it."""
+    backend = a.backend
+    if not isinstance(backend, Compiled) or b.backend is not backend:
+        return None
+    if (compiled := _factored(a, pivot)) is None:
+        return None
+    factors, order = backend.pack(compiled[0].components), compiled[1]
+    columns = backend.pack(b[order].components)
+    try:
+        _loops().reduce(backend.tag, factors, columns)
+        _loops().substitute(backend.tag, factors, columns)
+    except OverflowError:
+        return None
+    return FloatArray.from_components(backend, backend.unpack(columns), a.format)
+
+
+@lru_cache(maxsize=1)
+def _loops() -> Any:
+    from gpbnb.arithmetic.kernels import elimination
+
+    return elimination
+
+
+def _joined(*components: FloatArray) -> FloatArray:
+    return cast(FloatArray, np.concatenate(components))
+
+
+def _rows(rows: list[FloatArray]) -> FloatArray:
+    return cast(FloatArray, np.stack(rows))
+
+
+def _swap_largest(
+    work: FloatArray, order: NDArray[np.intp], multipliers: list[FloatArray], k: int
+) -> tuple[FloatArray, NDArray[np.intp], list[FloatArray]]:
+    size = abs(work[:, 0])
+    largest = 0
+    for i in range(1, len(work)):
+        if size[i] > size[largest]:
+            largest = i
+    if largest == 0:
+        return work, order, multipliers
+    rows = np.arange(len(work))
+    rows[[0, largest]] = largest, 0
+    order, multipliers = order.copy(), list(multipliers)
+    order[[k, k + largest]] = order[[k + largest, k]]
+    multipliers[k], multipliers[k + largest] = multipliers[k + largest], multipliers[k]
+    return work[rows], order, multipliers
+
+
+def _zero_pivot(k: int, n: int, pivot: bool) -> str:
+    cure = (
+        "the matrix is singular in this format; use more digits, or another matrix"
+        if pivot or k == n - 1
+        else "try pivot=True; if that fails too, the matrix is singular in this format"
+    )
+    return f"got a zero pivot in column {k + 1} of {n}; needed one other than zero; {cure}"
+
+
+def _check(x: object, name: str, ndim: int | None = None) -> None:
+    if not isinstance(x, FloatArray):
+        raise TypeError(f"{name}: got {type(x).__name__}; needed a FloatArray; write fmt.array({name})")
+    if ndim is not None and x.ndim != ndim:
+        raise ValueError(f"{name}: got shape {x.shape}; needed {ndim} axis, (n,)")
+
+
+def _square(a: FloatArray) -> int:
+    _check(a, "a")
+    if a.ndim != 2 or a.shape[0] != a.shape[1] or not a.size:
+        raise ValueError(f"a: got shape {a.shape}; needed a square matrix (n, n), n at least 1")
+    return a.shape[0]

@@ -1,0 +1,155 @@
+"""FloatArrays beyond their compiled backend, and between the two: the digits are those of the exact kernel."""
+
+from __future__ import annotations
+
+import operator
+import pickle
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, backend
+
+OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
+COMPILED = [(2, 1), (2, 24), (2, 26), (2, 53), (10, 1), (10, 9), (10, 10), (10, 18), (16, 1), (16, 13)]
+
+
+@st.composite
+def formats(draw: st.DrawFn) -> FloatFormat:
+    base, precision = draw(st.sampled_from(COMPILED))
+    return FloatFormat(base, precision, draw(st.sampled_from(list(Rounding))))
+
+
+@st.composite
+def pairs(draw: st.DrawFn, fmt: FloatFormat) -> tuple[int, int]:
+    """Numbers inside the range of the backend, at its edge, and far beyond."""
+    least = fmt.base ** (fmt.precision - 1)
+    m = draw(st.integers(least, fmt.base * least - 1))
+    if draw(st.integers(0, 9)) == 0:
+        return 0, 0
+    edges = [2**60, 2**63] if fmt.base == 10 else [960, 1023, 1074]
+    e = draw(st.integers(-30, 30)) + draw(st.sampled_from([0, 0, *edges, *(-edge for edge in edges)]))
+    return draw(st.sampled_from([m, -m])), e
+
+
+def made(fmt: FloatFormat, pairs: list[tuple[int, int]]) -> FloatArray:
+    m, e = np.array(pairs, dtype=object).T
+    return FloatArray._make(m, e, fmt)
+
+
+@settings(derandomize=True, deadline=None, database=None, max_examples=400)
+@given(st.data())
+def test_operations_at_the_edge_of_the_range_are_exact(data: st.DataObject) -> None:
+    fmt = data.draw(formats())
+    lists = st.lists(pairs(fmt), min_size=3, max_size=3)
+    x, y = made(fmt, data.draw(lists)), made(fmt, data.draw(lists))
+    p, q = x._exactly(), y._exactly()
+    assert isinstance(p.backend, Exact)
+    for operation in OPERATIONS[:3]:
+        assert same(operation(x, y), operation(p, q))
+    if np.all(y != 0):
+        assert same(x / y, p / q)
+    assert same(np.sqrt(abs(x)), np.sqrt(abs(p)))
+    assert same(-x, -p)
+    assert same(x.sum(), p.sum())
+    assert same(x.prod(), p.prod())
+    assert np.array_equal(x < y, p < q)
+    assert np.array_equal(x == y, p == q)
+    assert same(np.outer(x, y) @ y, np.outer(p, q) @ q)
+    assert same(np.concatenate([x, q]), np.concatenate([p, y]))
+    assert same(np.where([True, False, True], x, q), np.where([True, False, True], p, y))
+
+
+def same(x: Any, y: Any) -> bool:
+    return x.shape == y.shape and bool(np.all(x._m == y._m) and np.all(x._e == y._e))
+
+
+@pytest.mark.parametrize(("base", "kind"), [(2, Floats), (16, Floats), (10, Pairs), (3, Exact), (8, Exact)])
+def test_the_carrier_of_a_format(base: int, kind: type) -> None:
+    assert type(backend(base, 6, True)) is kind
+    assert type(backend(base, 54, True)) is Exact
+    assert pickle.loads(pickle.dumps(backend(base, 6, False))).nearest is False
+
+
+@pytest.mark.parametrize(("base", "precision"), [(2, 11), (2, 53), (10, 3), (10, 18), (16, 5)])
+@pytest.mark.parametrize("dtype", ["f8", "f4", "f2", "i8", "i4", "u1", "u8", ">f8", ">i4"])
+@pytest.mark.parametrize("rounding", list(Rounding))
+def test_number_arrays_are_rounded_as_their_entries(base: int, precision: int, dtype: str, rounding: Rounding) -> None:
+    fmt = FloatFormat(base, precision, rounding)
+    rng = np.random.default_rng(8)
+    if np.dtype(dtype).kind == "f":
+        values = (rng.standard_normal(40) * 100).astype(dtype)
+        values[::4] = np.rint(values[::4])
+    else:
+        info = np.iinfo(dtype)
+        values = rng.integers(info.min, info.max, 40, dtype=np.dtype(dtype).newbyteorder("="), endpoint=True).astype(
+            dtype
+        )
+        values[:3] = 0, info.max, info.min
+    for given_ in (values, values[::2], values.reshape(5, 8).T, values.astype(object), values[3:4].reshape(())):
+        x = fmt.array(given_)
+        assert x.shape == given_.shape
+        assert x.to_fractions() is not None
+        entries = [fmt.round(v) for v in given_.reshape(-1)]
+        assert x.reshape(-1).to_fractions().tolist() == entries
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("base", [2, 10, 16])
+def test_what_is_not_finite_names_its_place(base: int, bad: float) -> None:
+    values = np.ones((3, 4))
+    values[1, 2] = bad
+    with pytest.raises(ValueError, match=r"entry \[1, 2\]"):
+        FloatFormat(base, 6).array(values)
+
+
+def test_a_plain_operand_is_not_rounded_unseen() -> None:
+    for base in (2, 10, 16):
+        x = FloatFormat(base, 3).array([1, 2])
+        with pytest.raises(ValueError, match="holds exactly"):
+            x + np.array([1.0, 0.1])
+        with pytest.raises(ValueError, match="holds exactly"):
+            x + np.array([1, 99999])
+        assert np.all(x + np.array([1, 2]) == np.array([2.0, 4.0]))
+
+
+@pytest.mark.parametrize("base", [2, 16])
+def test_tiny_and_huge_floats_are_held_exactly(base: int) -> None:
+    fmt = FloatFormat(base, 13)
+    values = np.array([5e-324, 1e-300, 1.0, 1e308])
+    x = fmt.array(values)
+    assert isinstance(x.backend, Exact)
+    assert x.to_fractions().tolist() == [fmt.round(v) for v in values]
+
+
+def test_packed_arrays_are_new() -> None:
+    for fmt in (FloatFormat(2, 24), FloatFormat(10, 8)):
+        x = fmt.array([[1, 2], [3, 4]]).T
+        assert isinstance(fmt.backend, Compiled)
+        packed = fmt.backend.pack(x.components)
+        y = FloatArray.from_components(fmt.backend, fmt.backend.unpack(packed), fmt)
+        packed[...] = 9
+        assert np.all(x == [[1, 3], [2, 4]])
+        assert np.all(y == x)
+        assert packed.flags.c_contiguous
+
+
+def test_no_negative_zero() -> None:
+    for base in (2, 16):
+        x = FloatFormat(base, 5).array([-1.0, 0.0, -0.0])
+        zero = x[1]
+        for result in (x * zero, zero / x[0], -zero, zero - zero, np.sqrt(zero), x[2], abs(x[2]), x @ (x * zero)):
+            assert not np.any(np.signbit(result.to_float()) & (result.to_float() == 0))
+
+
+def test_to_float_of_long_decimals_is_nearest() -> None:
+    fmt = FloatFormat(10, 18)
+    x = fmt.array(["9007199254740993", "0.1", "123456789012345678e30", "1e-300", "4.35", "1e22", "1e23"])
+    assert x.to_float().tolist() == [float(v) for v in x.to_fractions()]
+    assert fmt.array(Fraction(1, 3)).to_float() == 1 / 3

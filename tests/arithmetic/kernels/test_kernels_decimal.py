@@ -1,0 +1,118 @@
+"""Base 10, both kernels: every pair of numbers of one and of two digits, and what products out of range leave."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+
+from gpbnb.arithmetic.kernels import elementwise, scalar
+from gpbnb.arithmetic.kernels.backends import backend
+from gpbnb.arithmetic.kernels.exact import kernel
+from gpbnb.arithmetic.kernels.scalar import load
+from gpbnb.arithmetic.kernels.tags import LARGEST_SHORT, Decimal, ShortDecimal
+
+TAGS = [Decimal, ShortDecimal]
+
+
+def computed(tag: Any, name: str, *components: Any) -> tuple[Any, Any]:
+    m1, e1, m2, e2 = (np.ascontiguousarray(part) for part in np.broadcast_arrays(*components))
+    out = np.empty(m1.size, np.int64), np.empty(m1.size, np.int64)
+    gone = elementwise.ENTRIES[name](tag, m1.size, (m1.ravel(), e1.ravel()), (m2.ravel(), e2.ravel()), out)
+    assert not gone
+    return out
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+@pytest.mark.parametrize("precision", [1, 2])
+def test_every_pair_of_short_numbers(precision: int, nearest: bool) -> None:
+    """Of either sign, with exponents up to t + 4 apart, either way."""
+    positive = np.arange(10 ** (precision - 1), 10**precision)
+    both = np.concatenate([-positive, positive])
+    gaps = np.arange(-precision - 4, precision + 5)
+    oracle = kernel(10, precision, nearest)
+    for name in ("add", "subtract", "multiply", "divide"):
+        first, gap, second = np.meshgrid(both, gaps if name in ("add", "subtract") else [3], both, indexing="ij")
+        exact = np.frompyfunc(getattr(oracle, name), 4, 2)
+        m, e = (part.astype(np.int64).ravel() for part in exact(first, gap, second, 0))
+        for tag in TAGS:
+            n, f = computed(tag(precision, nearest), name, first, gap, second, np.zeros_like(gap))
+            assert np.array_equal(m, n)
+            assert np.array_equal(e, f)
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+def test_carries_and_clamped_exponents_of_eight_digits(nearest: bool) -> None:
+    """Beside powers of ten and ties, at every distance of the exponents about the one where only a sign is left."""
+    t = LARGEST_SHORT
+    steps = np.arange(4)
+    edges = np.concatenate([10 ** (t - 1) + steps, 10**t - 1 - steps, 5 * 10 ** (t - 1) + steps - 2])
+    both = np.concatenate([-edges, edges])
+    first, gap, second = np.meshgrid(both, np.arange(-t - 5, t + 6), both, indexing="ij")
+    for name in ("add", "subtract", "multiply"):
+        exact = np.frompyfunc(getattr(kernel(10, t, nearest), name), 4, 2)
+        m, e = (part.astype(np.int64).ravel() for part in exact(first, gap, second, 0))
+        for tag in TAGS:
+            n, f = computed(tag(t, nearest), name, first, gap, second, np.zeros_like(gap))
+            assert np.array_equal(m, n)
+            assert np.array_equal(e, f)
+
+
+@pytest.mark.parametrize("nearest", [True, False])
+def test_zeros(nearest: bool) -> None:
+    for tag in TAGS:
+        for m, e in ((0, 0), (37, 40), (-37, -40)):
+            for name in ("add", "subtract"):
+                n, f = computed(tag(2, nearest), name, [m], [e], [0], [0])
+                assert (n[0], f[0]) == (m, e)
+            n, f = computed(tag(2, nearest), "add", [0], [0], [m], [e])
+            assert (n[0], f[0]) == (m, e)
+            for name, pair in (("subtract", (m, e)), ("multiply", (0, 0))):
+                n, f = computed(tag(2, nearest), name, [m], [e], *([part] for part in pair))
+                assert (n[0], f[0]) == (0, 0)
+
+
+def test_the_kernel_of_a_precision() -> None:
+    for precision in range(1, 19):
+        assert type(backend(10, precision, True).tag) is (ShortDecimal if precision <= LARGEST_SHORT else Decimal)
+
+
+@njit
+def dots(fmt: Any, x: Any, y: Any) -> Any:
+    c = x[:1].copy().reshape(1, 1, 2)
+    scalar.matmul(fmt, x.reshape(1, len(x), 2), y.reshape(len(x), 1, 2), c)
+    return scalar.dot(fmt, x, y), load(fmt, c, (0, 0))
+
+
+HIGH, ONE, LOW, ZERO = (10, 2**60), (10, -1), (10, -(2**60)), (0, 0)
+
+
+@pytest.mark.parametrize("tag", TAGS)
+@pytest.mark.parametrize(
+    ("x", "y", "expected"),
+    [
+        ([ONE, ZERO], [ONE, HIGH], ONE),
+        ([ONE, HIGH], [ONE, ZERO], ONE),
+        ([ZERO, ZERO], [ONE, LOW], ZERO),
+        ([ZERO, LOW], [ONE, ZERO], ZERO),
+        ([ZERO, ONE], [LOW, ONE], ONE),
+        ([ONE, HIGH], [ONE, HIGH], None),
+        ([ZERO, HIGH], [ONE, HIGH], None),
+        ([ZERO, LOW], [ONE, LOW], None),
+    ],
+)
+def test_products_out_of_range_in_sums(tag: Any, x: Any, y: Any, expected: Any) -> None:
+    arrays = np.array(x, np.int64), np.array(y, np.int64)
+    if expected is None:
+        with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
+            dots(tag(2, True), *arrays)
+    else:
+        assert dots(tag(2, True), *arrays) == (expected, expected)
+
+
+def test_a_product_too_small_to_hold_only_tells_its_sign_in_a_sum() -> None:
+    x, y = np.array([[10, -1], [10, -(2**60)]]), np.array([[10, -1], [-10, -(2**60)]])
+    assert dots(ShortDecimal(2, True), x, y) == ((10, -1), (10, -1))
+    assert dots(ShortDecimal(2, False), x, y) == ((99, -2), (99, -2))

@@ -1,0 +1,235 @@
+"""One recursion in every arithmetic; what a backend cannot hold raises."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+import time
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels import scalar
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.scalar import (
+    absolute,
+    add,
+    compare,
+    divide,
+    integer,
+    less,
+    load,
+    multiply,
+    negative,
+    one,
+    sqrt,
+    store,
+    subtract,
+    zero,
+)
+from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal
+
+FORMATS = [
+    FloatFormat(base, precision, rounding)
+    for base, precision in ((2, 11), (2, 24), (2, 53), (10, 8), (10, 17), (16, 6))
+    for rounding in Rounding
+]
+
+
+@njit
+def recursion(fmt: Any, x: Any, y: Any) -> None:
+    """Some of every operation; x has two numbers, y as many as steps."""
+    a, b = load(fmt, x, 0), load(fmt, x, 1)
+    s = zero(fmt)
+    for k in range(y.shape[0]):
+        n = integer(fmt, k + 2)
+        s = add(fmt, multiply(fmt, s, a), divide(fmt, b, n))
+        s = subtract(fmt, s, sqrt(fmt, absolute(fmt, s)))
+        if less(fmt, s, zero(fmt)):
+            s = add(fmt, negative(fmt, s), one(fmt))
+        store(fmt, y, k, s)
+
+
+def by_hand(x: FloatArray, steps: int) -> list[Fraction]:
+    """The same with FloatArrays of the exact backend."""
+    a, b = x[0]._exactly(), x[1]._exactly()
+    s = x.format.array(0)._exactly()
+    results = []
+    for k in range(steps):
+        s = s * a + b / x.format.array(k + 2)._exactly()
+        s = s - np.sqrt(abs(s))
+        if s < 0:
+            s = -s + 1
+        results.append(s.to_fractions())
+    return results
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_a_recursion_is_that_of_the_exact_kernel(fmt: FloatFormat) -> None:
+    x = fmt.array(["0.7310586", "2.7182818284590452"])
+    assert isinstance(fmt.backend, Compiled)
+    y = fmt.backend.pack(fmt.array([0] * 40).components)
+    recursion(fmt.backend.tag, fmt.backend.pack(x.components), y)
+    result = FloatArray.from_components(fmt.backend, fmt.backend.unpack(y), fmt)
+    assert result.to_fractions().tolist() == by_hand(x, 40)
+
+
+def test_the_recursion_in_the_reference_and_in_float64() -> None:
+    exact = np.array([Fraction(7310586, 10**7), Fraction(2718281828, 10**9)], dtype=object)
+    wide = FloatFormat(2, 300).array(exact)
+    expected = by_hand(wide, 12)
+    y = np.empty((12, 2))
+    recursion(DoubleDouble(), double_doubles(exact), y)
+    # Twelve steps of six operations, each within 2**-102, hardly amplified; and no luck: far better than float64.
+    errors = [abs(Fraction(h) + Fraction(low) - e) for (h, low), e in zip(y.tolist(), expected, strict=True)]
+    assert 0 < max(errors) < Fraction(1, 2**90)
+    z = np.empty(12)
+    recursion(Double(), exact.astype(float), z)
+    assert max(abs(Fraction(v) - e) for v, e in zip(z.tolist(), expected, strict=True)) < Fraction(1, 2**40)
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_products_of_matrices_in_the_stated_order(fmt: FloatFormat) -> None:
+    rng = np.random.default_rng(5)
+    a, b = fmt.array(rng.standard_normal((3, 7))), fmt.array(rng.standard_normal((7, 4)))
+    expected = (a._exactly() @ b._exactly()).to_fractions()
+    assert a.backend is fmt.backend
+    assert np.array_equal((a @ b).to_fractions(), expected)
+    assert np.array_equal((b.T @ a.T).T.to_fractions(), expected)
+    assert linalg.dot(a[0], b[:, 0]).to_fractions() == expected[0, 0]
+
+
+@njit
+def powers(fmt: Any, x: Any, y: Any) -> None:
+    a = load(fmt, x, 0)
+    s = one(fmt)
+    for k in range(y.shape[0]):
+        s = multiply(fmt, s, a)
+        store(fmt, y, k, s)
+
+
+@njit
+def compared_beyond(fmt: Any, x: Any) -> Any:
+    a = load(fmt, x, 0)
+    return compare(fmt, multiply(fmt, a, a), one(fmt))
+
+
+@njit
+def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    scalar.matmul(fmt, a, b, c)
+
+
+@pytest.mark.parametrize("tag", [Binary(24, True), Binary(53, False), Hexadecimal(6, True)], ids=str)
+@pytest.mark.parametrize("factor", [2.0**100, 2.0**-100])
+def test_float64_out_of_range_raises(tag: Any, factor: float) -> None:
+    y = np.zeros(20)
+    with pytest.raises(OverflowError, match="beyond the range of float64"):
+        powers(tag, np.array([factor]), y)
+    held = 10 if factor > 1 else 9
+    assert y.tolist() == [factor**k for k in range(1, held + 1)] + [0.0] * (20 - held)
+    with pytest.raises(OverflowError, match="beyond the range of float64"):
+        compared_beyond(tag, np.array([factor**7]))
+    square = np.full((2, 2), factor**7)
+    with pytest.raises(OverflowError, match="beyond the range of float64"):
+        product(tag, square, square, np.empty((2, 2)))
+
+
+def test_the_reference_out_of_range_raises() -> None:
+    for factor in (2.0**100, 2.0**-100):
+        with pytest.raises(OverflowError, match="scale the numbers"):
+            powers(DoubleDouble(), np.array([[factor, 0.0]]), np.zeros((20, 2)))
+
+
+def test_plain_float64_overflow_raises() -> None:
+    with pytest.raises(OverflowError, match="scale the numbers"):
+        powers(Double(), np.array([2.0**100]), np.zeros(20))
+
+
+def test_a_decimal_exponent_beyond_int64_raises() -> None:
+    big = np.array([[10, 2**58]])
+    with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
+        powers(Decimal(2, True), big, np.zeros((20, 2), np.int64))
+    with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
+        powers(Decimal(2, True), big * [1, -1], np.zeros((20, 2), np.int64))
+
+
+@njit
+def quotient(fmt: Any, x: Any) -> Any:
+    return divide(fmt, load(fmt, x, 0), load(fmt, x, 1))
+
+
+@njit
+def root(fmt: Any, x: Any) -> Any:
+    return sqrt(fmt, load(fmt, x, 0))
+
+
+PLACES = [
+    (Binary(24, True), np.array([-1.0, 0.0])),
+    (Hexadecimal(6, False), np.array([-1.0, 0.0])),
+    (Decimal(1, True), np.array([[-1, 0], [0, 0]])),
+    (DoubleDouble(), np.array([[-1.0, 0.0], [0.0, 0.0]])),
+]
+
+
+@pytest.mark.parametrize(("tag", "x"), PLACES, ids=lambda p: type(p).__name__)
+def test_division_by_zero_and_negative_roots_raise(tag: Any, x: Any) -> None:
+    with pytest.raises(ZeroDivisionError):
+        quotient(tag, x)
+    with pytest.raises(ValueError, match="negative"):
+        root(tag, x)
+
+
+@pytest.mark.parametrize("name", ["add", "sqrt", "load", "store", "zero", "compare"])
+def test_python_cannot_call_them(name: str) -> None:
+    function = getattr(scalar, name)
+    count = function.__code__.co_argcount
+    with pytest.raises(TypeError, match="compiled by numba"):
+        function(*[None] * count)
+
+
+@njit(nogil=True)
+def long_loop(fmt: Any, x: Any, y: Any, count: int) -> None:
+    for _ in range(count):
+        scalar.matmul(fmt, x, x, y)
+
+
+def test_the_gil_is_released() -> None:
+    tag, x = Binary(24, True), np.full((10, 10), 0.5)
+    long_loop(tag, x, np.empty((10, 10)), 1)
+    running = threading.Event()
+    seconds = []
+
+    def work() -> None:
+        running.set()
+        start = time.perf_counter()
+        long_loop(tag, x, np.empty((10, 10)), 200_000)
+        seconds.append(time.perf_counter() - start)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    running.wait()
+    turns = 0  # of Python, while the loop runs: were the GIL held, none or a few
+    while thread.is_alive():
+        time.sleep(0.001)
+        turns += 1
+    thread.join()
+    assert seconds[0] > 0.05
+    assert turns > 10
+
+
+def test_importing_gpbnb_is_light() -> None:
+    code = (
+        "import sys, gpbnb\n"
+        "from gpbnb.arithmetic import array, bounds, formats, linalg\n"
+        "gpbnb.FloatFormat(2, 24).round('0.1')\n"
+        "print([name for name in ('numba', 'llvmlite', 'sympy', 'matplotlib', 'mpmath') if name in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

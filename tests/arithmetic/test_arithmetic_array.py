@@ -1,0 +1,656 @@
+"""Arrays of t-digit numbers: each operation against independent arithmetic, and NumPy's manners."""
+
+from __future__ import annotations
+
+import copy
+import operator
+import pickle
+from collections.abc import Callable
+from datetime import date
+from decimal import MAX_EMAX, MIN_EMIN, ROUND_DOWN, ROUND_HALF_UP, Context, Decimal, DivisionByZero, InvalidOperation
+from fractions import Fraction
+from typing import Any
+
+import gmpy2
+import numpy as np
+import oracles
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+
+seeded = settings(derandomize=True, deadline=None, database=None, max_examples=1000)
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+OPERATIONS = {"+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv}
+D4 = FloatFormat(10, 4)
+B8 = FloatFormat(2, 8)
+
+Pair = tuple[int, int]
+
+
+@st.composite
+def operands(draw: st.DrawFn, base: int, precision: int, far: int) -> tuple[Pair, Pair]:
+    """Two numbers (m, e) of the format, chosen so that rounding their sum, product or quotient is hard."""
+    low, high = base ** (precision - 1), base**precision
+
+    def significand() -> st.SearchStrategy[int]:
+        edges = [m for m in (low, low + 1, high // 2, high // 2 + 1, high - 1) if m < high]
+        return st.one_of(st.integers(low, high - 1), st.sampled_from(edges), st.just(0))
+
+    m1, e1 = draw(significand()), draw(st.integers(-far, far))
+    kind = draw(st.sampled_from(["any", "far", "tie", "cancel"]))
+    if kind == "tie" and base % 2 == 0:  # half a unit of the last digit, and one of its own units beside
+        m2, e2 = base // 2 * low + draw(st.sampled_from([-1, 0, 1])), e1 - precision
+    elif kind == "cancel":
+        m2, e2 = m1 + draw(st.integers(-3, 3)), e1 - draw(st.integers(0, 1))
+    elif kind == "far":
+        m2, e2 = draw(significand()), draw(st.integers(-far, far))
+    else:
+        m2, e2 = draw(significand()), e1 + draw(st.integers(-precision - 5, precision + 5))
+    signs = st.sampled_from([-1, 1])
+    return (draw(signs) * m1, e1), (draw(signs) * min(abs(m2), high - 1), e2)
+
+
+class TestAgainstDecimal:
+    """Base 10 against the standard library."""
+
+    @seeded
+    @given(st.data(), st.integers(1, 40), st.sampled_from([NEAREST, CHOP]))
+    def test_operations(self, data: st.DataObject, precision: int, rounding: Rounding) -> None:
+        (m1, e1), (m2, e2) = data.draw(operands(10, precision, far=data.draw(st.sampled_from([50, 10**6]))))
+        context = Context(
+            prec=precision,
+            rounding=ROUND_HALF_UP if rounding is NEAREST else ROUND_DOWN,
+            Emax=MAX_EMAX,
+            Emin=MIN_EMIN,
+            traps=[InvalidOperation, DivisionByZero],
+        )
+        a, b = Decimal(f"{m1}e{e1}"), Decimal(f"{m2}e{e2}")
+        fmt = FloatFormat(10, precision, rounding)
+        x, y = fmt.array(a), fmt.array(b)
+        assert Decimal(str(x)) == a
+        assert Decimal(str(x + y)) == context.add(a, b)
+        assert Decimal(str(x - y)) == context.subtract(a, b)
+        assert Decimal(str(x * y)) == context.multiply(a, b)
+        if b:
+            assert Decimal(str(x / y)) == context.divide(a, b)
+        order = int(context.compare(a, b))
+        assert (x < y, x <= y, x == y, x != y, x >= y, x > y) == (
+            (order < 0), (order <= 0), (order == 0), (order != 0), (order >= 0), (order > 0),
+        )  # fmt: skip
+
+
+class TestAgainstMPFR:
+    """Base 2 against MPFR, which rounds towards zero but not half away from zero.
+
+    The nearest t-bit number follows from the first t + 1 bits: half away from zero, the last of them decides.
+    """
+
+    @staticmethod
+    def nearest(result: gmpy2.mpfr, precision: int) -> Fraction:
+        m, e = map(int, result.as_mantissa_exp())
+        if abs(m).bit_length() <= precision:
+            return m * Fraction(2) ** e
+        assert abs(m).bit_length() == precision + 1
+        return (m + m % 2 * (1 if m > 0 else -1)) * Fraction(2) ** e
+
+    @seeded
+    @given(st.data(), st.integers(1, 113))
+    def test_operations(self, data: st.DataObject, precision: int) -> None:
+        (m1, e1), (m2, e2) = data.draw(operands(2, precision, far=data.draw(st.sampled_from([150, 20_000]))))
+        exact = gmpy2.context(precision=200, emax=gmpy2.get_emax_max(), emin=gmpy2.get_emin_min())
+        a = exact.mul(gmpy2.mpfr(m1, 200), exact.exp2(e1))
+        b = exact.mul(gmpy2.mpfr(m2, 200), exact.exp2(e2))
+        for rounding, bits in ((CHOP, precision), (NEAREST, precision + 1)):
+            mpfr = gmpy2.context(
+                precision=bits, round=gmpy2.RoundToZero, emax=gmpy2.get_emax_max(), emin=gmpy2.get_emin_min()
+            )
+            fmt = FloatFormat(2, precision, rounding)
+            x, y = fmt.array(m1 * Fraction(2) ** e1), fmt.array(m2 * Fraction(2) ** e2)
+            results = [(x + y, mpfr.add(a, b)), (x - y, mpfr.sub(a, b)), (x * y, mpfr.mul(a, b))]
+            if m2:
+                results.append((x / y, mpfr.div(a, b)))
+            results.append((np.sqrt(abs(x)), mpfr.sqrt(exact.mul(a, -1 if a < 0 else 1))))
+            for ours, theirs in results:
+                expected = Fraction(*theirs.as_integer_ratio()) if rounding is CHOP else self.nearest(theirs, precision)
+                assert ours.to_fractions() == expected
+
+
+class TestAgainstFractions:
+    """Any base against the definition."""
+
+    @seeded
+    @given(
+        st.data(),
+        st.one_of(st.integers(2, 40), st.sampled_from([2, 10, 16, 60, 1000])),
+        st.integers(1, 20),
+        st.sampled_from([NEAREST, CHOP]),
+    )
+    def test_operations(self, data: st.DataObject, base: int, precision: int, rounding: Rounding) -> None:
+        (m1, e1), (m2, e2) = data.draw(operands(base, precision, far=40))
+        fmt = FloatFormat(base, precision, rounding)
+        a, b = m1 * Fraction(base) ** e1, m2 * Fraction(base) ** e2
+        x, y = fmt.array(a), fmt.array(b)
+        for sign, operation in OPERATIONS.items():
+            if b or sign != "/":
+                expected = oracles.rounded(operation(a, b), base, precision, rounding is NEAREST)
+                assert operation(x, y).to_fractions() == expected
+        root = oracles.square_root(abs(a), base, precision, rounding is NEAREST)
+        assert np.sqrt(abs(x)).to_fractions() == root
+        assert (x == y, x < y, x > y) == (a == b, a < b, a > b)
+        assert eval(repr(x)) == x
+        assert eval(repr(fmt.array([[a, b]]))).shape == (1, 2)
+        assert np.all(eval(repr(fmt.array([[a, b]]))) == fmt.array([[a, b]]))
+
+    @pytest.mark.parametrize("rounding", Rounding)
+    @pytest.mark.parametrize(("base", "precision"), [(2, 1), (2, 3), (3, 1), (3, 2), (10, 1)])
+    def test_each_pair_through_the_operators(self, base: int, precision: int, rounding: Rounding) -> None:
+        fmt = FloatFormat(base, precision, rounding)
+        positive = [
+            m * Fraction(base) ** e for e in range(-3, 4) for m in range(base ** (precision - 1), base**precision)
+        ]
+        numbers = [-x for x in positive] + [Fraction(0), *positive]
+        x = fmt.array(numbers)
+        count = 0
+        for sign, operation in OPERATIONS.items():
+            second = positive if sign == "/" else numbers
+            found = operation(x[:, np.newaxis], fmt.array(second)).to_fractions()
+            for i, a in enumerate(numbers):
+                for j, b in enumerate(second):
+                    assert found[i, j] == oracles.rounded(operation(a, b), base, precision, rounding is NEAREST)
+                    count += 1
+        n = 7 * (base - 1) * base ** (precision - 1)
+        assert count == 3 * (2 * n + 1) ** 2 + (2 * n + 1) * n
+
+
+class TestConversion:
+    @seeded
+    @given(st.data(), st.sampled_from([2, 3, 10, 16]), st.integers(1, 60))
+    def test_to_float_is_nearest(self, data: st.DataObject, base: int, precision: int) -> None:
+        m = data.draw(st.integers(base ** (precision - 1), base**precision - 1)) * data.draw(st.sampled_from([-1, 1]))
+        most = {2: 1100, 3: 700, 10: 340, 16: 280}[base]
+        value = m * Fraction(base) ** (data.draw(st.integers(-most, most)) - precision)
+        x = FloatFormat(base, precision).array(value)
+        try:
+            expected = float(value)  # Fraction divides its integers, correctly rounded; subnormal results too
+        except OverflowError:
+            expected = 0.0
+        if expected:
+            assert x.to_float() == expected
+            assert base != 10 or x.to_float() == float(str(x))
+            assert float(x) == expected
+        else:
+            with pytest.raises(OverflowError, match="within the range of float64"):
+                x.to_float()
+
+    @pytest.mark.parametrize(
+        ("value", "expected"),
+        [
+            (Fraction(2) ** 1024 - Fraction(2) ** 970 - 1, float.fromhex("0x1.fffffffffffffp1023")),
+            (Fraction(2) ** 1024 - Fraction(2) ** 970, None),
+            (Fraction(2) ** -1075, None),  # halfway between zero and the smallest: even is zero
+            (Fraction(2) ** -1075 + Fraction(2) ** -1200, 5e-324),
+            (Fraction(2) ** -1074 * Fraction(3, 2), 1e-323),
+            (Fraction(2) ** 53 + 1, 2.0**53),
+            (Fraction(0), 0.0),
+        ],
+    )
+    def test_edges_of_float64(self, value: Fraction, expected: float | None) -> None:
+        x = FloatFormat(2, 1100).array([value, -value])
+        if expected is None:
+            with pytest.raises(OverflowError, match="within the range of float64"):
+                x.to_float()
+        else:
+            assert x.to_float().tolist() == [expected, -expected]
+
+    def test_kinds_of_result(self) -> None:
+        x = D4.array([["1.5", "-2"], ["0", "1e-3"]])
+        assert x.to_float().dtype == np.float64
+        assert x.to_float().tolist() == [[1.5, -2.0], [0.0, 0.001]]
+        assert x.to_fractions().dtype == object
+        assert x.to_fractions().tolist() == [[Fraction(3, 2), -2], [0, Fraction(1, 1000)]]
+        assert isinstance(x[0, 0].to_fractions(), Fraction)
+        assert isinstance(x[0, 0].to_float(), float)
+        assert np.asarray(x).tolist() == x.to_float().tolist()
+        assert np.asarray(x, dtype=object).tolist() == x.to_fractions().tolist()
+        assert x.astype(float).tolist() == x.to_float().tolist()
+        assert x[0, 0].astype(object).shape == ()
+        assert x[0, 0].astype(object).item() == Fraction(3, 2)
+        assert f"{x[0, 0]:.3f}" == "1.500"
+        assert f"{x[0, 0]}" == "1.5"
+
+    def test_from_another_format(self) -> None:
+        x = FloatFormat(10, 6).array([["1.23455", "-1e1000000000"]])
+        assert str(D4.array(x)) == "[[         1.235 -1e+1000000000]]"
+        assert D4.array(D4.array(x)) is not x
+        assert str(FloatFormat(10, 3, CHOP).array(x[:, :1])) == "[[1.23]]"
+        assert B8.array(x[0, 0]).to_fractions() == Fraction(158, 128)
+        assert D4.array(B8.array([0.1])).to_fractions().tolist() == [Fraction("0.1001")]
+        assert np.all(D4.array([D4.array([1, 2]), [3, B8.array(4)]]) == D4.array([[1, 2], [3, 4]]))
+
+    @pytest.mark.parametrize(
+        "values",
+        [[1, 2], (1, 2), range(1, 3), np.array([1, 2]), np.array([1.0, 2.0]), np.array(["1", "2"]), ["1", Decimal(2)],
+         np.array([1, Fraction(2)], dtype=object), [np.array(1), np.float32(2)], np.array([1, 2], dtype=np.longdouble),
+         np.array(["1", "2"], dtype=np.dtypes.StringDType())],
+    )  # fmt: skip
+    def test_containers(self, values: Any) -> None:
+        assert np.array_equal(D4.array(values), D4.array(["1", "2"]))
+
+    def test_shapes(self) -> None:
+        assert D4.array(1).shape == ()
+        assert D4.array([]).shape == (0,)
+        assert D4.array([[], []]).shape == (2, 0)
+        assert D4.array(np.zeros((2, 0, 3))).shape == (2, 0, 3)
+        assert D4.array([[[1], [2]]]).shape == (1, 2, 1)
+
+
+class TestText:
+    def test_columns_are_aligned(self) -> None:
+        x = D4.array([["3.235", "-1.234"], ["1000", "1e-7"]])
+        assert repr(x).splitlines() == [
+            "FloatFormat(base=10, precision=4, rounding=Rounding.NEAREST).array([[ '3.235', '-1.234'],",
+            "                                                                    [  '1000',   '1e-7']])",
+        ]
+        assert str(x).splitlines() == ["[[ 3.235 -1.234]", " [  1000   1e-7]]"]
+
+    @pytest.mark.parametrize("fmt", [D4, B8, FloatFormat(3, 5, CHOP), FloatFormat(16, 1, CHOP)])
+    @pytest.mark.parametrize("shape", [(), (1,), (0,), (2, 3), (0, 3), (3, 0), (2, 1, 2), (40,)])
+    def test_repr_makes_the_array_again(self, fmt: FloatFormat, shape: tuple[int, ...]) -> None:
+        x = fmt.array(np.random.default_rng(7).normal(size=shape) * 10.0 ** np.random.default_rng(8).integers(-9, 9))
+        again = eval(repr(x))
+        assert again.format == fmt
+        assert again.shape == shape
+        assert np.all(again == x)
+
+    def test_notation(self) -> None:
+        values = ["0", "1", "1e15", "1e16", "1.2e16", "1e-4", "1.2e-5", "-0.05", "120"]
+        found = [str(D4.array(v)) for v in values]
+        assert found == ["0", "1", "1000000000000000", "1e+16", "1.2e+16", "0.0001", "1.2e-5", "-0.05", "120"]
+
+    def test_digits_are_the_nearest_or_chop_to_the_number(self) -> None:
+        # 171 / 512 = 0.333984375 in five digits
+        assert str(B8.array("1/3")) == "0.33398"
+        assert str(FloatFormat(2, 8, CHOP).array(Fraction(171, 512))) == "0.33399"
+
+    def test_a_value_too_far_for_decimal_digits_has_a_repr_too(self) -> None:
+        x = B8.array(3)
+        for _ in range(30):
+            x = x * x
+        assert "*2**" in repr(x)
+
+    def test_long_arrays_are_shortened(self) -> None:
+        assert str(D4.array(range(2000))) == "[   0    1    2 ... 1997 1998 1999]"
+
+
+class TestArithmetic:
+    X = D4.array([["1.5", "-2", "0.25"], ["3", "4", "-0.5"]])
+
+    @pytest.mark.parametrize(
+        "other",
+        [2, 0.5, "0.5", Decimal("0.5"), Fraction(1, 2), np.float64(2), np.int64(2), np.array(2), [2, "4", 0.5],
+         np.array([2, 4, 8]), np.array([[2.0], [0.5]]), [[1], [2]], (4, 2, 1)],
+    )  # fmt: skip
+    def test_plain_operands_on_either_side(self, other: Any) -> None:
+        y = D4.array(other)
+        for operation in OPERATIONS.values():
+            for found, expected in (
+                (operation(self.X, other), operation(self.X, y)),
+                (operation(other, self.X), operation(y, self.X)),
+            ):
+                assert isinstance(found, FloatArray)
+                assert found.format == D4
+                assert found.shape == expected.shape == (2, 3)
+                assert np.all(found == expected)
+        for comparison in (operator.eq, operator.ne, operator.lt, operator.le, operator.gt, operator.ge):
+            assert np.array_equal(comparison(self.X, other), comparison(self.X, y))
+            assert np.array_equal(comparison(other, self.X), comparison(y, self.X))
+
+    def test_broadcasting_against_loops(self) -> None:
+        rng = np.random.default_rng(11)
+        for a_shape, b_shape in [((3,), ()), ((2, 1), (3,)), ((2, 1, 3), (4, 1)), ((1,), (0,)), ((), ())]:
+            x, y = B8.array(rng.normal(size=a_shape)), B8.array(rng.normal(size=b_shape))
+            for operation in OPERATIONS.values():
+                found = operation(x, y)
+                assert found.shape == np.broadcast_shapes(a_shape, b_shape)
+                a = np.broadcast_to(x.to_fractions(), found.shape)
+                b = np.broadcast_to(y.to_fractions(), found.shape)
+                for index in np.ndindex(found.shape):
+                    exact = operation(Fraction(a[index]), Fraction(b[index]))
+                    assert found[index].to_fractions() == oracles.rounded(exact, 2, 8, True)
+
+    def test_signs(self) -> None:
+        x = D4.array(["1.5", "-2", "0"])
+        assert str(-x) == "[-1.5    2    0]"
+        assert str(abs(x)) == "[1.5   2   0]"
+        assert +x is x
+        assert str(np.negative(x)) == str(-x)
+        assert str(np.abs(x)) == str(np.fabs(x)) == str(abs(x))
+
+    def test_numpy_functions(self) -> None:
+        x, y = self.X, self.X * 2
+        for name, expected in {"add": x + y, "subtract": x - y, "multiply": x * y, "divide": x / y}.items():
+            assert np.all(getattr(np, name)(x, y) == expected)
+            assert np.all(getattr(np, name)(x.to_float(), y) == expected)
+        assert np.all(np.square(x) == x * x)
+        assert np.positive(x) is x
+        assert np.all(np.sqrt(x * x) == abs(x))
+        for name in ("equal", "not_equal", "less", "less_equal", "greater", "greater_equal"):
+            assert np.array_equal(getattr(np, name)(x, y), getattr(np, name)(x.to_float(), y.to_float()))
+        assert np.all(np.matmul(x, y.T) == x @ y.T)
+        assert np.all(np.dot(x, y.T) == x @ y.T)
+        assert np.all(np.dot(x, 2) == x * 2)
+        assert np.all(np.outer(x[0], y[1]) == x[0][:, np.newaxis] * y[1])
+        assert np.array_equal(x, x[:, :])
+        assert not np.array_equal(x, x[:1])
+        assert not np.array_equal(x, y)
+        assert (np.shape(x), np.ndim(x), np.size(x)) == ((2, 3), 2, 6)
+
+    def test_moving_entries(self) -> None:
+        x, f = self.X, self.X.to_float()
+        for move in (
+            np.transpose, np.ravel, np.squeeze, np.atleast_2d, np.atleast_1d, np.diag, np.diagonal, np.tril, np.triu,
+            np.flip, np.copy, np.vstack, np.hstack, np.concatenate, np.stack,
+            lambda a: np.reshape(a, (3, 2)), lambda a: np.expand_dims(a, 1), lambda a: np.broadcast_to(a, (2, 2, 3)),
+            lambda a: np.swapaxes(a, 0, 1), lambda a: np.moveaxis(a, 0, 1), lambda a: np.roll(a, 1, axis=1),
+            lambda a: np.repeat(a, 2, axis=0), lambda a: np.tile(a, (2, 2)), lambda a: np.take(a, [1, 0], axis=1),
+            lambda a: np.concatenate([a, a[:1]]), lambda a: np.concatenate([a, a], axis=1),
+            lambda a: np.stack([a, a], axis=1), lambda a: np.vstack([a, [1, 2, 3]]), lambda a: np.hstack((a, a)),
+            lambda a: np.where(a > 0, a, 0), lambda a: np.where([True, False, True], 1, a), lambda a: np.diag(a[0]),
+            lambda a: a.T, lambda a: a.reshape(-1), lambda a: a.reshape(3, 2), lambda a: a.reshape((6, 1)),
+        ):  # fmt: skip
+            if move in (np.vstack, np.hstack, np.concatenate, np.stack):
+                found, expected = move([x, x]), move([f, f])
+            else:
+                found, expected = move(x), move(f)
+            assert isinstance(found, FloatArray)
+            assert found.format == D4
+            assert np.array_equal(found.to_float(), expected)
+
+    @pytest.mark.parametrize(
+        "index",
+        [0, -1, (0, 1), slice(None, None, 2), (slice(None), 1), (..., 0), None, (np.newaxis, 0), [1, 0], [0, 0],
+         ([0, 1], [2, 0]), np.array([True, False]), [[True, False, True], [False, True, False]], slice(0, 0), (), ...],
+    )  # fmt: skip
+    def test_indexing(self, index: Any) -> None:
+        if isinstance(index, list) and isinstance(index[0], list):
+            index = np.array(index)
+        found = self.X[index]
+        assert isinstance(found, FloatArray)
+        assert np.array_equal(found.to_float(), self.X.to_float()[index])
+
+    def test_sums_run_from_left_to_right(self) -> None:
+        # In another order: 1000 + (0.4 + 0.4) = 1001.
+        x = D4.array(["1000", "0.4", "0.4"])
+        assert str(x.sum()) == "1000"
+        assert str(x[::-1].sum()) == "1001"
+        assert str(D4.array(["1.001", "1.001", "1000"]).prod()) == "1002"
+        rng = np.random.default_rng(3)
+        x = B8.array(rng.normal(size=(4, 3, 2)))
+        arithmetic = oracles.Arithmetic(2, 8, True)
+        f = x.to_fractions()
+        for axis in (0, 1, 2, -1):
+            expected = np.apply_along_axis(lambda line: [arithmetic.total(list(line))], axis, f).squeeze(axis)
+            for found in (x.sum(axis), x.sum(axis=axis), np.sum(x, axis), np.add.reduce(x, axis=axis)):
+                assert found.to_fractions().tolist() == expected.tolist()
+        assert x.sum().to_fractions() == np.sum(x).to_fractions() == arithmetic.total(list(f.reshape(-1)))
+        assert np.all(np.add.reduce(x) == x.sum(0))
+        assert np.all(np.multiply.reduce(x, axis=1) == np.prod(x, axis=1))
+        assert np.all(np.prod(x, axis=1) == x[:, 0] * x[:, 1] * x[:, 2])
+
+    def test_sums_of_nothing(self) -> None:
+        assert D4.array([]).sum() == 0
+        assert D4.array([]).prod() == 1
+        assert np.all(D4.array(np.zeros((0, 3))).sum(0) == D4.array([0, 0, 0]))
+        assert np.all(D4.array(np.zeros((0, 3))).prod(0) == D4.array([1, 1, 1]))
+        assert D4.array(np.zeros((3, 0))).sum(0).shape == (0,)
+        assert D4.array(5).sum() == 5
+
+    def test_python_sum_and_in(self) -> None:
+        assert sum(D4.array([1, 2, 3])) == 6
+        assert "1.5" in self.X
+        assert 7 not in self.X
+
+    def test_iteration(self) -> None:
+        rows = list(self.X)
+        assert [row.shape for row in rows] == [(3,), (3,)]
+        assert np.all(np.stack(rows) == self.X)
+        assert len(self.X) == 2
+
+    def test_truth_and_float(self) -> None:
+        assert D4.array(1)
+        assert not D4.array(0)
+        assert D4.array([["-1"]])
+        assert float(D4.array(["0.5"])) == 0.5
+
+    def test_copies(self) -> None:
+        x = self.X[:, ::2].T
+        for y in (copy.copy(x), copy.deepcopy(x), pickle.loads(pickle.dumps(x))):
+            assert isinstance(y, FloatArray)
+            assert y.format == x.format
+            assert np.array_equal(x, y)
+            assert not y._m.flags.writeable
+            assert not y._e.flags.writeable
+
+    def test_input_is_not_shared(self) -> None:
+        values = np.array([1, 2], dtype=object)
+        x = D4.array(values)
+        values[0] = 9
+        assert np.array_equal(x, [1, 2])
+        f = x.to_fractions()
+        f[0] = Fraction(9)
+        x.to_float()[0] = 9.0
+        assert np.array_equal(x, [1, 2])
+
+    def test_nothing_writes_into_an_array_or_its_views(self) -> None:
+        for x in (self.X, self.X[0], self.X.T, self.X.reshape(-1), np.broadcast_to(self.X[0], (2, 3)), self.X + 1):
+            assert not x._m.flags.writeable
+            assert not x._e.flags.writeable
+            with pytest.raises(TypeError, match="does not change"):
+                x[0] = 1
+            with pytest.raises(TypeError, match="does not change"):
+                del x[0]
+        y = x = self.X
+        x += 1
+        assert np.array_equal(y, self.X)
+        assert x is not y
+        for name in ("shape", "format", "T", "anything"):
+            with pytest.raises(AttributeError):
+                setattr(x, name, None)
+
+    def test_not_hashable(self) -> None:
+        with pytest.raises(TypeError, match="unhashable"):
+            hash(self.X)
+
+
+class TestMatmul:
+    @pytest.mark.parametrize("fmt", [D4, B8, FloatFormat(3, 4, CHOP)])
+    def test_against_loops(self, fmt: FloatFormat) -> None:
+        rng = np.random.default_rng(5)
+        arithmetic = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
+        for m, n, p in [(1, 1, 1), (2, 3, 4), (3, 5, 1), (1, 6, 2), (4, 4, 4)]:
+            a, b = fmt.array(rng.normal(size=(m, n))), fmt.array(rng.normal(size=(n, p)))
+            expected = arithmetic.matmul(a.to_fractions().tolist(), b.to_fractions().tolist())
+            assert (a @ b).to_fractions().tolist() == expected
+            assert (a @ b[:, 0]).to_fractions().tolist() == [row[0] for row in expected]
+            assert (a[0] @ b).to_fractions().tolist() == expected[0]
+            assert (a[0] @ b[:, 0]).to_fractions() == expected[0][0]
+
+    def test_stacks(self) -> None:
+        rng = np.random.default_rng(6)
+        for a_shape, b_shape in [
+            ((5, 2, 3), (3, 4)),
+            ((2, 3), (5, 3, 4)),
+            ((5, 1, 2, 3), (6, 3, 4)),
+            ((5, 2, 3), (3,)),
+            ((3,), (5, 3, 4)),
+        ]:
+            a, b = D4.array(rng.normal(size=a_shape)), D4.array(rng.normal(size=b_shape))
+            found = a @ b
+            assert found.shape == np.matmul(a.to_float(), b.to_float()).shape
+            stack = np.broadcast_shapes(a_shape[:-2], b_shape[:-2])
+            for index in np.ndindex(stack):
+                left = a if a.ndim <= 2 else np.broadcast_to(a, (*stack, *a_shape[-2:]))[index]
+                right = b if b.ndim <= 2 else np.broadcast_to(b, (*stack, *b_shape[-2:]))[index]
+                assert np.array_equal(found[index], left @ right)
+
+    def test_of_nothing(self) -> None:
+        for a_shape, b_shape in [((2, 0), (0, 3)), ((0,), (0,)), ((0, 2), (2, 3)), ((4, 2, 0), (0, 3))]:
+            a, b = D4.array(np.zeros(a_shape)), D4.array(np.zeros(b_shape))
+            expected = np.zeros(a_shape) @ np.zeros(b_shape)
+            assert (a @ b).shape == expected.shape
+            assert np.all(a @ b == 0)
+
+    def test_plain_operands(self) -> None:
+        x = D4.array([[1, 2], [3, 4]])
+        for found in (x @ [1, 2], x @ np.array([1, 2])):
+            assert np.array_equal(found, [5, 11])
+        for found in ([1, 2] @ x, np.array([1, 2]) @ x):
+            assert np.array_equal(found, [7, 10])
+
+
+def rows(n: int) -> FloatArray:
+    return D4.array(np.arange(1, n * n + 1).reshape(n, n))
+
+
+V, W = D4.array(["1.5", "-2", "0"]), B8.array([1, 2, 3])
+ONE, NAN = np.ones((2, 2)), float("nan")
+HUGE, TINY = D4.array(["1", "1e400"]), D4.array(["-1e-400"])
+
+BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
+    # numbers
+    ("nan", lambda: D4.array([1.0, NAN]), ValueError, "entry [1]: got nan; needed a finite number; remove or replace"),
+    ("inf", lambda: D4.round(float("-inf")), ValueError, "got -inf; needed a finite number; remove or replace"),
+    ("nan str", lambda: D4.round("NaN"), ValueError, "got 'NaN'; needed a finite number"),
+    ("inf str", lambda: D4.round("-Infinity"), ValueError, "got '-Infinity'; needed a finite number"),
+    ("inf Decimal", lambda: D4.round(Decimal("inf")), ValueError, "got Infinity; needed a finite number"),
+    ("nan float32", lambda: D4.array(np.float32("nan")), ValueError, "got nan; needed a finite number"),
+    ("inf array", lambda: D4.array([[1, 2], [3, np.inf]]), ValueError, "entry [1, 1]: got inf; needed a finite"),
+    ("complex", lambda: D4.round(1 + 2j), TypeError, "got (1+2j) of type complex; needed a str, int, float, Decimal"),
+    ("complex dtype", lambda: D4.array(ONE * 1j), TypeError, "got an array of dtype complex128; needed integers"),
+    ("None", lambda: D4.array([1, None]), TypeError, "entry [1]: got None of type NoneType; needed a str, int"),
+    ("bytes", lambda: D4.array([b"1"]), TypeError, "entry [0]: got b'1' of type bytes; needed a str, int"),
+    ("bytearray", lambda: D4.array(bytearray(b"1")), TypeError, "of type bytearray; needed a str, int"),
+    ("bool", lambda: D4.array([True]), TypeError, "entry [0]: got the truth value True; needed a str, int, float, De"),
+    ("bool dtype", lambda: D4.array(ONE == 1), TypeError, "got an array of dtype bool; needed integers, floats, str"),
+    ("comma", lambda: D4.array("1,5"), ValueError, "got '1,5'; needed a number such as '765.4567', '1e-3' or '1/3', w"),
+    ("empty str", lambda: D4.round(""), ValueError, "got ''; needed a number such as"),
+    ("hexadecimal", lambda: D4.round("0x10"), ValueError, "got '0x10'; needed a number such as"),
+    ("separators", lambda: D4.round("1_000"), ValueError, "with a point as decimal mark and no separators"),
+    ("zero denominator", lambda: D4.round("1/0"), ValueError, "got '1/0'; needed a denominator other than zero"),
+    ("date", lambda: D4.round(date(2026, 1, 1)), TypeError, "got datetime.date(2026, 1, 1) of type date; needed"),
+    ("array to round", lambda: D4.round(ONE), TypeError, "of type ndarray; needed a str, int, float"),
+    ("datetime", lambda: D4.array(np.array(["2026-01-01"], "M8[D]")), TypeError, "got an array of dtype datetime64[D]"),
+    ("NaT", lambda: D4.round(np.timedelta64("NaT")), TypeError, "of type timedelta64; needed a str, int"),
+    ("structured", lambda: D4.array(np.zeros(2, "i4,f8")), TypeError, "needed integers, floats, strings, or objects"),
+    ("far in base 2", lambda: B8.array("1e99999999"), OverflowError, "got a decimal exponent of 99999999; needed at m"),
+    # containers
+    ("ragged", lambda: D4.array([[1, 2], [3]]), ValueError, "got nested lists with parts of shapes (1,), (2,); needed"),
+    ("ragged deep", lambda: D4.array([[[1], 2]]), ValueError, "parts of shapes (), (1,); needed parts of one shape; f"),
+    ("masked", lambda: D4.array(np.ma.array([1, 2])), TypeError, "got a masked array; needed every entry; fill it fir"),
+    ("dict", lambda: D4.array({1: 2}), TypeError, "got a dict; needed a number, list or array; make it a list first"),
+    ("set", lambda: D4.array({1, 2}), TypeError, "got a set; needed a number, list or array; make it a list first"),
+    ("generator", lambda: D4.array(i for i in "12"), TypeError, "got a generator; needed a number, list or array; mak"),
+    ("object", lambda: D4.array(Rounding), TypeError, "needed a str, int, float, Decimal or Fraction"),
+    ("no format", lambda: FloatArray(), TypeError, "needed a format; write fmt.array(values)"),  # type: ignore[call-arg]
+    # formats
+    ("base 1", lambda: FloatFormat(1, 4), ValueError, "base: got 1; needed an int of at least 2"),
+    ("base -2", lambda: FloatFormat(-2, 4), ValueError, "base: got -2; needed an int of at least 2"),
+    ("base 2.0", lambda: FloatFormat(2.0, 4), TypeError, "base: got 2.0 of type float; needed an int of at least 2"),
+    ("base True", lambda: FloatFormat(True, 4), TypeError, "base: got True of type bool; needed an int of at least 2"),
+    ("base str", lambda: FloatFormat("10", 4), TypeError, "base: got '10' of type str; needed an int of at least 2"),
+    ("precision 0", lambda: FloatFormat(10, 0), ValueError, "precision: got 0; needed an int of at least 1"),
+    ("precision 2.5", lambda: FloatFormat(10, 2.5), TypeError, "precision: got 2.5 of type float; needed an int of at"),
+    ("precision vast", lambda: FloatFormat(2, 10**12), ValueError, "precision: got 1000000000000 digits; needed at mo"),
+    ("rounding str", lambda: FloatFormat(10, 4, "nearest"), TypeError,
+     "rounding: got 'nearest' of type str; needed Rounding.NEAREST or Rounding.CHOP"),
+    # operands
+    ("mixed +", lambda: V + W, ValueError, f"got operands in {D4} and {B8}; needed one format; convert one of them"),
+    ("mixed @", lambda: V @ W, ValueError, f"got operands in {D4} and {B8}; needed one format"),
+    ("mixed ==", lambda: V == W, ValueError, f"got operands in {D4} and {B8}; needed one format"),
+    ("mixed np.add", lambda: np.add(V, W), ValueError, f"got operands in {D4} and {B8}; needed one format"),
+    ("mixed where", lambda: np.where([True], V, W), ValueError, f"got operands in {D4} and {B8}; needed one format"),
+    ("mixed concatenate", lambda: np.concatenate([V, W]), ValueError, "needed one format; convert one of them"),
+    ("mixed rounding", lambda: V - FloatFormat(10, 4, CHOP).array(1), ValueError, "needed one format; convert one"),
+    ("mixed solve", lambda: linalg.solve(rows(1), W[:1]), ValueError, "needed one format; convert one of them"),
+    ("not representable", lambda: W + 0.1, ValueError,
+     f"got the operand 0.1; needed a number that {B8} holds exactly; round it first: fmt.array(...)"),
+    ("not representable, left", lambda: np.array([1, 257, 3]) * W, ValueError, "entry [1]: got the operand 257; neede"),
+    ("not representable, ==", lambda: V == 0.1, ValueError, "got the operand 0.1; needed a number that"),
+    ("no number", lambda: V + None, TypeError, "got None of type NoneType; needed a str, int, float, Decimal or Fract"),
+    ("no number, ==", lambda: V == "a", ValueError, "got 'a'; needed a number such as"),
+    ("bool operand", lambda: V * True, TypeError, "got the truth value True; needed"),
+    ("broadcast", lambda: V + V[:2], ValueError, "add: got operands of shapes (3,) and (2,); needed shapes that broad"),
+    ("broadcast ==", lambda: V[:2] == V, ValueError, "compare: got operands of shapes (2,) and (3,); needed shapes"),
+    ("broadcast where", lambda: np.where([True, False], V, 0), ValueError, "where: got operands of shapes (2,) and (3"),
+    ("interface", lambda: rows(3) @ rows(2), ValueError,
+     "matmul: got shapes (3, 3) and (2, 2), so 3 columns against 2 rows; needed as many; transpose or reshape one"),
+    ("stacks", lambda: D4.array(np.ones((2, 1, 1))) @ D4.array(np.ones((3, 1, 1))), ValueError, "matmul: got operands"),
+    ("scalar matmul", lambda: V @ 2, ValueError, "matmul: got shapes (3,) and (); needed at least one axis each; use"),
+    ("dot of stacks", lambda: np.dot(D4.array([ONE]), D4.array(ONE)), ValueError, "needed at most two axes each; use"),
+    ("division", lambda: 1 / V, ZeroDivisionError, "got a division by zero at [2] of the divisor; needed a divisor ot"),
+    ("division, one", lambda: V / 0, ZeroDivisionError, "got a division by zero; needed a divisor other than zero; te"),
+    ("negative root", lambda: np.sqrt(V), ValueError, "got the square root of a negative number at [1]; needed x >= 0"),
+    ("power", lambda: V**2, TypeError, "got x ** y of a FloatArray; needed + - * / @ or np.sqrt, each rounded once; w"),
+    ("power, right", lambda: 2**V, TypeError, "got x ** y of a FloatArray"),
+    ("remainder", lambda: V % 2, TypeError, "unsupported operand type(s) for %: 'FloatArray' and 'int'"),
+    # use of an array
+    ("assignment", lambda: operator.setitem(V, 0, 1), TypeError, "got a change of an entry; needed none, a Float"),
+    ("truth", lambda: bool(V), ValueError, "got the truth value of a FloatArray of shape (3,); needed one number; com"),
+    ("float", lambda: float(V), TypeError, "got float() of a FloatArray of shape (3,); needed one number; use x.to_fl"),
+    ("len", lambda: len(V[0]), TypeError, "got a FloatArray of a single number; needed one with a length"),
+    ("iteration", lambda: iter(V[0]), TypeError, "got a FloatArray of a single number; needed one with a length"),
+    ("index", lambda: V[3], IndexError, "index 3 is out of bounds for axis 0 with size 3"),
+    ("index kind", lambda: V[0.5], IndexError, "only integers, slices (`:`), ellipsis"),
+    ("reshape", lambda: V.reshape(2, 2), ValueError, "cannot reshape array of size 3 into shape (2,2)"),
+    ("axis", lambda: V.sum(1), np.exceptions.AxisError, "axis 1 is out of bounds for array of dimension 1"),
+    ("axes", lambda: V.sum((0, 1)), TypeError, "axis: got (0, 1); needed an int or None; reduce one axis after the ot"),
+    ("overflow", lambda: HUGE.to_float(), OverflowError,
+     "got a number of about 10**400; needed one within the range of float64, 2**-1074 to 2**1024; scale it, or use"),
+    ("underflow", lambda: TINY.to_float(), OverflowError, "got a number of about 10**-400; needed one within the rang"),
+    ("overflow, protocol", lambda: np.asarray(HUGE), OverflowError, "got a number of about 10**400"),
+    ("too long", lambda: D4.round("1e99999999"), OverflowError, "got a number of about 10**99999999; needed an expone"),
+    ("astype int", lambda: V.astype(int), TypeError, "got a conversion to dtype int64; needed float64 (nearest) or ob"),
+    ("float32", lambda: np.asarray(V, dtype=np.float32), TypeError, "got a conversion to dtype float32; needed float6"),
+    ("no copy", lambda: np.array(V, copy=False), ValueError, "got copy=False; needed True or None"),
+    # NumPy
+    ("np.exp", lambda: np.exp(V), TypeError, "got np.exp of a FloatArray; needed one of absolute, add, divide,"),
+    ("np.power", lambda: np.float64(2) ** V, TypeError, "got np.power of a FloatArray; needed one of absolute, add"),
+    ("out", lambda: np.add(V, V, out=np.zeros(3)), TypeError, "got np.add with out of a FloatArray; needed one of"),
+    ("in place", lambda: operator.iadd(np.zeros(3), V), TypeError, "got np.add with out of a FloatArray; needed one"),
+    ("outer", lambda: np.add.outer(V, V), TypeError, "got np.add.outer of a FloatArray; needed one of"),
+    ("np.mean", lambda: np.mean(V), TypeError, "got np.mean of a FloatArray; needed one of array_equal, atleast_1d,"),
+    ("np.linalg", lambda: np.linalg.inv(rows(2)), TypeError, "for linear algebra see gpbnb.linalg; or convert: x.to_f"),
+    ("keepdims", lambda: np.sum(V, keepdims=True), TypeError, "np.sum of a FloatArray: got an unexpected keyword argu"),
+    ("keepdims reduce", lambda: np.add.reduce(V, keepdims=True), TypeError, "got np.add.reduce with keepdims of a Fl"),
+    ("dtype", lambda: np.concatenate([V, V], dtype=float), TypeError, "got np.concatenate of a FloatArray with dtype;"),
+    ("place", lambda: np.transpose(a=V), TypeError, "got np.transpose with a FloatArray in an unexpected place; neede"),
+    ("condition", lambda: np.where(V, V, V), TypeError, "where: got a FloatArray as condition; needed booleans; compa"),
+    # linear algebra
+    ("dot of matrices", lambda: linalg.dot(rows(2), rows(2)), ValueError, "x: got shape (2, 2); needed 1 axis, (n,)"),
+    ("dot of lists", lambda: linalg.dot([1], V), TypeError, "x: got list; needed a FloatArray; write fmt.array(x)"),
+    ("matmul of array", lambda: linalg.matmul(V, ONE), TypeError, "b: got ndarray; needed a FloatArray; write fmt.arr"),
+    ("lu of array", lambda: linalg.lu(ONE), TypeError, "a: got ndarray; needed a FloatArray; write fmt.array(a)"),
+    ("solve with list", lambda: linalg.solve(rows(2), [1, 2]), TypeError, "b: got list; needed a FloatArray; write fm"),
+    ("not square", lambda: linalg.inv(D4.array([[1, 2]])), ValueError, "a: got shape (1, 2); needed a square matrix ("),
+    ("empty matrix", lambda: linalg.lu(D4.array(np.ones((0, 0)))), ValueError, "a: got shape (0, 0); needed a square"),
+    ("right-hand side", lambda: linalg.solve(rows(2), V), ValueError, "b: got shape (3,) with a of shape (2, 2); need"),
+    ("singular", lambda: linalg.inv(D4.array(ONE), pivot=True), np.linalg.LinAlgError,
+     "got a zero pivot in column 2 of 2; needed one other than zero; the matrix is singular in this format; use more"),
+    ("needs pivoting", lambda: linalg.lu(D4.array([[0, 1], [1, 0]])), np.linalg.LinAlgError,
+     "got a zero pivot in column 1 of 2; needed one other than zero; try pivot=True; if that fails too, the matrix is"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "kind", "message"), [pytest.param(*case[1:], id=case[0]) for case in BAD])
+def test_bad_input(call: Callable[[], Any], kind: type[Exception], message: str) -> None:
+    before = [repr(x) for x in (V, W, HUGE, TINY)], ONE.tolist()
+    with pytest.raises(Exception) as caught:  # noqa: PT011 (the kind and the message are compared exactly below)
+        call()
+    assert caught.type is kind
+    assert message in str(caught.value)
+    assert ([repr(x) for x in (V, W, HUGE, TINY)], ONE.tolist()) == before

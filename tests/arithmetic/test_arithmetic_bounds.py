@@ -1,0 +1,190 @@
+"""gpbnb.arithmetic.bounds: norms and error constants, exact."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.bounds import (
+    column_sum_norm,
+    exact,
+    gamma,
+    gamma_probabilistic,
+    integers,
+    inverse_of,
+    max_norm,
+    row_sum_norm,
+)
+from gpbnb.arithmetic.formats import FloatFormat
+
+A = [[1, -2, 3], [-4, 5, Fraction(1, 2)]]
+
+
+def matrices(seed, *shapes):
+    rng = np.random.default_rng(seed)
+    return [rng.integers(-9, 10, shape).astype(object) for shape in shapes]
+
+
+def test_exact_keeps_every_digit():
+    values = ["0.1", 0.1, Decimal("1e-30"), Fraction(1, 3), 7, np.float64(0.5), np.float32(0.1), np.int8(-3)]
+    expected = [
+        Fraction(1, 10),
+        Fraction(0.1),
+        Fraction(1, 10**30),
+        Fraction(1, 3),
+        7,
+        Fraction(1, 2),
+        Fraction(float(np.float32(0.1))),
+        -3,
+    ]
+    found = exact(values)
+    assert found.dtype == object
+    assert found.tolist() == expected
+    assert all(type(entry) is Fraction for entry in found)
+    assert exact(0.1).shape == ()
+    assert exact(np.float32(0.5)).item() == Fraction(1, 2)
+
+
+def test_exact_takes_float_arrays_and_keeps_shape():
+    x = FloatFormat(10, 4).array([["765.4567", "1"], ["-2", "0.33333"]])
+    assert exact(x).tolist() == [[Fraction("765.5"), 1], [-2, Fraction("0.3333")]]
+
+
+def test_integers_and_their_unit_are_the_fractions():
+    fractions = exact([["1/6", "-0.25", 7], [0, "1e-3", "-2/9"]])
+    counts, unit = integers(fractions)
+    assert counts.shape == (2, 3)
+    assert all(type(count) is int for count in counts.flat)
+    assert (counts * unit == fractions).all()
+    assert unit == Fraction(1, 9000)
+
+
+def test_an_inverse_is_exact():
+    a = exact([["0.1", "3", "-7"], ["2/3", 0, 1], [5, "1e-6", 4]])
+    inverse = inverse_of(a)
+    assert (a @ inverse == np.eye(3, dtype=int)).all()
+    assert (inverse @ a == np.eye(3, dtype=int)).all()
+    with pytest.raises(ZeroDivisionError):
+        inverse_of([[1, 2], [2, 4]])
+
+
+def test_norms_of_one_matrix():
+    assert max_norm([1, -7, 3]) == 7
+    assert column_sum_norm(A) == 7
+    assert row_sum_norm(A) == Fraction(19, 2)
+    assert column_sum_norm(np.array(A, dtype=object).T) == row_sum_norm(A)
+
+
+def test_norms_of_nothing_are_zero():
+    assert max_norm([]) == column_sum_norm(np.zeros((0, 2))) == column_sum_norm(np.zeros((2, 0))) == 0
+    assert row_sum_norm(np.zeros((2, 0))) == row_sum_norm(np.zeros((0, 2))) == 0
+
+
+def test_both_matrix_norms_are_submultiplicative():
+    for seed in range(100):
+        a, b = matrices(seed, (2, 3), (3, 4))
+        for norm in (column_sum_norm, row_sum_norm):
+            assert norm(a @ b) <= norm(a) * norm(b)
+
+
+def test_row_sums_go_with_21_and_are_the_least_that_do():
+    for seed in range(100):
+        a, x = matrices(seed, (3, 4), (4,))
+        assert max_norm(a @ x) <= row_sum_norm(a) * max_norm(x)
+    for (a,) in (matrices(seed, (3, 4)) for seed in range(20)):
+        signs = itertools.product((-1, 1), repeat=4)
+        assert max(max_norm(a @ np.array(x, dtype=object)) for x in signs) == row_sum_norm(a)
+
+
+def test_column_sums_of_22_do_not_go_with_21():
+    a, x = [[1, 1], [0, 0]], [1, 1]
+    product = max_norm(np.array(a) @ np.array(x))
+    assert product == 2 > column_sum_norm(a) * max_norm(x) == 1
+    # The quotient is as large as the number of columns.
+    row = np.ones((1, 9), dtype=int)
+    assert max_norm(row @ np.ones(9, dtype=int)) == 9 * column_sum_norm(row)
+
+
+def test_gamma_by_its_formula():
+    assert gamma(0, Fraction(1, 2)) == 0
+    assert gamma(3, Fraction(1, 2000)) == Fraction(3, 2000) / (1 - Fraction(3, 2000))
+    assert gamma(1, Fraction(1, 2)) == 1
+    assert gamma(2, 0.125) == Fraction(1, 3)
+
+
+def test_gamma_bounds_every_product_of_errors_and_their_inverses():
+    for beta in (Fraction(1, 20), Fraction(1, 8), Fraction(1, 3)):
+        for n in range(1, math.ceil(1 / beta)):
+            bound = gamma(n, beta)
+            # The extremes: each factor is convex in its error, and errors are at an end of their interval.
+            low, high = (1 - beta) ** n, 1 / (1 - beta) ** n
+            assert 1 - low <= bound
+            assert high - 1 <= bound
+            assert (1 + beta) ** n - 1 <= bound
+            assert gamma(n, beta) > n * beta
+    assert gamma(1, Fraction(1, 3)) == 1 / (1 - Fraction(1, 3)) - 1  # reached for one division
+
+
+def failure_of(n, u, bound):
+    """The probability that the theorem gives to `bound`."""
+    spread = (math.log1p(bound) - n * u * u / (1 - u)) / (math.sqrt(n) * u)
+    return 2 * math.exp(-((spread * (1 - u)) ** 2) / 2)
+
+
+@pytest.mark.parametrize("failure", [0.5, 0.01, 1e-6])
+@pytest.mark.parametrize(("n", "u"), [(1, Fraction(1, 20)), (100, Fraction(1, 2**11)), (10**6, Fraction(1, 2**24))])
+def test_probabilistic_gamma_fails_as_often_as_said(n, u, failure):
+    # The logarithm undoes the exponential: a few units of 2**-53 times the condition of exp(-x**2/2), below 40 here.
+    bound = gamma_probabilistic(n, u, failure)
+    assert failure_of(n, float(u), bound) == pytest.approx(failure, rel=1e-9)
+
+
+def test_probabilistic_gamma_grows_like_the_root():
+    u = Fraction(1, 2**40)
+    # expm1 leaves the linear term; the others are of size u n below 1e-6.
+    assert gamma_probabilistic(10**4, u) / gamma_probabilistic(100, u) == pytest.approx(10, rel=1e-5)
+    assert gamma_probabilistic(0, u) == 0
+    assert gamma_probabilistic(100, u) < gamma(100, u)
+
+
+def test_probabilistic_gamma_in_a_simulation():
+    """Errors of -u and u with equal chance are the worst of those with mean zero."""
+    n, u, failure, trials = 400, 2.0**-8, 0.1, 4000
+    eps = np.random.default_rng(5).choice([-u, u], (trials, n))
+    size = np.sort(abs(np.expm1(np.log1p(eps).sum(axis=1))))
+    share = np.mean(size > gamma_probabilistic(n, Fraction(u), failure))
+    assert share <= failure + 4 * math.sqrt(failure * (1 - failure) / trials)  # four standard errors
+    # Not vacuous: the error that a share of `failure` exceeds is above half of the bound (1.64 of 2.45 deviations).
+    assert size[int((1 - failure) * trials)] > 0.5 * gamma_probabilistic(n, Fraction(u), failure)
+
+
+REFUSED = [
+    (exact, ([1, None],), TypeError, r"entry 1: got None of type NoneType; needed a str, int, float"),
+    (exact, ([[1, "abc"]],), ValueError, r"entry 0, 1: got 'abc'; needed a number such as"),
+    (exact, ([float("nan")],), ValueError, r"entry 0: got nan; needed a finite number; remove or replace"),
+    (exact, ([float("-inf")],), ValueError, r"entry 0: got -inf; needed a finite number"),
+    (exact, ([1j],), TypeError, r"entry 0: got 1j of type complex; needed"),
+    (exact, ([True],), TypeError, r"entry 0: got the truth value True; .*write 1 or 0"),
+    (max_norm, ([[1, 2]],), ValueError, r"got shape \(1, 2\); needed a vector \(n,\)"),
+    (max_norm, (5,), ValueError, r"got shape \(\); needed a vector \(n,\)"),
+    (column_sum_norm, ([1, 2],), ValueError, r"got shape \(2,\); needed a matrix \(m, n\); reshape"),
+    (row_sum_norm, (5,), ValueError, r"got shape \(\); needed a matrix \(m, n\)"),
+    (gamma, (-1, Fraction(1, 4)), ValueError, r"got n = -1, unit roundoff 1/4; needed both at least 0"),
+    (gamma, (1, Fraction(-1, 4)), ValueError, r"got n = 1, unit roundoff -1/4; needed both"),
+    (gamma, (4, Fraction(1, 4)), ValueError, r"got 4 roundings .* 0.25, a product of 1; needed less than 1; use more"),
+    (gamma_probabilistic, (9, Fraction(1, 4), 0), ValueError, r"got failure = 0; needed a probability above 0 and"),
+    (gamma_probabilistic, (9, Fraction(1, 4), 1), ValueError, r"got failure = 1; needed"),
+    (gamma_probabilistic, (-1, Fraction(1, 4)), ValueError, r"got n = -1, unit roundoff 0.25; needed n >= 0"),
+    (gamma_probabilistic, (9, Fraction(1)), ValueError, r"got n = 9, unit roundoff 1.0; .*use more digits"),
+]
+
+
+@pytest.mark.parametrize(("function", "arguments", "error", "message"), REFUSED)
+def test_refused_with_what_came_and_what_was_needed(function, arguments, error, message):
+    with pytest.raises(error, match=message):
+        function(*arguments)

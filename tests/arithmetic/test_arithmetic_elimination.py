@@ -1,0 +1,150 @@
+"""Compiled elimination gives the digits of the loops in gpbnb.arithmetic.linalg, in every format that it serves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels import elimination
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.tags import Double, DoubleDouble
+
+FORMATS = [
+    FloatFormat(base, precision, rounding)
+    for base, precision in ((2, 3), (2, 24), (2, 53), (10, 1), (10, 8), (10, 18), (16, 6))
+    for rounding in Rounding
+]
+each_format = pytest.mark.parametrize("fmt", FORMATS, ids=str)
+each_pivoting = pytest.mark.parametrize("pivot", [False, True], ids=["in order", "pivoting"])
+
+
+def matrices(fmt: FloatFormat) -> Iterator[FloatArray]:
+    """Entries of all sizes, equal ones for the pivoting to choose from, and zeros."""
+    rng = np.random.default_rng([fmt.base, fmt.precision])
+    for n in (1, 2, 3, 5, 8):
+        yield fmt.array(rng.normal(size=(n, n)) * 10.0 ** rng.integers(-9, 10, size=(n, n)))
+        yield fmt.array(rng.integers(-2, 3, size=(n, n)))
+        yield fmt.array([[Fraction(1, i + j + 1) for j in range(n)] for i in range(n)])
+
+
+def outcome(function, *arguments):
+    """What a call returns, or how it fails."""
+    try:
+        result = function(*arguments)
+    except np.linalg.LinAlgError as error:
+        return str(error)
+    components = result if isinstance(result, tuple) else (result,)
+    return [part.to_fractions().tolist() if isinstance(part, FloatArray) else part.tolist() for part in components]
+
+
+@each_format
+@each_pivoting
+def test_the_same_digits_and_the_same_errors(fmt: FloatFormat, pivot: bool) -> None:
+    rng = np.random.default_rng(3)
+    failed = solved = 0
+    for a in matrices(fmt):
+        assert isinstance(a.backend, Compiled)
+        b = fmt.array(rng.normal(size=(len(a), 3)))
+        for function, arguments in (
+            (linalg.lu, (a,)),
+            (linalg.inv, (a,)),
+            (linalg.solve, (a, b)),
+            (linalg.solve, (a, b[:, 0])),
+        ):
+            expected = outcome(function, *(x._exactly() for x in arguments), pivot)
+            assert outcome(function, *arguments, pivot) == expected
+            failed += isinstance(expected, str)
+            solved += not isinstance(expected, str)
+    assert solved > 20
+    assert fmt.precision > 3 or failed > 0
+
+
+def test_it_is_the_compiled_loop_that_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = []
+    for name in ("lu", "reduce", "substitute"):
+        function = getattr(elimination, name)
+
+        def spied(*arguments, name=name, function=function):
+            called.append(name)
+            return function(*arguments)
+
+        monkeypatch.setattr(elimination, name, spied)
+    fmt = FloatFormat(2, 24)
+    x = linalg.inv(fmt.array([[2, 1], [1, 3]]))
+    assert called == ["lu", "reduce", "substitute"]
+    assert isinstance(x.backend, Compiled)
+
+
+@each_pivoting
+@pytest.mark.parametrize("size", ["1e-285", "1e300"])
+def test_beyond_the_range_of_float64_the_exact_loop_goes_on(size: str, pivot: bool) -> None:
+    fmt = FloatFormat(2, 24)
+    a = fmt.array([[size, "1"], ["1", size]])
+    assert isinstance(a.backend, Compiled)
+    for function in (linalg.lu, linalg.inv):
+        assert outcome(function, a, pivot) == outcome(function, a._exactly(), pivot)
+    b = fmt.array(["1e-200", size])
+    assert outcome(linalg.solve, a, b, pivot) == outcome(linalg.solve, a._exactly(), b._exactly(), pivot)
+
+
+def test_operands_stay() -> None:
+    fmt = FloatFormat(10, 8)
+    a, b = fmt.array([[1, 5], [3, 4]]), fmt.array([[1, 2], [3, 4]])
+    before = str(a), str(b)
+    linalg.solve(a, b, pivot=True)
+    linalg.lu(a, pivot=True).permutation[:] = 7
+    assert (str(a), str(b)) == before
+
+
+def test_mixed_formats_are_refused() -> None:
+    with pytest.raises(ValueError, match="one format"):
+        linalg.solve(FloatFormat(2, 24).array([[2]]), FloatFormat(2, 25).array([3]))
+
+
+def hilbert(n: int) -> np.ndarray:
+    return np.array([[Fraction(1, i + j + 1) for j in range(n)] for i in range(n)], dtype=object)
+
+
+def inverse(tag, a: np.ndarray, identity: np.ndarray) -> np.ndarray:
+    factors, order, x = a.copy(), np.arange(len(a)), identity.copy()
+    assert elimination.lu(tag, factors, order, True) == -1
+    x = x[order]
+    elimination.reduce(tag, factors, x)
+    elimination.substitute(tag, factors, x)
+    return x
+
+
+def test_plain_float64_in_the_same_order() -> None:
+    a = np.random.default_rng(2).normal(size=(7, 7))
+    rows = [[*row, *unit] for row, unit in zip(a.tolist(), np.eye(7).tolist(), strict=True)]
+    for k in range(7):
+        largest = max(range(k, 7), key=lambda i: (abs(rows[i][k]), -i))
+        rows[k], rows[largest] = rows[largest], rows[k]
+        for i in range(k + 1, 7):
+            m = -(rows[i][k] / rows[k][k])
+            rows[i][k + 1 :] = [p + m * q for p, q in zip(rows[i][k + 1 :], rows[k][k + 1 :], strict=True)]
+    for k in reversed(range(7)):
+        for i in range(k + 1, 7):
+            rows[k][7:] = [p - rows[k][i] * q for p, q in zip(rows[k][7:], rows[i][7:], strict=True)]
+        rows[k][7:] = [p / rows[k][k] for p in rows[k][7:]]
+    assert inverse(Double(), a, np.eye(7)).tolist() == [row[7:] for row in rows]
+
+
+def test_double_doubles_have_thirty_digits() -> None:
+    # Higham 2002, theorem 9.4: the error is at most 3n u times |A^-1| |L| |U| |X|, with u = 2**-102; here n = 5 and the
+    # condition number is below 1e6, so that 5 * 3 * 25 * 1e6 * 2**-102 < 2**-70 remains, relative to the largest entry.
+    exact = hilbert(5)
+    wide = FloatFormat(10, 80)
+    reference = linalg.inv(wide.array(exact), pivot=True).to_fractions()
+    found = inverse(DoubleDouble(), double_doubles(exact), double_doubles(np.eye(5, dtype=int).astype(object)))
+    errors = [
+        abs(Fraction(high) + Fraction(low) - x)
+        for (high, low), x in zip(found.reshape(-1, 2).tolist(), reference.ravel(), strict=True)
+    ]
+    assert 0 < max(errors) < max(abs(reference.ravel())) * Fraction(1, 2**70)

@@ -1,0 +1,250 @@
+"""Reading and rounding of single numbers, any base and precision."""
+
+from __future__ import annotations
+
+import pickle
+from decimal import ROUND_DOWN, ROUND_HALF_UP, Context, Decimal
+from fractions import Fraction
+from itertools import pairwise
+
+import gmpy2
+import numpy as np
+import oracles
+import pytest
+import sympy
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding, exact_ratio, prints_as
+
+seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+roundings = st.sampled_from([NEAREST, CHOP])
+bases = st.one_of(st.integers(2, 40), st.sampled_from([2, 10, 16, 60, 1000]))
+formats = st.builds(FloatFormat, bases, st.integers(1, 30), roundings)
+
+
+def oracle(x: Fraction, fmt: FloatFormat) -> Fraction:
+    return oracles.rounded(x, fmt.base, fmt.precision, fmt.rounding is NEAREST)
+
+
+@st.composite
+def hard_to_round(draw: st.DrawFn) -> tuple[Fraction, FloatFormat]:
+    """A number of the format, a tie, a power of the base or a carry; then one a little beside it."""
+    fmt = draw(formats)
+    low, high = fmt.base ** (fmt.precision - 1), fmt.base**fmt.precision
+    m = draw(st.one_of(st.integers(low, high - 1), st.sampled_from([low, high - 1])))
+    part = draw(st.sampled_from([Fraction(0), Fraction(1, 2), Fraction(1), Fraction(1, fmt.base)]))
+    beside = draw(st.sampled_from([-1, 0, 1])) * Fraction(fmt.base) ** -draw(st.integers(1, 60))
+    sign = draw(st.sampled_from([-1, 1]))
+    return sign * (m + part + beside) * Fraction(fmt.base) ** draw(st.integers(-40, 40)), fmt
+
+
+class TestRounding:
+    @pytest.mark.parametrize(
+        ("rounding", "expected"), [(NEAREST, "765.5"), (CHOP, "765.4")], ids=["hung1984 (7)", "hung1984 (13)"]
+    )
+    def test_example_of_the_report(self, rounding: Rounding, expected: str) -> None:
+        assert FloatFormat(10, 4, rounding).round("765.4567") == Fraction(expected)
+
+    @pytest.mark.parametrize("precision", [1, 2, 3])
+    @pytest.mark.parametrize("base", [2, 3, 10])
+    def test_each_gap_between_neighbours(self, base: int, precision: int) -> None:
+        nearest, chop = FloatFormat(base, precision), FloatFormat(base, precision, CHOP)
+        numbers = [
+            m * Fraction(base) ** e for e in range(-4, 4) for m in range(base ** (precision - 1), base**precision)
+        ]
+        count = 0
+        for low, high in pairwise(sorted(numbers)):
+            for part in map(Fraction, ("0", "1/1000000", "0.3", "0.49", "1/2", "0.51", "0.999999")):
+                x = low + part * (high - low)
+                assert chop.round(x) == low
+                assert chop.round(-x) == -low
+                assert nearest.round(x) == (high if part >= Fraction(1, 2) else low)
+                assert nearest.round(-x) == -(high if part >= Fraction(1, 2) else low)
+                count += 4
+        assert count == 28 * (8 * (base - 1) * base ** (precision - 1) - 1)
+
+    @seeded
+    @given(hard_to_round())
+    @example((Fraction(999, 1000), FloatFormat(10, 2)))
+    def test_any_base_against_the_definition(self, case: tuple[Fraction, FloatFormat]) -> None:
+        x, fmt = case
+        assert fmt.round(x) == oracle(x, fmt)
+        assert fmt.round(f"{x.numerator}/{x.denominator}") == fmt.round(x)
+
+    @seeded
+    @given(hard_to_round())
+    def test_relative_error_is_within_unit_roundoff(self, case: tuple[Fraction, FloatFormat]) -> None:
+        x, fmt = case
+        if x:
+            error = abs(fmt.round(x) - x) / abs(x)
+            assert error <= fmt.unit_roundoff if fmt.rounding is NEAREST else error < fmt.unit_roundoff
+
+    @seeded
+    @given(hard_to_round())
+    def test_rounding_again_changes_nothing(self, case: tuple[Fraction, FloatFormat]) -> None:
+        x, fmt = case
+        assert fmt.round(fmt.round(x)) == fmt.round(x)
+        assert fmt.round(-x) == -fmt.round(x)
+
+    @seeded
+    @given(
+        st.from_regex(r"[+-]?([0-9]{1,50}\.?[0-9]{0,50}|\.[0-9]{1,50})([eE][+-]?[0-9]{1,9})?", fullmatch=True),
+        st.integers(1, 40),
+    )
+    def test_decimal_strings_against_decimal(self, text: str, precision: int) -> None:
+        for rounding, name in ((NEAREST, ROUND_HALF_UP), (CHOP, ROUND_DOWN)):
+            context = Context(prec=precision, rounding=name, Emax=10**15, Emin=-(10**15))
+            for value in (text, Decimal(text)):
+                x = FloatFormat(10, precision, rounding).array(value)
+                assert Decimal(str(x)) == context.create_decimal(text)
+
+    @pytest.mark.parametrize("base", [2, 3, 7, 16, 60, 1000])
+    def test_decimal_strings_in_another_base(self, base: int) -> None:
+        for text in ("0.1", "-765.4567", "1e-30", "1e30", "2.5e-1", "12345678901234567890", ".5", "5.", "+7", " 7\n"):
+            for precision in (1, 5, 24):
+                for rounding in Rounding:
+                    fmt = FloatFormat(base, precision, rounding)
+                    assert fmt.round(text) == oracle(Fraction(text.strip()), fmt)
+
+
+class TestInput:
+    THIRD = FloatFormat(3, 40)  # holds no decimal fraction by accident
+
+    @pytest.mark.parametrize(
+        ("value", "exact"),
+        [
+            (0.1, Fraction(0.1)),
+            (-5e-324, Fraction(-1, 2**1074)),
+            (np.float64(0.1), Fraction(0.1)),
+            (np.float32(0.1), Fraction(13421773, 2**27)),
+            (np.float16(0.1), Fraction(1638, 2**14)),
+            (np.longdouble(1) / 3, Fraction(*(np.longdouble(1) / 3).as_integer_ratio())),
+            (np.int8(-7), Fraction(-7)),
+            (np.uint64(2**64 - 1), Fraction(2**64 - 1)),
+            (10**40, Fraction(10**40)),
+            (Fraction(-22, 7), Fraction(-22, 7)),
+            (Decimal("-1.250E-3"), Fraction(-1, 800)),
+            (Decimal("-0"), Fraction(0)),
+            ("1/3", Fraction(1, 3)),
+            ("-6 / 8", Fraction(-3, 4)),
+            (np.str_("2.5"), Fraction(5, 2)),
+            ("0e99999999999", Fraction(0)),
+            (gmpy2.mpq(1, 3), Fraction(1, 3)),
+            (gmpy2.mpz(7), Fraction(7)),
+            (gmpy2.mpfr("0.1"), Fraction(0.1)),
+            (sympy.Rational(2, 7), Fraction(2, 7)),
+            (sympy.Integer(-3), Fraction(-3)),
+        ],
+    )
+    def test_is_read_exactly(self, value: object, exact: Fraction) -> None:
+        p, q, k = exact_ratio(value)
+        assert (p == 0 and exact == 0) or Fraction(p, q) * Fraction(10) ** k == exact
+        assert self.THIRD.round(value) == oracle(exact, self.THIRD)
+        assert self.THIRD.array([value, 1])[0].to_fractions() == oracle(exact, self.THIRD)
+
+    def test_extended_precision_beyond_the_range_of_float64(self) -> None:
+        huge = np.longdouble(10) ** 400
+        if np.isinf(huge):
+            pytest.skip("longdouble is float64 here")
+        assert FloatFormat(10, 5).array(huge) == FloatFormat(10, 5).array("1e400")
+        assert FloatFormat(10, 5).array(np.array([huge])) == FloatFormat(10, 5).array("1e400")
+
+    @pytest.mark.parametrize("value", [np.longdouble("inf"), gmpy2.mpfr("nan"), gmpy2.mpfr("-inf"), Decimal("sNaN")])
+    def test_not_finite(self, value: object) -> None:
+        with pytest.raises(ValueError, match="needed a finite number; remove or replace"):
+            FloatFormat(10, 5).round(value)
+
+    def test_more_digits_than_python_reads(self) -> None:
+        # int() and str() refuse more than 4300 decimal digits.
+        fmt = FloatFormat(10, 5000)
+        text = "12" * 2500
+        for value in (text, Decimal(text), f"{text}/1", f"0.{text}e5000"):
+            assert fmt.round(value) == Fraction(12 * (10**5000 - 1) // 99)
+        assert str(fmt.array(text)) == f"1.{text[1:]}e+4999"
+        assert eval(repr(fmt.array(text))) == fmt.array(text)
+        far = fmt.array("1e" + "9" * 4400)
+        assert str(far) == "1e+" + "9" * 4400
+        with pytest.raises(OverflowError, match=r"about 10\*\*9999"):
+            far.to_float()
+
+    def test_far_exponents_in_base_10(self) -> None:
+        fmt = FloatFormat(10, 3)
+        x, tiny = fmt.array("1e1000000000"), fmt.array("1e-1000000000")
+        assert str(x * x) == "1e+2000000000"
+        assert str(x * "2.34e-1000000000") == "2.34"
+        assert str(x + 1) == "1e+1000000000"
+        assert str(x / tiny) == "1e+2000000000"
+        assert str(np.sqrt(x)) == "1e+500000000"
+        assert tiny < 1 < x
+        assert str(FloatFormat(10, 3, CHOP).array("1e1000000000") - 1) == "9.99e+999999999"
+        assert str(FloatFormat(10, 2).array(fmt.array("1.25e1000000000"))) == "1.3e+1000000000"
+
+
+class TestSplit:
+    def test_example_of_the_report(self) -> None:
+        # (2): 765.4567 = .7654 * 10**3 + .567 * 10**-1
+        assert FloatFormat(10, 4).split("765.4567") == (Fraction("0.7654"), Fraction("0.567"), 3)
+
+    @seeded
+    @given(hard_to_round())
+    def test_identity(self, case: tuple[Fraction, FloatFormat]) -> None:
+        x, fmt = case
+        u, v, e = fmt.split(x)
+        base = Fraction(fmt.base)
+        if x == 0:
+            assert (u, v, e) == (0, 0, 0)
+            return
+        assert u * base**e + v * base ** (e - fmt.precision) == x
+        assert 1 / base <= abs(u) < 1
+        assert abs(v) < 1
+        assert u * x > 0
+        assert v * x >= 0
+        assert (u * base**fmt.precision).denominator == 1
+
+
+class TestFormat:
+    def test_unit_roundoff(self) -> None:
+        # (8), (13) and (14)
+        assert FloatFormat(10, 4).unit_roundoff == Fraction(1, 2000)
+        assert FloatFormat(10, 4, CHOP).unit_roundoff == Fraction(1, 1000)
+        assert FloatFormat(2, 24).unit_roundoff == Fraction(1, 2**24)
+        assert FloatFormat(7, 1).unit_roundoff == Fraction(1, 2)
+
+    def test_is_a_value(self) -> None:
+        fmt = FloatFormat(np.int64(10), np.uint8(4))
+        assert fmt == FloatFormat(base=10, precision=4, rounding=NEAREST)
+        assert len({fmt, FloatFormat(10, 4), FloatFormat(10, 4, CHOP)}) == 2
+        assert type(fmt.base) is int
+        assert eval(repr(FloatFormat(10, 4, CHOP))) == FloatFormat(10, 4, CHOP)
+        assert pickle.loads(pickle.dumps(fmt)) == fmt
+        with pytest.raises(AttributeError):
+            fmt.base = 2  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("value", "printed", "so"),
+    [
+        (0.99999998766, ".999999987", True),  # chopped
+        (0.99999998766, ".999999988", True),  # rounded
+        (0.99999998766, ".999999989", False),
+        (1.2566e8, "1.2566e8", True),
+        (1.2567e8, "1.2566e8", False),
+        (0.0076, ".0004", False),
+        (0.00039996, ".0004", True),
+        (1.2337e-6, "1.234e-6", True),
+        (1.2337e-7, "1.234e-6", False),
+    ],
+)
+def test_a_number_rounded_or_chopped_prints_as_it_is_printed(value, printed, so):
+    assert prints_as(value, printed, *Rounding) is so
+
+
+def test_a_number_prints_as_it_is_rounded_unless_another_way_is_named():
+    assert prints_as(Fraction("2.64904e8"), "2.6490e8")
+    assert not prints_as(Fraction("2.64906e8"), "2.6490e8")
+    assert prints_as(Fraction("2.64906e8"), "2.6490e8", Rounding.CHOP)
+    assert not prints_as(Fraction("2.64904e8"), "2.6491e8", *Rounding)
+    assert prints_as(Fraction("-0.77226e-16"), "-.7723e-16")

@@ -1,0 +1,220 @@
+"""Linear algebra, digit for digit against loops in the stated order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+import numpy as np
+import oracles
+import pytest
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 3)) for r in Rounding]
+
+each_format = pytest.mark.parametrize("fmt", FORMATS, ids=lambda f: f"base{f.base}-{f.rounding.value}")
+each_size = pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+each_pivoting = pytest.mark.parametrize("pivot", [False, True], ids=["in order", "pivoting"])
+
+
+def arithmetic(fmt: FloatFormat) -> oracles.Arithmetic:
+    return oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST)
+
+
+def exact(x: FloatArray) -> list:
+    return x.to_fractions().tolist()
+
+
+def samples(fmt: FloatFormat, n: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Matrices whose entries differ in size, and right-hand sides; no zero, one or identity among them."""
+    rng = np.random.default_rng([fmt.base, n])
+    for _ in range(20):
+        scale = 10.0 ** rng.integers(-2, 3, size=(n, n))
+        yield fmt.array(rng.normal(size=(n, n)) * scale), fmt.array(rng.normal(size=(n, 2)))
+
+
+@each_format
+@each_size
+class TestDigitForDigit:
+    def test_dot(self, fmt: FloatFormat, n: int) -> None:
+        for a, b in samples(fmt, n):
+            assert linalg.dot(a[:, 0], b[:, 1]).to_fractions() == arithmetic(fmt).dot(exact(a[:, 0]), exact(b[:, 1]))
+
+    def test_matmul(self, fmt: FloatFormat, n: int) -> None:
+        for a, b in samples(fmt, n):
+            expected = arithmetic(fmt).matmul(exact(a), exact(b))
+            assert exact(linalg.matmul(a, b)) == exact(a @ b) == expected
+
+    @each_pivoting
+    def test_lu(self, fmt: FloatFormat, n: int, pivot: bool) -> None:
+        compared = 0
+        for a, b in samples(fmt, n):
+            try:
+                lower, upper, _, order = arithmetic(fmt).eliminate(exact(a), exact(b), pivot)
+            except ZeroDivisionError:
+                with pytest.raises(np.linalg.LinAlgError, match="zero pivot"):
+                    linalg.lu(a, pivot)
+                continue
+            found = linalg.lu(a, pivot)
+            assert exact(found.lower) == lower
+            assert exact(found.upper) == upper
+            assert found.permutation.tolist() == order
+            if pivot:
+                assert np.all(abs(found.lower) <= 1)
+            compared += 1
+        assert compared >= 15
+
+    @each_pivoting
+    def test_solve_and_inv(self, fmt: FloatFormat, n: int, pivot: bool) -> None:
+        compared = 0
+        for a, b in samples(fmt, n):
+            try:
+                expected = arithmetic(fmt).solve(exact(a), exact(b), pivot)
+            except ZeroDivisionError:
+                continue
+            assert exact(linalg.solve(a, b, pivot)) == expected
+            assert exact(linalg.solve(a, b[:, 0], pivot)) == [row[0] for row in expected]
+            assert exact(linalg.inv(a, pivot)) == arithmetic(fmt).inv(exact(a), pivot)
+            compared += 1
+        assert compared >= 15
+
+
+def test_the_order_of_operations_shows() -> None:
+    # The samples can tell one order from another: reversed sums have other digits.
+    fmt = FORMATS[-1]
+    forward, backward = [], []
+    for a, b in samples(fmt, 5):
+        forward.append(linalg.dot(a[0], b[:, 0]).to_fractions())
+        backward.append(linalg.dot(a[0, ::-1], b[::-1, 0]).to_fractions())
+    assert sum(x != y for x, y in zip(forward, backward, strict=True)) >= 3
+
+
+class TestIdentities:
+    @each_pivoting
+    @pytest.mark.parametrize("fmt", [FloatFormat(2, 200), FloatFormat(3, 150, CHOP)], ids=["base2", "base3"])
+    def test_lower_times_upper_without_rounding(self, fmt: FloatFormat, pivot: bool) -> None:
+        # Factors of few digits whose product, and whose elimination, needs no rounding in this format.
+        rng = np.random.default_rng(17)
+        for n in (1, 2, 3, 4, 6):
+            lower = np.tril(rng.integers(-4, 5, size=(n, n)), -1) + np.eye(n, dtype=int)
+            upper = np.triu(rng.integers(1, 9, size=(n, n)))
+            if pivot:  # multipliers exact and no larger than one: powers of the base
+                lower = np.tril(fmt.base ** -rng.integers(1, 4, size=(n, n)).astype(float), -1) + np.eye(n)
+                lower = fmt.array([[Fraction(1, fmt.base ** round(-np.log(v) / np.log(fmt.base))) if v else 0
+                                    for v in row] for row in lower])  # fmt: skip
+            a = fmt.array(lower) @ fmt.array(upper)
+            shuffled = a[rng.permutation(n)] if pivot else a
+            found = linalg.lu(shuffled, pivot)
+            assert np.array_equal(found.lower @ found.upper, shuffled[found.permutation])
+            assert np.array_equal(found.upper, np.triu(found.upper))
+            assert np.array_equal(found.lower, np.tril(found.lower))
+            assert np.all(np.diagonal(found.lower) == 1)
+            if not pivot:
+                assert np.array_equal(found.lower, fmt.array(lower))
+                assert np.array_equal(found.upper, upper)
+
+    def test_backward_error_of_lu(self) -> None:
+        # |LU - A| <= gamma_n |L||U|, gamma_n = n u / (1 - n u): Higham 2002, theorem 9.3.
+        fmt = FloatFormat(10, 5)
+        rng = np.random.default_rng(23)
+        for n in (2, 4, 7):
+            a = fmt.array(rng.normal(size=(n, n)))
+            found = linalg.lu(a, pivot=True)
+            lower, upper = found.lower.to_fractions(), found.upper.to_fractions()
+            error = abs(lower @ upper - a[found.permutation].to_fractions())
+            gamma = n * fmt.unit_roundoff / (1 - n * fmt.unit_roundoff)
+            assert np.all(error <= gamma * (abs(lower) @ abs(upper)))
+            assert np.any(error > 0)
+
+    @pytest.mark.parametrize("order", [[0], [1, 0], [2, 0, 1], [3, 1, 0, 2]])
+    def test_inverse_of_a_permutation_is_its_transpose(self, order: list[int]) -> None:
+        for fmt in FORMATS:
+            p = fmt.array(np.eye(len(order), dtype=int)[order])
+            assert np.array_equal(linalg.inv(p, pivot=True), p.T)
+            assert linalg.lu(p, pivot=True).permutation.tolist() == np.argsort(order).tolist()
+
+    def test_inverse_of_a_diagonal(self) -> None:
+        d = FORMATS[-1].array(np.diag([2, -4, 5]))
+        assert np.array_equal(linalg.inv(d), np.diag(1 / np.diag(d)))
+
+    def test_inverse_solves_for_each_column(self) -> None:
+        fmt = FloatFormat(10, 4)
+        a = fmt.array([["3.235", "-1.234", "3.256"], ["1.023", "-5.235", "0.921"], ["1.336", "2.120", "-8.235"]])
+        columns = [linalg.solve(a, fmt.array([int(i == j) for i in range(3)])) for j in range(3)]
+        assert np.array_equal(linalg.inv(a), np.stack(columns, axis=1))
+
+
+class TestPivoting:
+    FMT = FloatFormat(10, 4)
+
+    def test_first_of_equals(self) -> None:
+        a = self.FMT.array([[1, 2, 1], [-3, 1, 4], [3, 5, 9]])
+        assert linalg.lu(a, pivot=True).permutation.tolist() == [1, 2, 0]
+        assert linalg.lu(a[[0, 2, 1]], pivot=True).permutation.tolist()[0] == 1
+
+    def test_nothing_is_swapped_for_an_equal(self) -> None:
+        a = self.FMT.array([[2, 1], [-2, 5]])
+        assert linalg.lu(a, pivot=True).permutation.tolist() == [0, 1]
+
+    def test_multipliers_move_with_their_rows(self) -> None:
+        a = self.FMT.array([[4, 1, 0], [1, 1, 1], [2, 8, 3]])
+        found = linalg.lu(a, pivot=True)
+        assert found.permutation.tolist() == [0, 2, 1]
+        assert str(found.lower[1:, 0]) == "[ 0.5 0.25]"
+
+    def test_without_it_rows_stay(self) -> None:
+        a = self.FMT.array([[1, 2], [100, 3]])
+        assert linalg.lu(a).permutation.tolist() == [0, 1]
+        assert linalg.lu(a).lower[1, 0] == 100
+
+
+class TestSingular:
+    FMT = FloatFormat(10, 4)
+
+    @pytest.mark.parametrize("pivot", [False, True])
+    @pytest.mark.parametrize("matrix", [[[0]], [[1, 2], [2, 4]], [[0, 0], [0, 1]], [[1, 2, 3], [4, 5, 6], [5, 7, 9]]])
+    def test_is_refused(self, matrix: list[list[int]], pivot: bool) -> None:
+        a = self.FMT.array(matrix)
+        for call in (linalg.lu, linalg.inv):
+            with pytest.raises(np.linalg.LinAlgError, match=r"got a zero pivot in column \d of \d"):
+                call(a, pivot)
+        with pytest.raises(np.linalg.LinAlgError, match="zero pivot"):
+            linalg.solve(a, self.FMT.array([1] * len(matrix)), pivot)
+
+    def test_what_needs_pivoting_is_told_so(self) -> None:
+        a = self.FMT.array([[0, 2], [3, 1]])
+        with pytest.raises(np.linalg.LinAlgError, match="try pivot=True"):
+            linalg.inv(a)
+        assert str(linalg.inv(a, pivot=True)) == "[[-0.1667  0.3333]\n [    0.5       0]]"
+
+    def test_singular_only_in_few_digits(self) -> None:
+        a = [["1", "1"], ["1", "1.0001"]]
+        with pytest.raises(np.linalg.LinAlgError, match="use more digits"):
+            linalg.inv(self.FMT.array(a), pivot=True)
+        assert str(linalg.inv(FloatFormat(10, 5).array(a))[1, 1]) == "10000"
+
+
+def test_shapes() -> None:
+    fmt = FloatFormat(10, 4)
+    a = fmt.array([[2, 1], [1, 3]])
+    assert linalg.solve(a, fmt.array([3, 5])).shape == (2,)
+    assert linalg.solve(a, fmt.array([[3], [5]])).shape == (2, 1)
+    assert linalg.solve(a, fmt.array(np.ones((2, 0)))).shape == (2, 0)
+    assert linalg.dot(fmt.array([]), fmt.array([])).to_fractions() == 0
+    assert linalg.dot(fmt.array([1, 2]), fmt.array([3, 4])).shape == ()
+    assert linalg.matmul(fmt.array(np.ones((5, 2, 3))), fmt.array(np.ones((3, 4)))).shape == (5, 2, 4)
+    assert linalg.matmul(a, fmt.array([1, 2])).shape == (2,)
+
+
+def test_operands_do_not_change() -> None:
+    fmt = FloatFormat(10, 4)
+    a, b = fmt.array([[1, 2], [3, 4]]), fmt.array([5, 6])
+    before = repr(a), repr(b)
+    linalg.solve(a, b, pivot=True)
+    found = linalg.lu(a, pivot=True)
+    found.permutation[:] = 0
+    assert (repr(a), repr(b)) == before

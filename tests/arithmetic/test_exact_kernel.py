@@ -1,0 +1,109 @@
+"""Every pair of numbers of few digits, and every operation, with ``==`` against exact rational arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+
+import oracles
+import pytest
+from oracles import as_pair
+
+from gpbnb.arithmetic.kernels.exact import kernel
+
+SMALL = [(2, 1), (2, 2), (2, 3), (3, 1), (3, 2), (3, 3), (10, 1), (10, 2)]
+E = -5  # exponent of the second operand: not zero, lest an exponent be forgotten
+
+pytestmark = pytest.mark.parametrize("nearest", [True, False], ids=["nearest", "chop"])
+
+
+def significands(base: int, precision: int) -> range:
+    return range(base ** (precision - 1), base**precision)
+
+
+def signed(base: int, precision: int) -> list[int]:
+    positive = significands(base, precision)
+    return [-m for m in positive] + [0, *positive]
+
+
+@pytest.mark.parametrize(("base", "precision"), SMALL)
+class TestSmallFormats:
+    def test_sums_and_differences(self, base: int, precision: int, nearest: bool) -> None:
+        # The shortcut for far-apart operands begins at the gap t + 2.
+        k = kernel(base, precision, nearest)
+        numbers = signed(base, precision)
+        gaps = [*range(precision + 6), precision + 12]
+        count = 0
+        for gap in gaps:
+            expected: dict[int, tuple[int, int]] = {}
+            for m1 in numbers:
+                for m2 in numbers:
+                    n = m1 * base**gap + m2
+                    if n not in expected:
+                        value = oracles.rounded(Fraction(n), base, precision, nearest)
+                        m, e = as_pair(value * Fraction(base) ** E, base, precision)
+                        expected[n] = m, e
+                    pair, (e1, e2) = expected[n], (E + gap if m1 else 0, E if m2 else 0)
+                    assert k.add(m1, e1, m2, e2) == pair
+                    assert k.add(m2, e2, m1, e1) == pair
+                    assert k.subtract(m1, e1, -m2, e2) == pair
+                    count += 3
+        assert count == 3 * (precision + 7) * (2 * (base - 1) * base ** (precision - 1) + 1) ** 2
+
+    def test_products_and_quotients(self, base: int, precision: int, nearest: bool) -> None:
+        k = kernel(base, precision, nearest)
+
+        @cache
+        def expected(p: int, q: int, e: int) -> tuple[int, int]:
+            value = oracles.rounded(Fraction(p, q) * Fraction(base) ** e, base, precision, nearest)
+            return as_pair(value, base, precision)
+
+        numbers = signed(base, precision)
+        count = 0
+        for gap in (-7, 0, 1):
+            for m1 in numbers:
+                for m2 in numbers:
+                    e1, e2 = (E + gap if m1 else 0), (E if m2 else 0)
+                    assert k.multiply(m1, e1, m2, e2) == expected(m1 * m2, 1, e1 + e2)
+                    count += 1
+                    if m2:
+                        assert k.divide(m1, e1, m2, e2) == expected(*lowest(m1, m2), e1 - e2)
+                        count += 1
+        n = 2 * (base - 1) * base ** (precision - 1)
+        assert count == 3 * ((n + 1) ** 2 + (n + 1) * n)
+
+    def test_roots(self, base: int, precision: int, nearest: bool) -> None:
+        k = kernel(base, precision, nearest)
+        assert k.sqrt(0, 0) == (0, 0)
+        count = 0
+        for m in significands(base, precision):
+            for e in range(-6, 7):
+                value = oracles.square_root(m * Fraction(base) ** e, base, precision, nearest)
+                assert k.sqrt(m, e) == as_pair(value, base, precision)
+                count += 1
+        assert count == 13 * (base - 1) * base ** (precision - 1)
+
+    def test_order(self, base: int, precision: int, nearest: bool) -> None:
+        k = kernel(base, precision, nearest)
+        numbers = signed(base, precision)
+        for gap in (-3, -1, 0, 1, 3):
+            for m1 in numbers:
+                for m2 in numbers:
+                    e1, e2 = (E + gap if m1 else 0), (E if m2 else 0)
+                    x1, x2 = m1 * Fraction(base) ** e1, m2 * Fraction(base) ** e2
+                    assert k.compare(m1, e1, m2, e2) == (x1 > x2) - (x1 < x2)
+
+
+def lowest(p: int, q: int) -> tuple[int, int]:
+    return Fraction(p, q).as_integer_ratio()
+
+
+def test_every_power_is_right_beyond_the_table(nearest: bool) -> None:
+    # Long significands need powers of the base that are not kept.
+    k = kernel(10, 700, nearest)
+    m1, m2 = 10**699 + 7, 3 * 10**699 + 1
+    x1, x2 = Fraction(m1), m2 * Fraction(10) ** -650
+    assert k.add(m1, 0, m2, -650) == as_pair(oracles.rounded(x1 + x2, 10, 700, nearest), 10, 700)
+    assert k.divide(m1, 0, m2, -650) == as_pair(oracles.rounded(x1 / x2, 10, 700, nearest), 10, 700)
+    assert k.multiply(m1, 0, m2, -650) == as_pair(oracles.rounded(x1 * x2, 10, 700, nearest), 10, 700)
+    assert k.sqrt(m1, 0) == as_pair(oracles.square_root(x1, 10, 700, nearest), 10, 700)

@@ -1,0 +1,97 @@
+"""gpbnb.display.derivation: steps that check themselves."""
+
+from __future__ import annotations
+
+import pytest
+import sympy as sp
+
+from gpbnb.display.derivation import Derivation, Step, errors, first_order, held, over, together
+
+X, Y = sp.symbols("x y")
+N = sp.Symbol("n", integer=True, positive=True)
+B = sp.Symbol("beta", positive=True)
+
+HOLD = [
+    Step("expansion", (X + Y) ** 2, X**2 + 2 * X * Y + Y**2),
+    Step("held back", held(1 - B) * held(1 + B), 1 - B**2),
+    Step("a sum", sp.Sum(N, (N, 1, 4)), sp.Integer(10)),
+    Step("a limit", sp.Limit(sp.sin(X) / X, X, 0), sp.Integer(1)),
+    Step("a quotient", over(X * Y, Y), X),
+    Step("terms apart", together(N, 1), N + 1),
+    Step("a rest", (1 + B) ** 2, 1 + 2 * B, B**2),
+    Step("a rest of zero or more", N, sp.Integer(1), N - 1),
+]
+FAIL = [
+    Step("a wrong equality", (X + Y) ** 2, X**2 + Y**2),
+    Step("a wrong sign", held(1 - B) * held(1 + B), 1 + B**2),
+    Step("a wrong coefficient", sp.Sum(N, (N, 1, 4)), sp.Integer(11)),
+    Step("a negative rest", 1 + B, 1 + 2 * B, -B),
+    Step("a rest of either sign", X + Y, Y, X),
+    Step("a rest that does not make up the difference", (1 + B) ** 2, 1 + 2 * B, B),
+    Step("a negative rest that makes it up", N, N + 1, sp.Integer(-1)),
+    Step("no rest where one is needed", (1 + B) ** 2, 1 + 2 * B),
+]
+
+
+@pytest.mark.parametrize("step", HOLD, ids=lambda step: step.name)
+def test_right_steps_hold(step):
+    assert step.holds
+    assert Derivation((step,)).holds
+    assert repr(Derivation((step,))).startswith("✓")
+
+
+@pytest.mark.parametrize("step", FAIL, ids=lambda step: step.name)
+def test_wrong_steps_are_found_out(step):
+    assert not step.holds
+    assert not Derivation((*HOLD, step)).holds
+    assert repr(Derivation((step,))).startswith("✗")
+    assert Derivation((step,))._repr_markdown_().startswith("- ✗")
+
+
+def test_some_steps_of_a_derivation_are_asked_alone():
+    mixed = Derivation((HOLD[0], FAIL[0], HOLD[1]))
+    assert mixed.holds_at(0, 2)
+    assert not mixed.holds_at(0, 1)
+    assert not mixed.holds
+    with pytest.raises(IndexError):
+        mixed.holds_at(3)
+
+
+def test_a_derivation_shows_each_step():
+    derivation = Derivation((HOLD[0], FAIL[0]))
+    lines = repr(derivation).splitlines()
+    assert lines[0] == f"✓ {HOLD[0]}"
+    assert lines[1] == f"✗ {FAIL[0]}"
+    shown = derivation._repr_markdown_()
+    assert shown.count("$$") == 4
+    assert all(step.name in shown and step.latex() in shown for step in derivation.steps)
+
+
+def test_a_step_writes_its_rest():
+    step = HOLD[6]
+    assert str(step) == "a rest: (beta + 1)**2 = 2*beta + 1 + [beta**2 >= 0]"
+    assert step.latex().endswith(r"+ \underbrace{\beta^{2}}_{\ge\,0}")
+    assert "underbrace" not in HOLD[0].latex()
+    assert r"\;=\;" in HOLD[0].latex()
+
+
+def test_what_is_kept_apart_is_shown_so():
+    assert str(together(N, 1)) == "n + 1"
+    assert sp.latex(over(X * Y, Y)) == r"\frac{x y}{y}"
+    assert held(N - 1) * X != (N - 1) * X
+    assert (held(N - 1) * X).doit() == (N - 1) * X
+    assert over(X * Y, Y) != X
+
+
+def test_symbols_of_errors():
+    assert [e.name for e in errors(3)] == ["epsilon_1", "epsilon_2", "epsilon_3"]
+    assert [e.name for e in errors(1, "eta")] == ["eta_1"]
+    assert errors(0) == ()
+
+
+def test_first_order_is_the_part_linear_in_the_errors():
+    e1, e2 = errors(2)
+    assert first_order(X * (1 + e1) * (1 + e2) + Y * e1 * e2, (e1, e2)) == sp.expand(X * (e1 + e2))
+    assert first_order(X / (1 + e1), (e1,)) == -X * e1
+    assert first_order(X * (1 + e1) * (1 + e2), (e2,)) == sp.expand(X * e2 * (1 + e1))
+    assert first_order(X + Y, (e1, e2)) == 0

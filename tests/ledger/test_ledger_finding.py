@@ -1,0 +1,206 @@
+"""gpbnb.ledger.finding: what a finding may be, how verdicts follow, and the registry of checks."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+import sympy
+
+from gpbnb.ledger.finding import Checks, Finding, Verdict, answer, compare, unverifiable
+
+ALLOWED = {
+    ("verified", True),
+    ("typo", False),
+    ("wrong", False),
+    ("inconsistent", False),
+    ("ocr", False),
+    ("unverifiable", None),
+    ("open", False),
+    ("open", None),
+    ("answered", True),
+}
+
+
+def test_verdicts_are_those_of_the_contract():
+    assert {verdict.value for verdict in Verdict} == {verdict for verdict, _ in ALLOWED}
+
+
+@pytest.mark.parametrize("agrees", [True, False, None])
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_verdict_must_fit_agreement(verdict, agrees):
+    if (verdict.value, agrees) in ALLOWED:
+        finding = Finding("$1$", agrees, verdict, "see (20)")
+        assert (finding.recomputed, finding.agrees, finding.verdict, finding.note) == (
+            "$1$",
+            agrees,
+            verdict,
+            "see (20)",
+        )
+    else:
+        with pytest.raises(ValueError, match=f"verdict '{verdict.value}' came with agrees={agrees}"):
+            Finding("$1$", agrees, verdict, "see (20)")
+
+
+@pytest.mark.parametrize("agrees", [np.True_, sympy.true, 1, 0, "yes"])
+def test_agreement_must_be_a_real_bool(agrees):
+    for make in (
+        lambda: Finding("1", agrees, Verdict.VERIFIED),
+        lambda: compare(agrees, "1"),
+        lambda: answer(agrees, "1", "here"),
+    ):
+        with pytest.raises(TypeError, match=r"bool.* is needed: use bool\(\.\.\.\)"):
+            make()
+
+
+@pytest.mark.parametrize("make", [compare, lambda agrees, text: answer(agrees, text, "here")])
+def test_no_outcome_is_not_a_comparison(make):
+    with pytest.raises(TypeError, match="None is a NoneType; a bool is needed"):
+        make(None, "1")
+
+
+@pytest.mark.parametrize(
+    ("fields", "error", "message"),
+    [
+        ((1, True, Verdict.VERIFIED), TypeError, "recomputed=1 is a int; a str is needed"),
+        (("1", True, Verdict.VERIFIED, None), TypeError, "note=None is a NoneType; a str is needed"),
+        (("1", True, "verified"), TypeError, "verdict='verified' is a str; take one of"),
+        (("$1", True, Verdict.VERIFIED), ValueError, "recomputed='\\$1' has an unpaired or doubled dollar sign"),
+        (("1", True, Verdict.VERIFIED, "$$a$$"), ValueError, "note='\\$\\$a\\$\\$' has an unpaired or doubled"),
+        (("", True, Verdict.VERIFIED), ValueError, "agrees=True came with a blank recomputed"),
+        ((" ", False, Verdict.TYPO), ValueError, "agrees=False came with a blank recomputed"),
+        (
+            ("1", None, Verdict.UNVERIFIABLE, " "),
+            ValueError,
+            "'unverifiable' came without a note; say there which data",
+        ),
+        (("1", True, Verdict.ANSWERED), ValueError, "'answered' came without a note; say there where"),
+    ],
+)
+def test_bad_fields_are_refused(fields, error, message):
+    with pytest.raises(error, match=message):
+        Finding(*fields)
+
+
+def test_finding_is_frozen():
+    finding = compare(True, "1")
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        finding.agrees = False
+
+
+@pytest.mark.parametrize("otherwise", [Verdict.TYPO, Verdict.WRONG, Verdict.INCONSISTENT, Verdict.OCR])
+def test_compare(otherwise):
+    assert compare(True, "4", otherwise, "n") == Finding("4", True, Verdict.VERIFIED, "n")
+    assert compare(False, "4", otherwise, "n") == Finding("4", False, otherwise, "n")
+    assert compare(True, "4", otherwise, "n", "no").note == "n"
+    assert compare(False, "4", otherwise, "n", "no").note == "no"
+    assert compare(False, "4", otherwise, "n", "").note == ""
+
+
+def test_compare_calls_a_disagreement_wrong_unless_told():
+    assert compare(False, "4").verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize("otherwise", [Verdict.VERIFIED, Verdict.UNVERIFIABLE, Verdict.OPEN, Verdict.ANSWERED, "typo"])
+@pytest.mark.parametrize("agrees", [True, False])
+def test_compare_refuses_other_verdicts_whatever_the_outcome(agrees, otherwise):
+    with pytest.raises(ValueError, match="a disagreement is one of typo, wrong, inconsistent, ocr"):
+        compare(agrees, "4", otherwise)
+
+
+def test_answer():
+    assert answer(True, "4", "here") == Finding("4", True, Verdict.ANSWERED, "here")
+    assert answer(False, "4", "here") == Finding("4", False, Verdict.OPEN, "here")
+
+
+@pytest.mark.parametrize("holds", [True, False])
+def test_answer_says_where(holds):
+    with pytest.raises(ValueError, match="without a note"):
+        answer(holds, "4", "")
+
+
+def test_unverifiable():
+    assert unverifiable("", "no data") == Finding("", None, Verdict.UNVERIFIABLE, "no data")
+    with pytest.raises(ValueError, match="without a note"):
+        unverifiable("4", "")
+
+
+def good() -> Finding:
+    return compare(True, "1")
+
+
+def other() -> Finding:
+    return compare(False, "2")
+
+
+def test_checks_is_a_mapping_that_keeps_order_and_shares_functions():
+    checks = Checks()
+    assert checks.add("b", "a")(good) is good
+    checks.add("c")(other)
+    assert list(checks) == ["b", "a", "c"]
+    assert len(checks) == 3
+    assert "a" in checks
+    assert "z" not in checks
+    assert checks["a"] is checks["b"] is good
+    assert dict(checks) == {"b": good, "a": good, "c": other}
+    assert checks.run("a") == good()
+    assert checks.run("c") == other()
+    assert repr(checks) == "Checks(3 ids)"
+
+
+def test_a_second_check_of_an_id_is_refused_and_nothing_of_it_registered():
+    checks = Checks()
+    checks.add("a")(good)
+    with pytest.raises(ValueError, match=r"'a' is checked by .*good and by .*other"):
+        checks.add("b", "a")(other)
+    assert dict(checks) == {"a": good}
+
+
+def test_an_id_given_twice_at_once_is_refused():
+    with pytest.raises(ValueError, match=r"'a' is checked by .*good and by .*good"):
+        Checks().add("a", "a")(good)
+
+
+def test_missing_id():
+    checks = Checks()
+    checks.add("a")(good)
+    for look in (checks.run, checks.__getitem__):
+        with pytest.raises(KeyError, match=r"no check of 'z' here; .* the 1 ids"):
+            look("z")
+    assert checks.get("z") is None
+
+
+@pytest.mark.parametrize("result", [None, True, "verified", (True, "1")])
+def test_a_check_must_return_a_finding(result):
+    def lazy():
+        return result
+
+    checks = Checks()
+    checks.add("a")(lazy)
+    with pytest.raises(TypeError, match=r"the check of 'a', .*lazy, returned .*; a Finding is needed"):
+        checks.run("a")
+
+
+def test_a_check_takes_no_arguments():
+    with pytest.raises(TypeError, match="takes arguments; a check is called without any"):
+        Checks().add("a")(lambda x: good())
+
+
+@pytest.mark.parametrize(
+    ("ids", "error", "message"),
+    [((), TypeError, "without an id"), ((good,), TypeError, "is not an id; write"), ((" ",), ValueError, "blank")],
+)
+def test_ids_are_given(ids, error, message):
+    with pytest.raises(error, match=message):
+        Checks().add(*ids)
+
+
+def test_imports_the_standard_library_only():
+    code = (
+        "import sys; before = set(sys.modules); import gpbnb.ledger.finding;"
+        "new = {name.split('.')[0] for name in set(sys.modules) - before};"
+        "print(*sorted(new - sys.stdlib_module_names))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["gpbnb"]
