@@ -39,8 +39,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, inverse_of, max_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of, max_norm
 
 # -- the counts of the report -----------------------------------------------------------------------------------------
 
@@ -277,7 +277,7 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
 
     Raises
     ------
-    ZeroDivisionError : :math:`HP_pH^T + R` is singular.
+    numpy.linalg.LinAlgError : :math:`HP_pH^T + R` is singular.
     """
     Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
     predicted = Phi @ P @ Phi.T + Q
