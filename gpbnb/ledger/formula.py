@@ -10,7 +10,8 @@ words : ``label: printed phrase | another phrase | ...``; the first phrase is wh
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` and ``approx(a, b)`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
-printed sequence; a part that contains it can be typeset but not evaluated.
+printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that a
+printed series leaves out; a check gives it a value, such as ``sp.O(mu**4)``.
 """
 
 from __future__ import annotations
@@ -287,6 +288,8 @@ def _base(word: str) -> str:
         return rf"\{_GREEK[word]}"
     if word.startswith("Delta") and len(word) > len("Delta"):
         return rf"\Delta {_base(word[len('Delta') :])}"
+    if word == "dots":
+        return r"\cdots"
     if word == "inf":
         return r"\infty"
     return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word
