@@ -29,7 +29,8 @@ def test_a_monotone_requirement_is_found_in_every_range(least, largest, monotone
         calls: list[int] = []
         found = smallest_precision(among(range(first, 99), calls), 2, least=least, largest=largest, monotone=monotone)
         assert found == (FloatFormat(2, first) if first <= largest else None)
-        assert len(calls) == len(set(calls)) and set(calls) <= set(range(least, largest + 1))
+        assert len(calls) == len(set(calls))
+        assert set(calls) <= set(range(least, largest + 1))
 
 
 def test_a_precision_qualifies_only_if_the_next_one_does_too():
@@ -48,7 +49,8 @@ def test_the_neighbours_of_the_answer_are_tried():
 def test_the_format_is_passed_on_and_returned():
     seen = []
     found = smallest_precision(lambda fmt: seen.append(fmt) or True, 10, Rounding.CHOP, largest=4)
-    assert found == FloatFormat(10, 1, Rounding.CHOP) and {(f.base, f.rounding) for f in seen} == {(10, Rounding.CHOP)}
+    assert found == FloatFormat(10, 1, Rounding.CHOP)
+    assert {(f.base, f.rounding) for f in seen} == {(10, Rounding.CHOP)}
 
 
 @pytest.mark.parametrize("base", [2, 3, 10, 16])

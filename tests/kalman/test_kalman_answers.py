@@ -56,7 +56,7 @@ def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
     assert answers.largest(replace(run, **zeros)) == 5.0
 
 
-def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
+def test_a_looser_tolerance_asks_for_fewer_digits_and_an_impossible_one_is_refused():
     assert answers.find_answers(100.0).observed[Rounding.NEAREST] < answers.find_answers().observed[Rounding.NEAREST]
     runs = answers.find_answers().runs
     best = max(min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
@@ -65,7 +65,7 @@ def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
 
 
 @pytest.mark.parametrize("rounding", Rounding)
-def test_the_goal_itself_is_met_and_what_is_just_below_is_not(rounding):
+def test_the_tolerance_itself_is_met_and_what_is_just_below_is_not(rounding):
     found = answers.find_answers()
     digits = found.observed[rounding]
     enough = [run for run in found.runs if run.case.rounding is rounding]
@@ -81,7 +81,7 @@ def test_only_the_usual_model_counts():
     assert {run.case.model for run in answers.find_answers().runs} == {year_cases.MODELS[0]}
 
 
-def test_the_picture_shows_each_answer_on_the_goal():
+def test_the_picture_shows_each_answer_on_the_tolerance():
     _, axes = style.figure()
     found = answers.find_answers()
     figures.digits_needed(found, axes[0])

@@ -402,7 +402,7 @@ def test_a_division_by_zero_ends_a_run_and_is_a_result():
 
 
 @pytest.mark.parametrize("form", list(Form))
-def test_a_number_beyond_the_carrier_ends_a_run_and_is_a_result(form):
+def test_a_number_beyond_the_backend_ends_a_run_and_is_a_result(form):
     """A state that grows by 1e60 a step, and that nobody sees: its variance would be 1e360 after the third."""
     given = LinearModel([["1e60", 0], [0, 1]], [[0, 1]], np.zeros((2, 2)), [[1]], [1, 1], np.eye(2))
     found = run(FloatFormat(2, 24), form, given, np.ones((9, 1)))
@@ -441,7 +441,7 @@ def test_what_a_run_refuses():
         reference(LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]]), np.ones((3, 1)), (1,))
 
 
-def test_marks():
+def test_checkpoint_steps():
     assert log_spaced(1) == (1,)
     assert log_spaced(1000, 3) == (1, 2, 5, 10, 22, 46, 100, 215, 464, 1000)
     assert log_spaced(20, 1) == (1, 10, 20)

@@ -37,7 +37,7 @@ def error(fmt):
 
 @pytest.mark.parametrize("rounding", list(Rounding))
 @pytest.mark.parametrize("base", [2, 10, 16])
-def test_the_smallest_precision_meets_the_goal_and_one_less_does_not(base, rounding):
+def test_the_smallest_precision_meets_the_tolerance_and_one_less_does_not(base, rounding):
     tolerance = 1e-4
     found = required_precision(MODEL, STEPS, tolerance, base, rounding)
     assert found.fmt.base == base
@@ -169,7 +169,7 @@ def test_the_bound_asks_for_more_digits_and_holds():
     assert "(bound, 60 steps)" in str(by_bound)
 
 
-def test_a_goal_for_each_state():
+def test_a_tolerance_for_each_state():
     first = required_precision(MODEL, STEPS, (1e-6, math.inf), 2, z=Z).fmt
     second = required_precision(MODEL, STEPS, (math.inf, 1e-2), 2, z=Z).fmt
     assert second.precision < first.precision
@@ -202,7 +202,7 @@ def test_no_precision_may_be_enough():
     assert str(found) == "no precision up to 13 digits meets the tolerance (emulation, 3 steps)"
 
 
-def test_a_run_that_loses_its_covariance_does_not_meet_a_goal():
+def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
     """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
     given = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
     found = required_precision(given, 3, 10.0, 10, form=Form.HUNG)

@@ -27,7 +27,7 @@ def test_the_example_by_every_formula():
     assert [row[4] for row in rows] == ["10", "16", "10", "16", "10", "16", "15", "22"]
 
 
-def test_the_slips():
+def test_the_misprints():
     rows = {row[0]: row[1:] for row in cells(tables.misprints(*report_bounds.EXAMPLE))}
     assert list(rows) == [
         "first coefficient",
@@ -44,7 +44,7 @@ def test_the_slips():
     assert rows["second digits"] == ["$17$", "16", "the printed β is that of 16.81 digits; it needs 17"]
 
 
-def test_slips_that_are_none_are_not_claimed():
+def test_misprints_that_are_none_are_not_claimed():
     rows = {row[0]: row[1:] for row in cells(tables.misprints(1000, 3, 1))}
     assert rows["second coefficient"][2] == "not found"
 
@@ -69,7 +69,7 @@ def test_the_order():
     ]
 
 
-def test_the_mildest_noise():
+def test_the_largest_violating_noise():
     fmt = FloatFormat(2, 5)
     rows = cells(tables.largest_violating_noise([fmt]))
     first, second = (smallest.largest_violating_noise(fmt, form) for form in (False, True))

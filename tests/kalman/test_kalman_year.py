@@ -177,7 +177,7 @@ def test_in_one_base_every_format_holds_the_model_and_the_measurements():
     assert np.abs(z).max() < 10**4  # four decimal digits
 
 
-def test_marks_are_at_equal_ratios():
+def test_checkpoint_steps_are_at_equal_ratios():
     assert year_cases.checkpoint_steps()[-1] == YEAR
     assert year_cases.checkpoint_steps(100) == (1, 2, 5, 10, 22, 46, 100)
 
@@ -290,6 +290,6 @@ def test_a_year_that_lost_its_variance_says_when():
     assert HEADER[:5] == ("model", "base", "precision", "rounding", "form")
 
 
-def test_a_case_is_followed_only_where_the_others_rest_on_it(tmp_path):
+def test_a_case_is_bounded_only_where_the_others_rest_on_it(tmp_path):
     assert isinstance(ResumableRun(SINGLE.reference, tmp_path, 10).run, BoundedRun)
     assert not isinstance(ResumableRun(SINGLE, tmp_path, 10).run, BoundedRun)

@@ -138,7 +138,7 @@ def test_years_needed_against_each_run():
         study.precision_by_step([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
 
 
-def test_a_run_that_left_the_goal_does_not_come_back():
+def test_a_run_that_left_the_tolerance_does_not_come_back():
     (first, *_) = year.load()
     one = first.steps.tolist()[:3]
     drift = np.array([[0.5, 0.0], [0.0, -2.0], [0.5, 0.0]])
@@ -158,15 +158,15 @@ def test_spans_hold_every_number():
     assert found["model"][1:] == (-34, 8)  # 1e-10 and 400
 
 
-def test_deafness_is_that_of_the_runs():
+def test_update_stagnation_is_that_of_the_runs():
     fmt, checkpoint_steps = FloatFormat(2, 12), tuple(range(1, 301))
     (coarse, fine) = study.update_stagnation(TILT, Z, 2, [fmt, FloatFormat(2, 40)], last=200)
     history = emulate(TILT, Z, fmt, Form.INNOVATION, checkpoint_steps, reference(TILT, Z, checkpoint_steps))
     true = reference(TILT, Z, checkpoint_steps)
     bias = history.state[:, 2] + true.x[:, 2].astype(float)
-    assert coarse.still == pytest.approx(np.mean(np.abs(np.diff(bias[-201:])) < 1e-9), abs=1e-12)
-    assert coarse.still > 0
-    assert fine.still == 0
+    assert coarse.unchanged == pytest.approx(np.mean(np.abs(np.diff(bias[-201:])) < 1e-9), abs=1e-12)
+    assert coarse.unchanged > 0
+    assert fine.unchanged == 0
     assert coarse.variance == pytest.approx(1 + history.covariance[-1, 2, 2] / float(true.P[-1, 2, 2]), rel=1e-12)
     watched = np.array(sorted({*log_spaced(300, 16), *range(100, 301)})) - 1
     assert coarse.error == np.abs(history.state[watched, 0]).max()
@@ -175,7 +175,7 @@ def test_deafness_is_that_of_the_runs():
     steady = [bool(step) for step in np.abs(np.diff(bias)) < 1e-9]
     for last in (next(k for k in range(1, 300) if steady[-k]), 299):
         (found,) = study.update_stagnation(TILT, Z, 2, [fmt], last=last)
-        assert found.still == sum(steady[-last:]) / last
+        assert found.unchanged == sum(steady[-last:]) / last
     assert study.bits_hiding_process_noise(TILT, Z, 2) == pytest.approx(
         math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12
     )
@@ -444,7 +444,7 @@ def test_cells():
         "none",
         "binary16, binary32, binary64, bfloat16, TF32",
     ]
-    inverses = tables.inverses([study.InversePrecision("fit", 123.0, 45.0, 6, 7)])
+    inverses = tables.inverse_precisions([study.InversePrecision("fit", 123.0, 45.0, 6, 7)])
     assert inverses.body == (("fit", "120", "45", "6", "7"),)
 
 
