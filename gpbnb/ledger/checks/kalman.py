@@ -11,8 +11,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, max_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
 from gpbnb.display.tables import scientific
 from gpbnb.kalman import (
     contraction,
@@ -25,7 +25,8 @@ from gpbnb.kalman import (
     year,
     year_cases,
 )
-from gpbnb.ledger.finding import Check, Checks, Finding, Verdict, answer, both, compare, unverifiable
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Check, Checks, both
 from gpbnb.ledger.statements import quote
 
 CHECKS = Checks()
@@ -153,7 +154,7 @@ def model_equations() -> Finding:
     return compare(
         conformable,
         f"with $n={n}$, $m={m}$, $w_kv_j$ is no product; $w_kv_j^T$ is one, and with it (98)-(101) are optimal",
-        Verdict.TYPO if all(optimal().values()) else Verdict.WRONG,
+        Verdict.MISPRINT if all(optimal().values()) else Verdict.WRONG,
         otherwise_note="a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ are one letter, as are $v$ and $V$",
     )
 
@@ -167,7 +168,7 @@ def asterisk() -> Finding:
     return compare(
         bool(np.all(x == by_111)),
         f"a step of one state in four digits gives {float(x[0]):g}, (111) {float(by_111[0]):.4g}",
-        Verdict.TYPO if loops_close() else Verdict.WRONG,
+        Verdict.MISPRINT if loops_close() else Verdict.WRONG,
         otherwise_note="from (111) on $x$ is the exact estimate, as (118) says, and $\\hat x$ the rounded one",
     )
 
@@ -232,7 +233,7 @@ def covariance() -> Finding:
     return compare(
         "K_kH_k" in quote("hung1984.II.eq101") and optimal()["(101)"],
         "with $K_k$ it is the covariance of the optimal estimate, in exact arithmetic",
-        Verdict.TYPO if optimal()["(101)"] else Verdict.WRONG,
+        Verdict.MISPRINT if optimal()["(101)"] else Verdict.WRONG,
         otherwise_note="$K_p$ for $K_k$, which stands where (101) is recalled",
     )
 
@@ -585,7 +586,7 @@ def word() -> Finding:
     return compare(
         "iterations" in quote("hung1984.II.s12.word-interactions"),
         f"$k$ counts the iterations of the filter, {Fraction(YEAR, STEP)} in a year",
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="iterations are meant, and an iteration period of ten seconds",
     )
 
@@ -915,7 +916,7 @@ def title(number: int) -> Finding:
     return compare(
         f", {TITLES[number]}, " in quote(f"hung1984.II.s14.reference-{number}"),
         f"the book is called {TITLES[number]}",
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="an s is missing",
     )
 
@@ -938,7 +939,7 @@ def reference_7() -> Finding:
     return compare(
         f"NASA Contract {CONTRACT}, " in quote("hung1984.II.s14.reference-7"),
         CONTRACT,
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="a 5 for the S that the title page has, as in chapter I; by the author or the scan. The date is "
         "a month after the end of the period that the report of 1982 covers",
     )

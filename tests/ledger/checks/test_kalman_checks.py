@@ -42,12 +42,12 @@ def test_every_entry_of_the_sections_has_a_check_here_and_no_other_has():
 def test_verdicts_by_document(rows):
     """The present state: to be changed knowingly."""
     counts = {
-        document: Counter(row.outcome for row in rows if row.entry.document == document)
+        document: Counter(row.outcome for row in rows if row.statement.document == document)
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {
         "verified": 20,
-        "typo": 7,
+        "misprint": 7,
         "wrong": 29,
         "inconsistent": 3,
         "ocr": 1,
@@ -56,7 +56,7 @@ def test_verdicts_by_document(rows):
     }
     assert counts["hung1982"] == {
         "verified": 11,
-        "typo": 1,
+        "misprint": 1,
         "wrong": 28,
         "inconsistent": 1,
         "ocr": 1,
