@@ -77,7 +77,7 @@ class Relation:
         ----------
         names : values of names, as in ``{"n": 3}``; functions for calls and for indices:
             ``{"a": lambda i, j: ...}`` gives ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
-            ``.inv``. A name that is missing becomes a SymPy symbol, an indexed name the symbol ``a[i,j]``, and a call a
+            ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy symbol, an indexed name the symbol ``a[i,j]``, and a call a
             SymPy function.
         number : turns the exact value of a printed number into the arithmetic wanted; SymPy rationals by default.
 
@@ -212,7 +212,8 @@ class _Evaluation:
             case ast.Call(func=ast.Subscript(value=ast.Name(id=name), slice=index), args=arguments):
                 return self.names[name](*self._indices(index), *map(self, arguments))
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
-                return [self(row) for row in rows]
+                found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
+                return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
         raise ValueError(f"{ast.unparse(node)} cannot be evaluated")
 
     def _indices(self, index: ast.expr) -> list[Any]:
@@ -285,8 +286,8 @@ def number_latex(literal: str) -> str:
 def _base(word: str) -> str:
     if word in _GREEK:
         return rf"\{_GREEK[word]}"
-    if word.startswith("Delta") and len(word) > len("Delta"):
-        return rf"\Delta {_base(word[len('Delta') :])}"
+    if word.lower().startswith("delta") and len(word) > len("delta"):
+        return rf"\{word[: len('delta')]} {_base(word[len('delta') :])}"
     if word == "inf":
         return r"\infty"
     return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word
