@@ -11,7 +11,7 @@ import pytest
 from docutils import nodes
 from docutils.utils import new_document
 
-from gpbnb.ledger import load_inventory
+from gpbnb.ledger import load_statements
 
 FOLDER = Path(__file__).resolve().parents[1] / "book" / "_ext"
 
@@ -114,7 +114,7 @@ def environment(*pages):
 def test_each_entry_has_a_label():
     env = environment(ledger.PAGE, "book/index")
     ledger.add_labels(None, env)
-    inventory = load_inventory()
+    inventory = load_statements()
     assert env.standard.labels.keys() == env.standard.anonlabels.keys() == {entry.id.lower() for entry in inventory}
     for entry in inventory:
         assert env.standard.anonlabels[entry.id.lower()] == (ledger.PAGE, entry.id)

@@ -4,7 +4,7 @@ from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
-from gpbnb.ledger import load_inventory
+from gpbnb.ledger import load_statements
 from gpbnb.ledger.page import EMPHASIS
 
 PAGE = "book/errata"
@@ -16,7 +16,7 @@ def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
     if PAGE not in env.found_docs:
         return
     standard = env.get_domain("std")
-    for entry in load_inventory():
+    for entry in load_statements():
         title = ", ".join(part for part in (entry.document, entry.chapter, entry.item) if part != "-")
         standard.labels[entry.id.lower()] = (PAGE, entry.id, title)
         standard.anonlabels[entry.id.lower()] = (PAGE, entry.id)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import theory, year
+from gpbnb.kalman import report_bounds, year, year_cases
 
 
 def decimal_digits(fmt: FloatFormat) -> float:
@@ -52,7 +52,7 @@ def find(goal: float = 1.0) -> Answers:
     ------
     ValueError : no emulated year meets the goal, with one of the roundings.
     """
-    runs = tuple(run for run in year.load() if run.case.model == year.MODELS[0])
+    runs = tuple(run for run in year.load() if run.case.model == year_cases.MODELS[0])
     observed = {}
     for rounding in Rounding:
         enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, goal)) is not None]
@@ -61,12 +61,12 @@ def find(goal: float = 1.0) -> Answers:
                 f"got a goal of {goal}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
             )
         observed[rounding] = min(enough)
-    mended = theory.coefficients(*theory.EXAMPLE, **theory.MENDINGS["and errors carried on"])
+    mended = report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.MENDINGS["and errors carried on"])
     return Answers(
         goal,
         runs,
-        (int(theory.PRINTED["first digits"]), int(theory.PRINTED["second digits"])),
-        _both(theory.coefficients(*theory.EXAMPLE)),
+        (int(report_bounds.PRINTED["first digits"]), int(report_bounds.PRINTED["second digits"])),
+        _both(report_bounds.coefficients(*report_bounds.EXAMPLE)),
         _both(mended),
         observed,
     )
@@ -80,5 +80,5 @@ def _best(runs: tuple[year.Year, ...]) -> float:
     return max(min(largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
 
 
-def _both(counts: theory.Coefficients) -> tuple[int, int]:
-    return theory.required_precision(counts.first), theory.required_precision(counts.second)
+def _both(counts: report_bounds.Coefficients) -> tuple[int, int]:
+    return report_bounds.required_precision(counts.first), report_bounds.required_precision(counts.second)

@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import theory
-from gpbnb.kalman.experiment import Bounded, Form, bounded
+from gpbnb.kalman import report_bounds
+from gpbnb.kalman.bounded_run import Bounded, bounded
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year import machine
 
@@ -157,8 +158,8 @@ def printed_ratios(found: Bounded, task: Task) -> tuple[float, float, float]:
     true, n, m = history.reference, history.model.n, history.model.m
     x, K, P = (each[:c].astype(np.float64) for each in (true.x, true.K, true.P))
     with np.errstate(divide="ignore", invalid="ignore"):
-        covariance = np.abs(history.covariance) / (theory.covariance_count(n, m) * beta * np.abs(P))
-        gain = np.abs(history.gain) / (theory.gain_count(n, m) * beta * np.abs(K))
+        covariance = np.abs(history.covariance) / (report_bounds.covariance_count(n, m) * beta * np.abs(P))
+        gain = np.abs(history.gain) / (report_bounds.gain_count(n, m) * beta * np.abs(K))
         return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, task, x, K))
 
 
@@ -174,7 +175,7 @@ def _printed_state(found: Bounded, task: Task, x: NDArray[np.float64], K: NDArra
         F = max(F, float(np.abs(loop).sum(axis=0).max()))
         # u = K z = x - F x of the step before, (111)
         u = max(u, float(np.abs(x[k] - before + K[k] @ (h @ before)).max()))
-        first, second = theory.coefficients(k + 1, model.n, model.m)
+        first, second = report_bounds.coefficients(k + 1, model.n, model.m)
         bounds[k] = beta * (first * np.abs(x[k]).max() + second * u * max(1.0, F**k))
     return bounds
 

@@ -23,10 +23,11 @@ from gpbnb.display.style import (
     loglog,
 )
 from gpbnb.display.tables import arithmetic
-from gpbnb.kalman import theory
+from gpbnb.kalman import report_bounds
 from gpbnb.kalman.answers import Answers, decimal_digits, largest
+from gpbnb.kalman.bounded_run import Bounded
 from gpbnb.kalman.ensembles import Summary
-from gpbnb.kalman.experiment import Bounded, Form
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.year import Year
 
 _QUANTITIES = {
@@ -97,7 +98,7 @@ def year_end(
     runs: Sequence[Year],
     ax: Axes,
     goal: float,
-    counts: Sequence[tuple[str, theory.Coefficients]],
+    counts: Sequence[tuple[str, report_bounds.Coefficients]],
     answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
     """Largest error of drift or rate in a year against the digits, beside (125) and the answers to how many.
@@ -134,8 +135,11 @@ def year_end(
 def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
     """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
     lines = [
-        ("(125), printed formula", theory.coefficients(*theory.EXAMPLE)),
-        ("(125), all faults mended", theory.coefficients(*theory.EXAMPLE, **theory.MENDINGS["and errors carried on"])),
+        ("(125), printed formula", report_bounds.coefficients(*report_bounds.EXAMPLE)),
+        (
+            "(125), all faults mended",
+            report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.MENDINGS["and errors carried on"]),
+        ),
     ]
     marked: list[tuple[str, Sequence[float]]] = [
         ("printed answers", found.printed),
@@ -157,9 +161,9 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style in (
         ("(125) as printed", {}, "-"),
-        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"], "--"),
+        ("(125) with its faults mended", report_bounds.MENDINGS["and errors carried on"], "--"),
     ):
-        height = _allowed(theory.coefficients(*theory.EXAMPLE, **faults))
+        height = _allowed(report_bounds.coefficients(*report_bounds.EXAMPLE, **faults))
         artists += ax.plot(_DIGITS, height, color=BOUND, ls=style)
         artists.append(_beside(ax, word, (_DIGITS[12], height[12]), (6, 6), BOUND))
     artists.append(ax.axhline(found.goal, color=REFERENCE, ls=":"))
@@ -183,7 +187,7 @@ def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
     return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
 
 
-def _allowed(each: theory.Coefficients) -> NDArray[np.float64]:
+def _allowed(each: report_bounds.Coefficients) -> NDArray[np.float64]:
     """What (125) allows with :data:`_DIGITS` decimal digits, for a norm of the state and a B of 1."""
     return 0.5 * 10.0 ** (1 - _DIGITS) * (each.first + each.second)
 

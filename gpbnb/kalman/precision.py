@@ -14,8 +14,12 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
-from gpbnb.kalman.experiment import Followed, Form, Kept, Run, Simulation, compare_runs, log_spaced, reference
+from gpbnb.kalman.bounded_run import Followed
+from gpbnb.kalman.emulation import compare_runs
+from gpbnb.kalman.filter_run import Kept, Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import Simulation
 
 Basis = Literal["emulation", "bound"]
 
@@ -79,7 +83,7 @@ def required_precision(
     base : 2, 10 or 16.
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
         the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
-        contraction bound of :mod:`gpbnb.kalman.theory`, which holds for the arithmetic of this run without doubt, and
+        contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
         asks for more digits.
     z : (steps, m), measurements; by default simulated by the model, from its first estimate.
     seed : of the simulation.

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import theory
-from gpbnb.kalman.experiment import Kept
+from gpbnb.kalman import report_bounds
+from gpbnb.kalman.filter_run import Kept
 from gpbnb.kalman.model import LinearModel
 
 
@@ -38,9 +38,9 @@ class Terms:
         Parameters
         ----------
         fmt : gives β. k : 1 or more; beyond the last of the steps, x and u of the last are taken.
-        faults : to mend, as for :func:`gpbnb.kalman.theory.coefficients`.
+        faults : to mend, as for :func:`gpbnb.kalman.report_bounds.coefficients`.
         """
-        first, second = theory.coefficients(k, self.n, self.m, **faults)
+        first, second = report_bounds.coefficients(k, self.n, self.m, **faults)
         last = min(k, len(self.x)) - 1
         return float(fmt.unit_roundoff) * (first * float(self.x[last]) + second * float(self.u[last]))
 

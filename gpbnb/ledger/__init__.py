@@ -9,7 +9,8 @@
     ledger.summary_table(rows)
 """
 
-from gpbnb.ledger.checking import TOPICS, Row, counts, examine, rows, summary
+from gpbnb.ledger.checking import Row, counts, examine, rows, summary
+from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.page import (
     CHAPTERS,
     Html,
@@ -24,20 +25,20 @@ from gpbnb.ledger.page import (
     topics,
 )
 from gpbnb.ledger.render import summary_table, table
-from gpbnb.ledger.statements import Entry, load_inventory, quote, select
+from gpbnb.ledger.statements import Statement, load_statements, quote, select
 
 __all__ = [
     "CHAPTERS",
     "TOPICS",
-    "Entry",
     "Html",
     "Row",
+    "Statement",
     "brief",
     "count_table",
     "counts",
     "examine",
     "links",
-    "load_inventory",
+    "load_statements",
     "of_ids",
     "of_kind",
     "of_topic",

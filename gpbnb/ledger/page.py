@@ -6,14 +6,14 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib import import_module
 from itertools import groupby
 
 from gpbnb.display.tables import POWER, Table, one_line
-from gpbnb.ledger.checking import TOPICS, Row, counts, examine, in_reading_order, load_checks
-from gpbnb.ledger.finding import Verdict
+from gpbnb.ledger.checking import Row, counts, examine, in_reading_order
+from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.ledger.render import OUTCOMES, describe, section_name
-from gpbnb.ledger.statements import Entry, load_inventory
+from gpbnb.ledger.statements import Statement, load_statements
 
 CHAPTERS = {
     "rounding": "Rounding bounds",
@@ -27,7 +27,6 @@ CHAPTERS = {
 """Titles of the chapters, by the topic whose checks they show; the page of a topic has its name."""
 
 LEDGER_PAGE = "errata.html"
-_DIFFERS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.TYPO, Verdict.OCR)
 EMPHASIS = re.compile(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])")
 """What stands between stars in a note."""
 _PAGE_OF = {title: topic for topic, title in CHAPTERS.items()}
@@ -55,7 +54,7 @@ class Html:
 
 def topics() -> dict[str, str]:
     """Name the topic that checks each entry, as in ``{"hung1984.II.eq20": "rounding"}``."""
-    return {key: topic.split(".")[-1] for topic in TOPICS for key in import_module(topic).CHECKS}
+    return {key: topic for topic, checks in TOPICS.items() for key in checks}
 
 
 def of_topic(rows: Iterable[Row], topic: str, *verdicts: str) -> tuple[Row, ...]:
@@ -77,7 +76,9 @@ def of_topic(rows: Iterable[Row], topic: str, *verdicts: str) -> tuple[Row, ...]
     for verdict in verdicts:
         if verdict not in [known.value for known in Verdict]:
             raise ValueError(f"no verdict {verdict!r}; here are: {', '.join(known.value for known in Verdict)}")
-    return tuple(row for row in rows if owner.get(row.entry.id) == topic and (not verdicts or row.outcome in verdicts))
+    return tuple(
+        row for row in rows if owner.get(row.statement.id) == topic and (not verdicts or row.outcome in verdicts)
+    )
 
 
 def of_kind(kind: str) -> tuple[Row, ...]:
@@ -88,11 +89,11 @@ def of_kind(kind: str) -> tuple[Row, ...]:
     ExceptionGroup : checks raised.
     ValueError : there is no entry of that kind.
     """
-    inventory = load_inventory()
+    inventory = load_statements()
     chosen = [entry for entry in inventory if entry.kind == kind]
     if not chosen:
         raise ValueError(f"no entry of kind {kind!r}; here are: {', '.join({e.kind: 0 for e in inventory})}")
-    return in_reading_order(_checked(chosen, inventory))
+    return in_reading_order(_checked(chosen))
 
 
 def of_ids(*ids: str) -> tuple[Row, ...]:
@@ -103,16 +104,16 @@ def of_ids(*ids: str) -> tuple[Row, ...]:
     ExceptionGroup : checks raised.
     KeyError : the inventory has no such id.
     """
-    inventory = load_inventory()
+    inventory = load_statements()
     by_id = {entry.id: entry for entry in inventory}
     for key in ids:
         if key not in by_id:
             raise KeyError(f"no entry {key!r} in the inventory; correct the id")
-    return _checked([by_id[key] for key in ids], inventory)
+    return _checked([by_id[key] for key in ids])
 
 
-def _checked(chosen: Sequence[Entry], inventory: Sequence[Entry]) -> tuple[Row, ...]:
-    found = examine(chosen, load_checks(inventory))
+def _checked(chosen: Sequence[Statement]) -> tuple[Row, ...]:
+    found = examine(chosen)
     errors = list(dict.fromkeys(row.error for row in found if row.error))
     if errors:
         raise ExceptionGroup(f"checks of {sum(row.error is not None for row in found)} entries failed", errors)
@@ -134,9 +135,9 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
     rows = in_reading_order(rows)
     owner = topics()
     groups: dict[str, Callable[[Row], str]] = {
-        "document": lambda row: row.entry.document,
-        "chapter": lambda row: _title(owner.get(row.entry.id, "-")),
-        "kind": lambda row: row.entry.kind,
+        "document": lambda row: row.statement.document,
+        "chapter": lambda row: _title(owner.get(row.statement.id, "-")),
+        "kind": lambda row: row.statement.kind,
     }
     if by not in groups:
         raise ValueError(f"by={by!r}; take one of {', '.join(groups)}")
@@ -161,13 +162,13 @@ def told(rows: Iterable[Row], *ids: str) -> tuple[Row, ...]:
     KeyError : an id is not among `rows`.
     ValueError : print and recomputation of one of them do not differ.
     """
-    by_id = {row.entry.id: row for row in rows}
+    by_id = {row.statement.id: row for row in rows}
     picked = []
     for key in ids:
         if key not in by_id:
             raise KeyError(f"no row {key!r} among the {len(by_id)} given; correct the id")
         row = by_id[key]
-        if row.finding is None or row.finding.verdict not in _DIFFERS:
+        if row.finding is None or row.finding.verdict not in DISAGREEMENTS:
             raise ValueError(f"{key} is {row.outcome}, no error; change the text that names it as one")
         picked.append(row)
     return tuple(picked)
@@ -182,7 +183,7 @@ def searchable(rows: Iterable[Row]) -> Html:
     owner = topics()
     tables = [
         _part(document, chapter, tuple(inside), owner)
-        for (document, chapter), inside in groupby(rows, lambda row: (row.entry.document, row.entry.chapter))
+        for (document, chapter), inside in groupby(rows, lambda row: (row.statement.document, row.statement.chapter))
     ]
     html = f'<div class="ledger">\n{_form(rows, owner)}\n{"".join(tables)}</div>'
     return Html(f"Searchable ledger of {len(rows)} entries: {describe(counts(rows)) or 'none'}", html)
@@ -192,8 +193,8 @@ def links(rows: Iterable[Row]) -> Html:
     """List `rows` as links to their places in the complete ledger."""
     rows = in_reading_order(rows)
     parts = []
-    for (document, chapter), inside in groupby(rows, lambda row: (row.entry.document, row.entry.chapter)):
-        every = ", ".join(f'<a href="{_address(row.entry)}">{_text(row.entry.item)}</a>' for row in inside)
+    for (document, chapter), inside in groupby(rows, lambda row: (row.statement.document, row.statement.chapter)):
+        every = ", ".join(f'<a href="{_address(row.statement)}">{_text(row.statement.item)}</a>' for row in inside)
         parts.append(f"<li>{escape(_document(document, chapter))}: {every}</li>")
     return Html(
         f"Links to {len(rows)} entries: {describe(counts(rows)) or 'none'}",
@@ -213,7 +214,7 @@ def brief(rows: Iterable[Row], left_undone: bool = False) -> Html:
     owner = topics()
     lines = []
     for row in rows:
-        entry = row.entry
+        entry = row.statement
         place = section_name(entry.chapter, entry.section)
         item = f'<a href="{_address(entry)}">{_text(entry.item)}</a><br>{entry.document}, {escape(place)}'
         lines.append(_line("<tr>", item, row, owner))
@@ -224,7 +225,7 @@ def brief(rows: Iterable[Row], left_undone: bool = False) -> Html:
 def _part(document: str, chapter: str, rows: Sequence[Row], owner: dict[str, str]) -> str:
     lines = []
     for row in rows:
-        entry = row.entry
+        entry = row.statement
         start = (
             f'<tr id="{escape(entry.id)}" data-kind="{entry.kind}" data-verdict="{escape(_outcome(row))}" '
             f'data-chapter="{owner.get(entry.id, "")}">'
@@ -249,11 +250,11 @@ def _table(classes: str, caption: str, lines: Sequence[str], left_undone: bool =
 def _line(start: str, item: str, row: Row, owner: dict[str, str]) -> str:
     """Write a row; what was printed, what was recomputed, and the note, with the chapter, share a wide cell."""
     found, note = (_text(row.finding.recomputed), _text(row.finding.note)) if row.finding else ("", "")
-    topic = owner.get(row.entry.id, "")
+    topic = owner.get(row.statement.id, "")
     link = _chapter_link(CHAPTERS[topic]) if topic in CHAPTERS else ""
     if link not in note:
         note = f"{note} [{link}]" if note else f"[{link}]"
-    named = (("printed", _text(row.entry.printed)), ("recomputed", found), ("note", note))
+    named = (("printed", _text(row.statement.printed)), ("recomputed", found), ("note", note))
     content = "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
     return f'{start}<th scope="row">{item}</th><td>{escape(_outcome(row))}</td><td>{content}</td></tr>'
 
@@ -264,14 +265,14 @@ def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
         every = "".join(f'<option value="{escape(v)}">{escape(name(v))} ({n})</option>' for v, n in there.items())
         return f'<option value="">all</option>{every}'
 
-    parts = [f"{row.entry.document} {row.entry.chapter}" for row in rows]
-    documents = options([row.entry.document for row in rows])
+    parts = [f"{row.statement.document} {row.statement.chapter}" for row in rows]
+    documents = options([row.statement.document for row in rows])
     chapters = options(parts, lambda part: _document(*part.split(" ", 1)))
     selects = {
         "document": ("Document", documents + chapters.removeprefix('<option value="">all</option>')),
         "verdict": ("Verdict", options([o for o in map(_label, counts(rows)) for row in rows if _outcome(row) == o])),
-        "kind": ("Kind", options(sorted(row.entry.kind for row in rows))),
-        "chapter": ("Chapter of this book", options([owner.get(row.entry.id, "") for row in rows], _title)),
+        "kind": ("Kind", options(sorted(row.statement.kind for row in rows))),
+        "chapter": ("Chapter of this book", options([owner.get(row.statement.id, "") for row in rows], _title)),
     }
     labels = "".join(
         f'<label>{label} <select name="{name}" autocomplete="off">{choice}</select></label>\n'
@@ -289,7 +290,7 @@ def _document(document: str, chapter: str) -> str:
     return document if chapter == "-" else f"{document}, ch. {chapter}"
 
 
-def _address(entry: Entry) -> str:
+def _address(entry: Statement) -> str:
     return f"{LEDGER_PAGE}#{escape(entry.id)}"
 
 

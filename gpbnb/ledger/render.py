@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from gpbnb.display.tables import Table, one_line
 from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order, summary
-from gpbnb.ledger.statements import Entry
+from gpbnb.ledger.statements import Statement
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
 _AGREES = {True: "true", False: "false", None: ""}
@@ -37,7 +37,7 @@ def to_text(rows: Iterable[Row]) -> str:
     lines = []
     for row in rows:
         found = (row.finding.recomputed, row.finding.note) if row.finding else ()
-        cells = (row.entry.id, *filter(None, map(one_line, found)))
+        cells = (row.statement.id, *filter(None, map(one_line, found)))
         lines.append(f"{_outcome(row):<12}  {'  '.join(cells)}\n")
     return "".join(lines)
 
@@ -48,7 +48,7 @@ def to_markdown(rows: Iterable[Row]) -> str:
 
 
 def _record(row: Row) -> tuple[str, str, str, str, str, bool | None, str | None, str]:
-    entry, finding = row.entry, row.finding
+    entry, finding = row.statement, row.finding
     head = (entry.id, entry.document, entry.kind, entry.printed)
     if finding is None:
         return (*head, "", None, None, "")
@@ -60,9 +60,9 @@ def table(rows: Iterable[Row]) -> Table:
     rows = in_reading_order(rows)
     body = tuple(
         (
-            _place(row.entry),
+            _place(row.statement),
             _outcome(row),
-            row.entry.printed,
+            row.statement.printed,
             row.finding.recomputed if row.finding else "",
             row.finding.note if row.finding else "",
         )
@@ -102,7 +102,7 @@ def _title(rows: tuple[Row, ...]) -> str:
     return f"Ledger of {len(rows)} entries: {describe(counts(rows)) or 'none'}"
 
 
-def _place(entry: Entry) -> str:
+def _place(entry: Statement) -> str:
     return f"{entry.document}, {section_name(entry.chapter, entry.section)}: {entry.item}"
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.experiment import Simulation
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import Simulation
 
 #: The states of :func:`tilt`, and their units.
 TILT_STATES = (("tilt", "°"), ("rate", "°/s"), ("gyro bias", "°/s"))

@@ -16,11 +16,15 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion.bounds import column_sum, rationals, smallest_precision, true_inverse
-from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
+from gpbnb.kalman.bounded_run import Followed
+from gpbnb.kalman.contraction import companion_bound
+from gpbnb.kalman.emulation import compare_runs
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision
-from gpbnb.kalman.theory import coefficients, companion_bound
-from gpbnb.kalman.theory import required_precision as digits_of_125
+from gpbnb.kalman.report_bounds import coefficients
+from gpbnb.kalman.report_bounds import required_precision as digits_of_125
 from gpbnb.kalman.year import Year
 
 
@@ -29,7 +33,7 @@ def printed_precision(k: int, n: int, m: int, goal: Fraction, size: Fraction, ba
 
     Parameters
     ----------
-    goal, size : in one unit. faults : of :func:`gpbnb.kalman.theory.coefficients`, which mend (125).
+    goal, size : in one unit. faults : of :func:`gpbnb.kalman.report_bounds.coefficients`, which mend (125).
 
     References
     ----------
@@ -165,7 +169,7 @@ def _check_state(model: LinearModel, state: int) -> None:
 
 
 def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
-    """The largest entry of the estimates after the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks."""
+    """The largest entry of the estimates after the steps that :func:`gpbnb.kalman.filter_run.log_spaced` marks."""
     return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
 
 
@@ -178,7 +182,7 @@ def companion(
 
     Returns
     -------
-    error, bound : (n,), the largest of each state at the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks.
+    error, bound : (n,), the largest of each state at the steps that :func:`gpbnb.kalman.filter_run.log_spaced` marks.
     """
     stored, measured, marks = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
     run, beside = Run(stored, fmt, form, marks), Followed(stored, None, Form.USUAL, marks)

@@ -10,12 +10,12 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
-from gpbnb.kalman import answers, figures, theory, year
+from gpbnb.kalman import answers, figures, report_bounds, year, year_cases
 
 
 def test_the_answers_are_those_of_the_example_and_of_the_years():
     found = answers.find()
-    first, second = theory.coefficients(*theory.EXAMPLE)
+    first, second = report_bounds.coefficients(*report_bounds.EXAMPLE)
     for digits, coefficient in zip(found.formula, (first, second), strict=True):
         assert coefficient * 0.5 * 10.0 ** (1 - digits) <= 1 < coefficient * 0.5 * 10.0 ** (2 - digits)
     assert found.printed == (9, 17)
@@ -78,7 +78,7 @@ def test_the_goal_itself_is_met_and_what_is_just_below_is_not(rounding):
 
 
 def test_only_the_usual_model_counts():
-    assert {run.case.model for run in answers.find().runs} == {year.MODELS[0]}
+    assert {run.case.model for run in answers.find().runs} == {year_cases.MODELS[0]}
 
 
 def test_the_picture_shows_each_answer_on_the_goal():
@@ -107,9 +107,9 @@ def test_the_headline_says_beside_each_mark_what_it_is():
     assert shown == sum(run.case.fmt is not None for run in found.runs)
     for name, faults in (
         ("(125) as printed", {}),
-        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"]),
+        ("(125) with its faults mended", report_bounds.MENDINGS["and errors carried on"]),
     ):
-        each = theory.coefficients(*theory.EXAMPLE, **faults)
+        each = report_bounds.coefficients(*report_bounds.EXAMPLE, **faults)
         t, height = words[name]
         assert height == pytest.approx(0.5 * 10 ** (1 - t) * (each.first + each.second), rel=1e-12)
     ax.figure.canvas.draw()

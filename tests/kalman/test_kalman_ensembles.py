@@ -15,8 +15,10 @@ from distributed import Client, KilledWorker, LocalCluster
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles
+from gpbnb.kalman.bounded_run import bounded
+from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
-from gpbnb.kalman.experiment import Form, bounded, emulate
+from gpbnb.kalman.forms import Form
 
 SINGLE = FloatFormat(2, 24)
 

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.experiment: every digit of the compiled filters against filters on Fractions, written anew here."""
+"""Filter runs, their errors and bounds: every digit against filters on Fractions, written anew here."""
 
 from __future__ import annotations
 
@@ -11,20 +11,14 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import smallest, theory
-from gpbnb.kalman.experiment import (
-    BLOCK,
-    Followed,
-    Form,
-    Run,
-    Simulation,
-    bounded,
-    compare_runs,
-    emulate,
-    log_spaced,
-    reference,
-)
-from gpbnb.kalman.model import LinearModel, gravity_probe_b
+from gpbnb.kalman import exact_step, smallest
+from gpbnb.kalman.bounded_run import Followed, bounded
+from gpbnb.kalman.emulation import compare_runs, emulate
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import gravity_probe_b
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import BLOCK, Simulation
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (
@@ -270,7 +264,7 @@ def exactly(told, z):
     x, P, found = told.x0, told.P0, []
     for k in range(len(z)):
         Phi, H, Q, R = (each[k % len(each)] for each in (told.Phi, told.H, told.Q, told.R))
-        step = theory.exact_step(Phi, H, Q, R, x, P, z[k])
+        step = exact_step.exact_step(Phi, H, Q, R, x, P, z[k])
         x, P = step.x, step.P
         found.append(step)
     return found

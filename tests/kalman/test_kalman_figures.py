@@ -8,13 +8,14 @@ from drawn import colour, legend_of
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
-from gpbnb.kalman import ensembles, figures, smallest, theory, year
+from gpbnb.kalman import ensembles, figures, report_bounds, smallest, year, year_cases
 from gpbnb.kalman.answers import decimal_digits
-from gpbnb.kalman.experiment import Form, bounded
+from gpbnb.kalman.bounded_run import bounded
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
-USUAL = year.MODELS[0]
-TWENTY_FOUR = year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT)
+USUAL = year_cases.MODELS[0]
+TWENTY_FOUR = year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,7 @@ def test_lines_and_levels(ax):
 
 def test_year_end(ax, runs):
     cases = [TWENTY_FOUR, TWENTY_FOUR._replace(precision=32), TWENTY_FOUR._replace(rounding=Rounding.CHOP)]
-    counts = [("printed", theory.coefficients(*theory.EXAMPLE))]
+    counts = [("printed", report_bounds.coefficients(*report_bounds.EXAMPLE))]
     answers = [("print", [9, 17]), ("formula", [10, 16]), ("seen", [10.3])]
     artists = figures.year_end([runs[case] for case in cases], ax, 1.0, counts, answers)
     rounded, chopped, line, goal, *marks = artists
@@ -85,7 +86,7 @@ def test_year_end(ax, runs):
     assert colour(rounded) == style.OBSERVED != colour(chopped)
     assert colour(line) == style.BOUND
     crossing = float(np.interp(0, -np.log10(line.get_ydata()), line.get_xdata()))
-    assert int(np.ceil(crossing)) == theory.required_precision(sum(counts[0][1]))
+    assert int(np.ceil(crossing)) == report_bounds.required_precision(sum(counts[0][1]))
     assert list(goal.get_ydata()) == [1, 1]
     assert [list(mark.get_xdata()) for mark in marks] == [places for _, places in answers]
     assert all(set(mark.get_ydata()) == {1} for mark in marks)

@@ -11,9 +11,13 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import precision
-from gpbnb.kalman.experiment import Form, Simulation, bounded, emulate, log_spaced, reference
+from gpbnb.kalman.bounded_run import bounded
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.simulation import Simulation
 
 STEPS = 60
 MODEL = LinearModel(

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import ensembles, printed, smallest, tables, theory, year
-from gpbnb.kalman.experiment import Form
-from gpbnb.kalman.model import gravity_probe_b
+from gpbnb.kalman import ensembles, printed, report_bounds, smallest, tables, year, year_cases
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import gravity_probe_b
 from gpbnb.kalman.precision import Requirement
 
 
@@ -20,15 +20,15 @@ def cells(table):
 
 
 def test_the_example_by_every_formula():
-    rows = cells(tables.example(*theory.EXAMPLE))
-    assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(theory.MENDINGS)
+    rows = cells(tables.example(*report_bounds.EXAMPLE))
+    assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(report_bounds.MENDINGS)
     assert rows[0][1:] == ["first", r"$2.5860\times10^{8}$", r"$3.867\times10^{-9}$", "10", r"$2.9\times10^{-8}$"]
     assert rows[1][1:] == ["second", r"$4.0775\times10^{14}$", r"$2.452\times10^{-15}$", "16", r"$4.5\times10^{-2}$"]
     assert [row[4] for row in rows] == ["10", "16", "10", "16", "10", "16", "15", "22"]
 
 
 def test_the_slips():
-    rows = {row[0]: row[1:] for row in cells(tables.slips(*theory.EXAMPLE))}
+    rows = {row[0]: row[1:] for row in cells(tables.slips(*report_bounds.EXAMPLE))}
     assert list(rows) == [
         "first coefficient",
         "second coefficient",
@@ -50,7 +50,7 @@ def test_slips_that_are_none_are_not_claimed():
 
 
 def test_what_one_grants():
-    rows = cells(tables.goals(*theory.EXAMPLE, Fraction(1), Fraction(6606)))
+    rows = cells(tables.goals(*report_bounds.EXAMPLE, Fraction(1), Fraction(6606)))
     assert [row[3:] for row in rows] == [["10", "28"], ["13", "41"], ["16", "49"], ["20", "62"]]
     assert rows[1][1:3] == [r"$1.5\times10^{-4}$", "$1.0$"]
 
@@ -86,12 +86,12 @@ def test_the_states():
     assert len(rows) == 10
 
 
-USUAL = year.MODELS[0]
+USUAL = year_cases.MODELS[0]
 
 
 def run(**changes):
     values = {
-        "case": year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT),
+        "case": year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT),
         "steps": np.array([1, 3]),
         "drift": np.array([[9.0, 9.0], [-2.0, 1.0]]),
         "rate": np.array([[9.0, 9.0], [0.25, -0.5]]),
@@ -112,10 +112,10 @@ def test_year_ends():
     rows = cells(table)
     assert rows[0] == ["24 bits", "report", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5, a variance lost at step 2"
-    other = run(case=run().case._replace(model=year.MODELS[1]))
+    other = run(case=run().case._replace(model=year_cases.MODELS[1]))
     table = tables.year_ends([run(), other])
     assert table.header[0] == "model"
-    assert [row[0] for row in cells(table)] == list(year.MODELS[:2])
+    assert [row[0] for row in cells(table)] == list(year_cases.MODELS[:2])
     with pytest.raises(ValueError, match="got the reference"):
         tables.year_ends([run(case=run().case.reference)])
 
@@ -126,7 +126,7 @@ def test_slack():
     zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
     bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
     row = cells(tables.slack([run()], [bounds], terms))[0]
-    first, second = theory.coefficients(k, 10, 2)
+    first, second = report_bounds.coefficients(k, 10, 2)
     assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
     assert row[-1] == "1.25000"
     with pytest.raises(ValueError, match="needed one to step 3"):

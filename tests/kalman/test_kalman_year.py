@@ -8,10 +8,16 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import answers, theory, year
-from gpbnb.kalman.experiment import TRUTH, Followed, Form, emulate, reference
-from gpbnb.kalman.model import YEAR
-from gpbnb.kalman.year import BLOCK, CASES, FOLLOWED, HEADER, MODELS, Case, Journey, travel
+from gpbnb.kalman import answers, contraction, year, year_cases, year_runs
+from gpbnb.kalman.bounded_run import Followed
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import Run, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
+from gpbnb.kalman.simulation import BLOCK
+from gpbnb.kalman.year import HEADER
+from gpbnb.kalman.year_cases import CASES, FOLLOWED, MODELS, Case
+from gpbnb.kalman.year_runs import Journey, travel
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 SINGLE = Case(MODELS[0], 2, 24, NEAREST, Form.REPORT)
@@ -35,9 +41,9 @@ def slices():
 @pytest.mark.parametrize("key", slices())
 def test_a_slice_of_every_year_comes_out_digit_for_digit(key):
     case = Case(key[0], int(key[1]), int(key[2]), Rounding(key[3]), Form[key[4].upper()])
-    marks = tuple(mark for mark in year.marks() if mark <= 464)
-    z = year.simulation(case.model).measurements(marks[-1])
-    told = year.model(case.model, case.base)
+    marks = tuple(mark for mark in year_cases.marks() if mark <= 464)
+    z = year_cases.simulation(case.model).measurements(marks[-1])
+    told = year_cases.model(case.model, case.base)
     again = year.rows(case, emulate(told, z, case.fmt, case.form, marks, true(case.model, case.base)))
     lines = [line for line in stored("year") if line[:5] == key]
     # The last column is an eigenvalue, whose last digits are those of a machine's LAPACK.
@@ -52,8 +58,9 @@ REFERENCES = {}
 def true(name, base):
     """The reference, once for all cases."""
     if (name, base) not in REFERENCES:
-        marks = tuple(mark for mark in year.marks() if mark <= 464)
-        REFERENCES[name, base] = reference(year.model(name, base), year.simulation(name).measurements(464), marks)
+        marks = tuple(mark for mark in year_cases.marks() if mark <= 464)
+        z = year_cases.simulation(name).measurements(464)
+        REFERENCES[name, base] = reference(year_cases.model(name, base), z, marks)
     return REFERENCES[name, base]
 
 
@@ -73,7 +80,7 @@ def test_every_case_is_stored_to_the_end_of_the_year():
     assert [run.case for run in runs] == list(CASES)
     assert len(set(CASES)) == len(CASES) == 45
     for run in runs:
-        assert run.steps.tolist() == list(year.marks())
+        assert run.steps.tolist() == list(year_cases.marks())
         assert run.steps[-1] == YEAR == 3_153_600
         assert run.stopped is None
         assert run.drift.shape == run.rate.shape == (len(run.steps), 2)
@@ -127,7 +134,7 @@ def test_the_refined_bound_is_near_the_error_at_the_end_of_the_year():
             assert of_reference.steps.tolist() == run.steps.tolist()
             for name in ("drift", "rate"):
                 error, own = getattr(run, name)[-1], getattr(of_reference, name)[-1]
-                total = theory.companion_bound(error, own)
+                total = contraction.companion_bound(error, own)
                 assert (total >= np.abs(error)).all()
                 ratios.append((total / np.abs(error)).max())
     assert len(ratios) == 2 * 43
@@ -161,18 +168,18 @@ def test_in_one_base_every_format_holds_the_model_and_the_measurements():
     assert min(case.precision for case in CASES if case.base == 2) == 14
     assert min(case.precision for case in CASES if case.base == 10) == 4
     for name, base in {(case.model, case.base) for case in CASES}:
-        told = year.model(name, base)
+        told = year_cases.model(name, base)
         stored_again = told.rounded(FloatFormat(base, 14 if base == 2 else 4, CHOP))
         for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
             assert (getattr(told, letter) == getattr(stored_again, letter)).all()
-    z = year.simulation(MODELS[0]).measurements(BLOCK)
+    z = year_cases.simulation(MODELS[0]).measurements(BLOCK)
     assert (z == np.rint(z)).all()
     assert np.abs(z).max() < 10**4  # four decimal digits
 
 
 def test_marks_are_at_equal_ratios():
-    assert year.marks()[-1] == YEAR
-    assert year.marks(100) == (1, 2, 5, 10, 22, 46, 100)
+    assert year_cases.marks()[-1] == YEAR
+    assert year_cases.marks(100) == (1, 2, 5, 10, 22, 46, 100)
 
 
 def test_cases_have_names_of_their_own():
@@ -185,27 +192,27 @@ def test_cases_have_names_of_their_own():
 
 def test_the_fingerprint_tells_whatever_changes_a_run(monkeypatch):
     def told(case=SINGLE, steps=500):
-        year.fingerprint.cache_clear()
-        return year.fingerprint(case, steps)
+        year_runs.fingerprint.cache_clear()
+        return year_runs.fingerprint(case, steps)
 
     first = told()
     assert told() == first
     others = {told(steps=501), told(SINGLE._replace(precision=25)), told(SINGLE._replace(rounding=CHOP))}
     others |= {told(SINGLE._replace(form=form)) for form in Form if form is not Form.REPORT}
     others |= {told(SINGLE._replace(model=name)) for name in MODELS[1:]} | {told(SINGLE.reference)}
-    monkeypatch.setattr(year, "TRUTH", tuple(value + 1 for value in TRUTH))
+    monkeypatch.setattr(year_runs, "TRUTH", tuple(value + 1 for value in TRUTH))
     others.add(told())
     monkeypatch.undo()
-    monkeypatch.setattr(year, "FOLLOWED", frozenset([SINGLE]))
+    monkeypatch.setattr(year_runs, "FOLLOWED", frozenset([SINGLE]))
     others.add(told())
     monkeypatch.undo()
-    step = year.Run.take
-    monkeypatch.setattr(year.Run, "take", lambda self, z: step(self, z + 1))  # code that computes otherwise
+    step = Run.take
+    monkeypatch.setattr(Run, "take", lambda self, z: step(self, z + 1))  # code that computes otherwise
     others.add(told())
     monkeypatch.undo()
     assert first not in others
     assert len(others) == 13
-    year.fingerprint.cache_clear()
+    year_runs.fingerprint.cache_clear()
 
 
 # -- interruption ---------------------------------------------------------------------------------
@@ -214,9 +221,9 @@ STEPS = 2 * BLOCK + 100
 
 
 def results(directory):
-    year._true.cache_clear()
+    year_runs.reference_checkpoints.cache_clear()
     run = Journey(SINGLE, directory, STEPS).run
-    return year.rows(SINGLE, year.history(SINGLE, directory, STEPS)), run.x.tolist(), run.P.tolist()
+    return year.rows(SINGLE, year_runs.history(SINGLE, directory, STEPS)), run.x.tolist(), run.P.tolist()
 
 
 def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeypatch):
@@ -240,12 +247,12 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
     monkeypatch.undo()
     assert results(parts) == results(whole)
     assert year.bound_rows(SINGLE.reference, parts, STEPS) == year.bound_rows(SINGLE.reference, whole, STEPS)
-    year._true.cache_clear()
+    year_runs.reference_checkpoints.cache_clear()
     assert sorted(file.name for file in parts.iterdir()) == [f"{SINGLE.reference.name}.npz", f"{SINGLE.name}.npz"]
     # Finished runs are not taken up again; those of another code are.
     monkeypatch.setattr(Journey, "go_on", lambda *_: pytest.fail("a finished run went on"))
     travel([SINGLE], parts, STEPS, progress=False)
-    monkeypatch.setattr(year, "fingerprint", lambda case, steps: "other")
+    monkeypatch.setattr(year_runs, "fingerprint", lambda case, steps: "other")
     assert Journey(SINGLE, parts, STEPS).run.steps == 0
 
 
@@ -255,7 +262,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
     assert year.main(given) == 0
     runs = year.load(here)
     assert [run.case for run in runs] == list(CASES[:3])
-    assert all(run.steps.tolist() == list(year.marks(100)) for run in runs)
+    assert all(run.steps.tolist() == list(year_cases.marks(100)) for run in runs)
     # As far as it goes, it is the year.
     for run in runs:
         whole = at_end(2, run.case.precision)

@@ -8,21 +8,21 @@ from pathlib import Path
 import pytest
 
 from gpbnb import ledger
-from gpbnb.ledger import Row, load_inventory, page
+from gpbnb.ledger import Row, load_statements, page
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
-from gpbnb.ledger.statements import DOCUMENTS, Entry
+from gpbnb.ledger.statements import DOCUMENTS, Statement
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FINDINGS = (
     compare(True, "yes"),
     compare(False, r"$a<b$ & <c>", Verdict.WRONG, "see the chapter *Rounding bounds*; *not* x*y*z, x*y* z"),
-    compare(False, "one", Verdict.TYPO),
+    compare(False, "one", Verdict.MISPRINT),
     unverifiable("", "no data"),
     answer(True, "$|x|$", "here"),
 )
-INVENTORY = load_inventory()
+INVENTORY = load_statements()
 ROWS = tuple(Row(entry, FINDINGS[place % len(FINDINGS)]) for place, entry in enumerate(INVENTORY))
-UNCHECKED = Row(Entry("savage2016.x", "savage2016", "-", "-", "x", "claim", "a"), None)
+UNCHECKED = Row(Statement("savage2016.x", "savage2016", "-", "-", "x", "claim", "a"), None)
 
 
 class Tags(HTMLParser):
@@ -57,13 +57,13 @@ def test_every_entry_is_a_row_under_its_id():
     found = Tags(ledger.searchable(ROWS).html)
     rows = [attrs for attrs in found.all("tr") if "id" in attrs]
     assert sorted(attrs["id"] for attrs in rows) == sorted(entry.id for entry in INVENTORY)
-    by_id = {row.entry.id: row for row in ROWS}
+    by_id = {row.statement.id: row for row in ROWS}
     owner = ledger.topics()
     for attrs in rows:
         row = by_id[attrs["id"]]
-        assert attrs["data-kind"] == row.entry.kind
+        assert attrs["data-kind"] == row.statement.kind
         assert attrs["data-verdict"] == row.outcome
-        assert attrs["data-chapter"] == owner.get(row.entry.id, "")
+        assert attrs["data-chapter"] == owner.get(row.statement.id, "")
 
 
 def test_tables_are_the_chapters_of_the_documents_with_their_rows():
@@ -88,7 +88,7 @@ def test_a_table_of_one_row_says_so():
 
 
 def test_printed_and_recomputed_reach_the_cells_as_math_and_prose():
-    row = Row(Entry("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", r"$a<b$ & so on"), FINDINGS[1])
+    row = Row(Statement("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", r"$a<b$ & so on"), FINDINGS[1])
     *_, item, verdict, found = Tags(ledger.searchable([row]).html).cells
     assert item == "eq (x)II.6, equation"
     assert verdict == "wrong"
@@ -101,7 +101,9 @@ def test_printed_and_recomputed_reach_the_cells_as_math_and_prose():
 
 def test_all_math_of_the_ledger_is_marked_and_no_dollar_left():
     html = ledger.searchable(ROWS).html
-    texts = [t for row in ROWS for t in (row.entry.item, row.entry.printed, row.finding.recomputed, row.finding.note)]
+    texts = [
+        t for row in ROWS for t in (row.statement.item, row.statement.printed, row.finding.recomputed, row.finding.note)
+    ]
     assert html.count('<span class="math notranslate nohighlight">') == sum(t.count("$") // 2 for t in texts)
     assert "$" not in html
 
@@ -117,8 +119,8 @@ def test_the_options_of_each_filter_count_its_rows():
     owner = ledger.topics()
     values = {
         "verdict": [row.outcome for row in ROWS],
-        "kind": [row.entry.kind for row in ROWS],
-        "chapter": [owner[row.entry.id] for row in ROWS if row.entry.id in owner],
+        "kind": [row.statement.kind for row in ROWS],
+        "chapter": [owner[row.statement.id] for row in ROWS if row.statement.id in owner],
         "document": [v for e in INVENTORY for v in (e.document, f"{e.document} {e.chapter}")],
     }
     for name, expected in values.items():
@@ -140,17 +142,17 @@ def test_the_form_waits_for_the_script_and_every_control_has_a_label():
 
 def test_brief_and_links_lead_to_rows_of_the_complete_ledger():
     some = ROWS[3:9]
-    targets = [f"errata.html#{row.entry.id}" for row in some]
+    targets = [f"errata.html#{row.statement.id}" for row in some]
     brief = Tags(ledger.brief(some).html)
     assert [a["href"] for a in brief.all("a") if a["href"].startswith("errata")] == targets
     links = ledger.links(some)
     assert [a["href"] for a in Tags(links.html).all("a")] == targets
-    parts = dict.fromkeys((row.entry.document, row.entry.chapter) for row in some)
+    parts = dict.fromkeys((row.statement.document, row.statement.chapter) for row in some)
     assert re.findall(r"<li>(.*?): <a", links.html) == [f"{document}, ch. {chapter}" for document, chapter in parts]
     assert re.findall(r"<li>(.*?): <a", ledger.links([UNCHECKED]).html) == ["savage2016"]
     assert brief.cells[:3] == ["Item", "Verdict", "Printed, recomputed, and note"]
     assert re.search(r"<br>(.*?)</th>", ledger.brief(some[:1]).html)[1] == "hung1984, I"
-    eq20 = next(row for row in ROWS if row.entry.id == "hung1984.II.eq20")
+    eq20 = next(row for row in ROWS if row.statement.id == "hung1984.II.eq20")
     assert re.search(r"<br>(.*?)</th>", ledger.brief([eq20]).html)[1] == "hung1984, II.6"
     undone = ledger.brief(some, left_undone=True)
     assert Tags(undone.html).cells[2] == "Left undone, and our answer"
@@ -160,31 +162,33 @@ def test_brief_and_links_lead_to_rows_of_the_complete_ledger():
 
 def test_the_chapter_of_the_check_is_linked_once():
     owner = ledger.topics()
-    row = next(r for r in ROWS if owner.get(r.entry.id) == "rounding" and r.outcome == "wrong")
+    row = next(r for r in ROWS if owner.get(r.statement.id) == "rounding" and r.outcome == "wrong")
     assert ledger.brief([row]).html.count('href="rounding.html"') == 1
-    other = next(r for r in ROWS if owner.get(r.entry.id) == "rounding" and r.outcome == "verified")
+    other = next(r for r in ROWS if owner.get(r.statement.id) == "rounding" and r.outcome == "verified")
     assert ledger.brief([other]).html.count('href="rounding.html"') == 1
 
 
 @pytest.mark.parametrize("verdict", Verdict)
 def test_told_tells_where_print_and_recomputation_differ_and_of_nothing_else(verdict):
-    agrees = {Verdict.VERIFIED: True, Verdict.ANSWERED: True, Verdict.UNVERIFIABLE: None}.get(verdict, False)
+    agrees = {Verdict.VERIFIED: True, Verdict.ANSWERED: True, Verdict.UNVERIFIABLE: None, Verdict.GIVEN: None}.get(
+        verdict, False
+    )
     row = Row(INVENTORY[0], Finding("found", agrees, verdict, "a note"))
     if agrees is False and verdict is not Verdict.OPEN:
-        assert ledger.told([row], row.entry.id) == (row,)
+        assert ledger.told([row], row.statement.id) == (row,)
     else:
         with pytest.raises(ValueError, match=f"is {verdict.value}, no error"):
-            ledger.told([row], row.entry.id)
+            ledger.told([row], row.statement.id)
 
 
 def test_told_refuses_what_is_no_error():
-    by_outcome = {row.outcome: row.entry.id for row in ROWS}
-    picked = ledger.told(ROWS, by_outcome["typo"], by_outcome["wrong"])
-    assert [row.outcome for row in picked] == ["typo", "wrong"]
+    by_outcome = {row.outcome: row.statement.id for row in ROWS}
+    picked = ledger.told(ROWS, by_outcome["misprint"], by_outcome["wrong"])
+    assert [row.outcome for row in picked] == ["misprint", "wrong"]
     with pytest.raises(ValueError, match="verified, no error; change the text"):
         ledger.told(ROWS, by_outcome["verified"])
     with pytest.raises(ValueError, match="missing, no error"):
-        ledger.told([UNCHECKED], UNCHECKED.entry.id)
+        ledger.told([UNCHECKED], UNCHECKED.statement.id)
     with pytest.raises(KeyError, match=r"no row 'hung1984\.none' among"):
         ledger.told(ROWS, "hung1984.none")
 
@@ -192,9 +196,9 @@ def test_told_refuses_what_is_no_error():
 def test_of_topic():
     owner = ledger.topics()
     found = ledger.of_topic(ROWS, "rounding")
-    assert [row.entry.id for row in found] == [e.id for e in INVENTORY if owner.get(e.id) == "rounding"]
-    wrong = ledger.of_topic(ROWS, "rounding", "wrong", "typo")
-    assert {row.outcome for row in wrong} == {"wrong", "typo"}
+    assert [row.statement.id for row in found] == [e.id for e in INVENTORY if owner.get(e.id) == "rounding"]
+    wrong = ledger.of_topic(ROWS, "rounding", "wrong", "misprint")
+    assert {row.outcome for row in wrong} == {"wrong", "misprint"}
     assert set(wrong) <= set(found)
     with pytest.raises(ValueError, match="no topic 'Rounding'; here are: rounding"):
         ledger.of_topic(ROWS, "Rounding")
@@ -205,15 +209,15 @@ def test_of_topic():
 def test_of_kind_and_of_ids_run_the_checks_of_those_alone(monkeypatch):
     asked = []
 
-    def examine(entries, checks):
+    def examine(entries):
         asked.extend(entry.id for entry in entries)
         return tuple(Row(entry, FINDINGS[0]) for entry in entries)
 
     monkeypatch.setattr(page, "examine", examine)
     expected = [entry.id for entry in INVENTORY if entry.kind == "open"]
-    assert sorted(row.entry.id for row in ledger.of_kind("open")) == sorted(expected) == sorted(asked)
+    assert sorted(row.statement.id for row in ledger.of_kind("open")) == sorted(expected) == sorted(asked)
     ids = ("hung1984.II.eq8", "hung1982.III.eq18")
-    assert tuple(row.entry.id for row in ledger.of_ids(*ids)) == ids
+    assert tuple(row.statement.id for row in ledger.of_ids(*ids)) == ids
     with pytest.raises(ValueError, match="no entry of kind 'opened'; here are: claim"):
         ledger.of_kind("opened")
     with pytest.raises(KeyError, match=r"no entry 'hung1984\.none'"):
@@ -221,18 +225,18 @@ def test_of_kind_and_of_ids_run_the_checks_of_those_alone(monkeypatch):
 
 
 def test_entries_of_a_kind_come_in_reading_order(monkeypatch):
-    monkeypatch.setattr(page, "load_inventory", lambda: INVENTORY[::-1])
-    monkeypatch.setattr(page, "examine", lambda entries, checks: tuple(Row(e, FINDINGS[0]) for e in entries))
+    monkeypatch.setattr(page, "load_statements", lambda: INVENTORY[::-1])
+    monkeypatch.setattr(page, "examine", lambda entries: tuple(Row(e, FINDINGS[0]) for e in entries))
     claims = ledger.of_kind("claim")
     assert claims == ledger.checking.in_reading_order(claims)
-    assert [row.entry for row in claims] != [entry for entry in INVENTORY[::-1] if entry.kind == "claim"]
+    assert [row.statement for row in claims] != [entry for entry in INVENTORY[::-1] if entry.kind == "claim"]
 
 
 def test_a_check_that_raises_is_not_passed_over(monkeypatch):
     broken, other = ValueError("broken"), KeyError("other")
     errors = (broken, other, broken, None)
 
-    def examine(entries, checks):
+    def examine(entries):
         return tuple(Row(e, None if error else FINDINGS[0], error) for e, error in zip(entries, errors, strict=True))
 
     monkeypatch.setattr(page, "examine", examine)
@@ -274,6 +278,6 @@ def test_every_topic_has_a_chapter():
 
 
 def test_powers_of_ten_in_prose_are_written_as_such():
-    row = Row(Entry("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", "1.5e-08 and $1e-8$, 2e3x"), None)
+    row = Row(Statement("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", "1.5e-08 and $1e-8$, 2e3x"), None)
     assert r"1.5&nbsp;×&nbsp;10<sup>−8</sup> and <span" in ledger.searchable([row]).html
     assert r"\(1e-8\)</span>, 2e3x" in ledger.searchable([row]).html

@@ -15,11 +15,13 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
 from gpbnb.integration.theory import needed_precision
 from gpbnb.inversion.bounds import smallest_precision
-from gpbnb.kalman import year
-from gpbnb.kalman.experiment import Form, Run, emulate, log_spaced, reference
+from gpbnb.kalman import gravity_probe_b, year, year_cases
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision, survey
-from gpbnb.kalman.theory import coefficients
+from gpbnb.kalman.report_bounds import coefficients
 from gpbnb.wordlength import examples, figures, study, tables
 
 TILT = examples.tilt()
@@ -86,8 +88,8 @@ def test_printed_precision_is_the_least_that_meets_125(base):
 
 
 def test_growth_answers_for_the_first_steps():
-    model = year.model(year.MODELS[0], 2)
-    z = year.simulation(year.MODELS[0]).measurements(12)
+    model = year_cases.model(year_cases.MODELS[0], 2)
+    z = year_cases.simulation(year_cases.MODELS[0]).measurements(12)
     goal = [1] * 4 + [math.inf] * 6
     (found,) = study.growth(model, z, goal, [12], form=Form.UD)
     assert found == required_precision(model, 12, goal, form=Form.UD, z=z)
@@ -120,7 +122,7 @@ def test_growth_grows():
 
 
 def test_years_needed_against_each_run():
-    kind = year.Case(year.MODELS[0], 2, 0, Rounding.NEAREST, Form.REPORT)
+    kind = year_cases.Case(year_cases.MODELS[0], 2, 0, Rounding.NEAREST, Form.REPORT)
     runs = [run for run in year.load() if run.case == kind._replace(precision=run.case.precision)]
     found = dict(study.years_needed(runs, 1.0))
     for run in runs:
@@ -131,7 +133,7 @@ def test_years_needed_against_each_run():
             if run.case.precision == found[step]:
                 assert worst <= 1
     assert list(found.values()) == sorted(found.values())
-    assert found[year.YEAR] == 32
+    assert found[gravity_probe_b.YEAR] == 32
     with pytest.raises(ValueError, match="got runs of 2 kinds; needed one"):
         study.years_needed([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
 

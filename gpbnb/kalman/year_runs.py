@@ -1,0 +1,147 @@
+"""Resumable runs of a year of Gravity Probe B: each is saved as it goes and continues where it was interrupted."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.kalman.bounded_run import Followed
+from gpbnb.kalman.contraction import Contraction
+from gpbnb.kalman.emulation import History, compare_runs
+from gpbnb.kalman.filter_run import Kept, Run
+from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
+from gpbnb.kalman.simulation import BLOCK
+from gpbnb.kalman.year_cases import FOLLOWED, Case, marks, model, simulation
+
+_SAVED_EACH = 64  # blocks
+_TRIED = 200  # steps by which a change of the code is told
+
+
+class Journey:
+    """A run of a case, kept in a file; with the contraction bound at its side, if it is among :data:`FOLLOWED`."""
+
+    def __init__(self, case: Case, directory: Path, steps: int) -> None:
+        self.case, self.steps, self.seconds = case, steps, 0.0
+        self.run = _run(case, steps)
+        self.truth: NDArray[np.float64] = np.array(TRUTH)
+        self.file = directory / f"{case.name}.npz"
+        self.told = fingerprint(case, steps)
+        if self.file.exists():
+            with np.load(self.file) as saved:
+                if str(saved["told"]) == self.told:
+                    for name, array in self._kept().items():
+                        array[...] = saved[name]
+                    if isinstance(self.run, Followed):
+                        self.run.bound = Contraction(*(saved[f"bound_{name}"][()] for name in Contraction._fields))
+                    self.truth, self.seconds = saved["truth"], float(saved["seconds"])
+
+    def _kept(self) -> dict[str, NDArray[Any]]:
+        arrays = {name: getattr(self.run, name) for name in ("x", "P", "X", "G", "C", "notes")}
+        if isinstance(self.run, Followed):
+            arrays |= dict(zip(("states", "gains", "covariances"), self.run.bounds, strict=True))
+        return arrays
+
+    @property
+    def finished(self) -> bool:
+        return self.run.steps >= self.steps or self.run.stopped is not None
+
+    def go_on(self, blocks: int, bar: Any = None) -> None:
+        """Take at most so many blocks of measurements, and save."""
+        source = simulation(self.case.model)
+        for _ in range(blocks):
+            if self.finished:
+                break
+            before, start = self.run.steps, time.process_time()
+            z, self.truth = source.block(before // BLOCK, self.truth, self.steps - before)
+            self.run.take(z)
+            self.seconds += time.process_time() - start
+            if bar is not None:
+                bar.update(self.run.steps - before)
+        self.save()
+
+    def save(self) -> None:
+        """Write all of it, or nothing."""
+        draft = self.file.with_suffix(f".{os.getpid()}.npz")
+        arrays = self._kept()
+        if isinstance(self.run, Followed):
+            arrays |= {f"bound_{name}": np.asarray(each) for name, each in self.run.bound._asdict().items()}
+        arrays |= {"truth": self.truth, "seconds": np.array(self.seconds), "told": np.array(self.told)}
+        np.savez(draft, allow_pickle=False, **arrays)
+        os.replace(draft, self.file)
+
+
+def _run(case: Case, steps: int) -> Run:
+    kind = Followed if case in FOLLOWED else Run
+    return kind(model(case.model, case.base), case.fmt, case.form, marks(steps))
+
+
+@cache
+def fingerprint(case: Case, steps: int) -> str:
+    """A digest of all that a run is told, and of what it makes of the first measurements, to the last digit.
+
+    Code that computes otherwise makes runs begin again; code that is only written otherwise does not.
+    """
+    told, run = model(case.model, case.base), _run(case, steps)
+    digest = hashlib.sha256(repr((case.name, steps, marks(steps), TRUTH, BLOCK, case in FOLLOWED)).encode())
+    for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
+        digest.update(" ".join(map(str, getattr(told, letter).flat)).encode())
+    run.take(simulation(case.model).measurements(_TRIED))
+    bound = run.bound if isinstance(run, Followed) else ()
+    for each in (run.x, run.P, run.notes, *bound):
+        digest.update(np.ascontiguousarray(each).tobytes())
+    return digest.hexdigest()
+
+
+def travel(
+    cases: Sequence[Case],
+    directory: Path,
+    steps: int = YEAR,
+    progress: bool = True,
+    each: int = _SAVED_EACH,
+) -> None:
+    """Run the cases and their references, one after another, each from where it was saved.
+
+    Parameters
+    ----------
+    directory : where runs are saved, each 64 blocks of 4096 steps.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    todo = list(dict.fromkeys(part for case in cases for part in (case.reference, case)))
+    with tqdm(total=len(todo) * steps, desc="year", unit="step", unit_scale=True, disable=not progress) as bar:
+        for case in todo:
+            bar.set_postfix_str(case.name)
+            if _is_finished(case, directory, steps):
+                bar.update(steps)
+                continue
+            journey = Journey(case, directory, steps)
+            bar.update(journey.run.steps)
+            while not journey.finished:
+                journey.go_on(each, bar)
+
+
+def _is_finished(case: Case, directory: Path, steps: int) -> bool:
+    file = directory / f"{case.name}.npz"
+    if not file.exists():
+        return False
+    with np.load(file) as saved:
+        done, _, _, stopped = saved["notes"]
+        return str(saved["told"]) == fingerprint(case, steps) and (done >= steps or stopped > 0)
+
+
+def history(case: Case, directory: Path, steps: int = YEAR) -> History:
+    """Errors of a finished run."""
+    return compare_runs(Journey(case, directory, steps).run, reference_checkpoints(case.reference, directory, steps))
+
+
+@cache
+def reference_checkpoints(case: Case, directory: Path, steps: int) -> Kept:
+    return Journey(case, directory, steps).run.kept()
