@@ -13,18 +13,21 @@ import sys
 import time
 import zlib
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import year
-from gpbnb.kalman.experiment import BLOCK, TRUTH, Form, Simulation
-from gpbnb.kalman.model import YEAR
-from gpbnb.kalman.records import Records, update_largest
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
+from gpbnb.kalman.kernels.records import update_largest
+from gpbnb.kalman.records import Records
+from gpbnb.kalman.simulation import BLOCK, Simulation
+from gpbnb.kalman.year_cases import MODELS, model
 from gpbnb.sweeps import Column, Sweep
 
 #: What the filter estimates: drift angles and rates themselves, or their deviations from the predicted drift.
@@ -46,7 +49,8 @@ _ANGLES = 4  # two drift angles, two rates
 _SAVED_EACH = 16  # blocks
 
 
-class Cell(NamedTuple):
+@dataclass(frozen=True)
+class Cell:
     """Some formats of one base, for the same records: they share measurements and reference."""
 
     states: str
@@ -102,7 +106,7 @@ def simulation(states: str, record: int) -> Simulation:
     if states not in STATES:
         raise ValueError(f"got states {states!r}; needed one of {', '.join(STATES)}")
     start = TRUTH if states == "absolute" else (*TRUTH[:2], *DEVIATION, *TRUTH[4:])
-    return Simulation(year.model(year.MODELS[0], 2), start, SEED + record, resolution=1.0)
+    return Simulation(model(MODELS[0], 2), start, SEED + record, resolution=1.0)
 
 
 class Years:
@@ -115,12 +119,12 @@ class Years:
 
     def __init__(self, cell: Cell, steps: int = YEAR) -> None:
         self.cell, self.steps, self.block = cell, steps, 0
-        model = year.model(year.MODELS[0], cell.base)
+        told = model(MODELS[0], cell.base)
         self.sources = [simulation(cell.states, record) for record in range(cell.first, cell.first + cell.count)]
         self.truth = np.array([source.start for source in self.sources])
-        self.reference = Records(model, REFERENCE, Form.USUAL, cell.count)
+        self.reference = Records(told, REFERENCE, Form.USUAL, cell.count)
         self.runs = [
-            Records(model, FloatFormat(cell.base, t, Rounding(cell.rounding)), FORMS[cell.form], cell.count)
+            Records(told, FloatFormat(cell.base, t, Rounding(cell.rounding)), FORMS[cell.form], cell.count)
             for t in cell.precisions
         ]
         count = len(cell.precisions)
@@ -145,7 +149,7 @@ class Years:
         start = self._timed(1, start)
         for i, run in enumerate(self.runs):
             computed = run.carry(z, _ANGLES)
-            update_largest(computed, true, length, self.largest[i])
+            update_largest(computed, true, self.largest[i])
             self.end[i] = computed[-1] - true[-1]
             start = self._timed(i + 2, start)
         self.block += 1
@@ -228,7 +232,7 @@ def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """The row of one format and record, computed alone."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
-    one = cell._replace(precisions=(precision,), first=record, count=1)
+    one = replace(cell, precisions=(precision,), first=record, count=1)
     return rows(one, compute(one))
 
 

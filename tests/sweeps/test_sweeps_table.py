@@ -65,7 +65,7 @@ def test_every_lost_end_is_found(file):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda lines: lines[:28] + [""], "line 29: the file ends after 23 of 45 rows"),
+        (lambda lines: [*lines[:28], ""], "line 29: the file ends after 23 of 45 rows"),
         (lambda lines: lines[:9] + lines[10:], "line 10: the checksum of the row is"),
         (lambda lines: [*lines[:9], lines[10], lines[9], *lines[11:]], "line 10: the checksum"),
         (lambda lines: [*lines[:-1], lines[-2], ""], "line 51: the file has more than the 45 rows"),
@@ -85,7 +85,7 @@ def test_damage_is_described(file, change, message):
 
 
 def test_a_missing_and_a_foreign_file_are_reported(tmp_path):
-    with pytest.raises(DamagedFileError, match=r"year.csv, line 1: the file is missing. Restore .* python -m something"):
+    with pytest.raises(DamagedFileError, match=r"csv, line 1: the file is missing. Restore .* python -m something"):
         read(tmp_path / "year.csv", COLUMNS, CURE)
     (tmp_path / "year.csv").write_bytes(b"\xff\xfe")
     with pytest.raises(DamagedFileError, match="not UTF-8"):
