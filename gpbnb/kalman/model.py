@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, max_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
 
 # -- the counts of the report -----------------------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact, max_norm
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact, max_norm
 from gpbnb.kalman import exact_step, report_bounds
 
 

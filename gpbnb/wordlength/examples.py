@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation
 

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion.bounds import column_sum, rationals, smallest_precision, true_inverse
+from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+from gpbnb.inversion.bounds import smallest_precision
 from gpbnb.kalman.bounded_run import Followed
 from gpbnb.kalman.contraction import companion_bound
 from gpbnb.kalman.emulation import compare_runs
@@ -309,7 +309,7 @@ def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = R
         raise ValueError(f"{name}: got goal {goal}; needed a relative error above 0")
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
-    conditions = [column_sum(rationals(a)) * column_sum(true_inverse(a)) for a in (matrix, scaled)]
+    conditions = [column_sum_norm(rationals(a)) * column_sum_norm(true_inverse(a)) for a in (matrix, scaled)]
     expected = digits_of_125(conditions[1], Fraction(goal), 2, rounding)
     proved = smallest_precision(matrix, goal, 2, rounding).fmt.precision
     return Inverse(name, float(conditions[0]), float(conditions[1]), expected, proved)

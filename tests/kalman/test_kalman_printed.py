@@ -7,8 +7,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.bounds import column_sum_norm, max_norm, row_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import column_sum_norm, max_norm, row_sum_norm
 from gpbnb.kalman import exact_step, printed, report_bounds
 from gpbnb.kalman.filter_run import Kept, reference
 from gpbnb.kalman.model import LinearModel

@@ -10,6 +10,7 @@ from numba import njit
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import (
     difference,
     product,
@@ -129,7 +130,7 @@ def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U
                 put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def follow(
     fmt: Any,
     form: int,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import (
     copy,
     difference,
@@ -150,7 +151,7 @@ def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
             store(fmt, c, (i, j), s)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def prepare(fmt: Any, form: int, Q: Any, R: Any, P: Any, RI: Any, UQ: Any, UR: Any) -> Any:
     """What a form needs beside the model, computed in its arithmetic: the inverses of R, the factors of Q, R and P."""
     T, S = np.empty_like(P), np.empty_like(R[0])
@@ -271,7 +272,7 @@ def record_step(
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def advance(
     fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, marks: Any, X: Any, G: Any, C: Any, notes: Any
 ) -> None:

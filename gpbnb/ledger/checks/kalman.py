@@ -11,8 +11,8 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, max_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
 from gpbnb.display.tables import scientific
 from gpbnb.kalman import (
     contraction,
