@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import load
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
 from gpbnb.kalman.kernels.step import filter_step, record_step, workspace
@@ -35,7 +35,7 @@ def _overloaded_as_float(fmt: Any, a: Any) -> Any:
     return of_pair if tag in (Decimal, ShortDecimal) else lambda fmt, a: a
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def advance_records(
     fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, marks: Any, kept: Any, notes: Any, out: Any
 ) -> None:
@@ -51,7 +51,7 @@ def advance_records(
                 out[step, i, j] = _as_float(fmt, load(fmt, x, (i, j)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def update_largest(computed: Any, true: Any, largest: Any) -> None:
     """Raise `largest` (states, records) to the largest difference of any step; NaN counts as infinite."""
     for step in range(computed.shape[0]):
