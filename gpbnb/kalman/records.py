@@ -48,7 +48,7 @@ class Records(Run):
             raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
         packed = self._packed(H)
         transposed = np.ascontiguousarray(np.swapaxes(packed, 1, 2))
-        self._parts = (*self._parts[:2], packed, transposed, *self._parts[4:])
+        self._matrices = (*self._matrices[:2], packed, transposed, *self._matrices[4:])
 
     def carry(self, z: NDArray[np.float64], states: int) -> NDArray[np.float64]:
         """Take the next measurements of all records.
@@ -68,9 +68,11 @@ class Records(Run):
         if self.stopped or not len(z):
             return out
         before = self.steps
-        kept = (self.marks, (self.X, self.G, self.C), self.notes)
+        kept = (self.checkpoint_steps, (self.X, self.G, self.C), self.notes)
         try:
-            advance_records(self.tag, int(self.form), self._parts, self._packed(z), before, self.x, self.P, *kept, out)
+            advance_records(
+                self.tag, int(self.form), self._matrices, self._packed(z), before, self.x, self.P, *kept, out
+            )
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1
         out[self.steps - before :] = np.nan

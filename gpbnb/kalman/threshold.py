@@ -34,7 +34,7 @@ from gpbnb.sweeps import Column, Sweep
 STATES = ("absolute", "deviation")
 
 #: The forms of the sweep, by the name under which they are stored.
-FORMS = {"hung": Form.REPORT, "innovation": Form.USUAL}
+FORMS = {"hung": Form.HUNG, "innovation": Form.INNOVATION}
 
 #: True drift rates less the predicted ones, mas/yr: 6606.1 - 6601.8 and 39.2 - 37.2, the measured differences.
 DEVIATION = (4.3, 2.0)
@@ -122,7 +122,7 @@ class Years:
         told = model(MODELS[0], cell.base)
         self.sources = [simulation(cell.states, record) for record in range(cell.first, cell.first + cell.count)]
         self.truth = np.array([source.start for source in self.sources])
-        self.reference = Records(told, REFERENCE, Form.USUAL, cell.count)
+        self.reference = Records(told, REFERENCE, Form.INNOVATION, cell.count)
         self.runs = [
             Records(told, FloatFormat(cell.base, t, Rounding(cell.rounding)), FORMS[cell.form], cell.count)
             for t in cell.precisions

@@ -43,7 +43,7 @@ def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form):
         one.take(MEASURED[:, :, record])
         assert (many.x[:, record] == one.x[:, 0]).all()
         assert (many.P == one.P).all()
-        first, last = one.kept().x[:, :4].astype(float)
+        first, last = one.checkpoints().x[:, :4].astype(float)
         # The conversion of a decimal number has an error of one rounding.
         np.testing.assert_allclose(estimates[[0, -1], :, record], [first, last], rtol=3e-16, atol=0)
     assert many.steps == STEPS
@@ -52,7 +52,7 @@ def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form):
 
 def test_a_filter_that_stops_leaves_no_numbers():
     told = model(MODELS[0], 2)
-    many = Records(told, FloatFormat(2, 24), Form.REPORT, 2)
+    many = Records(told, FloatFormat(2, 24), Form.HUNG, 2)
     measured = MEASURED[:20, :, :2].copy()
     measured[7, 0, 1] = 2.0**1000
     before = many.carry(measured[:7], 4)
@@ -69,8 +69,8 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(ValueError, match="any but UD"):
         Records(told, REFERENCE, Form.UD, 2)
     with pytest.raises(ValueError, match="at least one record"):
-        Records(told, REFERENCE, Form.REPORT, 0)
-    many = Records(told, REFERENCE, Form.REPORT, 2)
+        Records(told, REFERENCE, Form.HUNG, 0)
+    many = Records(told, REFERENCE, Form.HUNG, 2)
     with pytest.raises(ValueError, match=r"needed \(steps, 2, 2\)"):
         many.carry(MEASURED, 4)
     with pytest.raises(ValueError, match=r"needed \(p, 2, 10\)"):
@@ -80,12 +80,12 @@ def test_what_does_not_fit_is_refused():
 def test_measurement_matrices_may_be_replaced():
     told = model(MODELS[0], 2)
     H = told.to_float()["H"]
-    many, other = (Records(told, FloatFormat(2, 30), Form.USUAL, COUNT) for _ in range(2))
+    many, other = (Records(told, FloatFormat(2, 30), Form.INNOVATION, COUNT) for _ in range(2))
     expected = many.carry(MEASURED, 4)
     assert (len(H) > STEPS) is True
     other.use_measurement_matrices(H[:STEPS])
     assert (other.carry(MEASURED, 4) == expected).all()
-    changed = Records(told, FloatFormat(2, 30), Form.USUAL, COUNT)
+    changed = Records(told, FloatFormat(2, 30), Form.INNOVATION, COUNT)
     changed.use_measurement_matrices(np.zeros_like(H[:1]))  # nothing is measured
     assert (changed.carry(MEASURED, 4) == 0).all()
 
@@ -110,7 +110,7 @@ def test_errors_are_those_of_every_step():
         for j in range(2):
             z = simulation("deviation", 3 + j).measurements(steps)
             estimates = []
-            for fmt, form in ((FloatFormat(2, precision), FORMS["hung"]), (REFERENCE, Form.USUAL)):
+            for fmt, form in ((FloatFormat(2, precision), FORMS["hung"]), (REFERENCE, Form.INNOVATION)):
                 run = Run(model(MODELS[0], 2), fmt, form, range(1, steps + 1))
                 run.take(z)
                 estimates.append(run.X[:, :4, 0])

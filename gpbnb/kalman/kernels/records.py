@@ -37,14 +37,24 @@ def _overloaded_as_float(fmt: Any, a: Any) -> Any:
 
 @compiled
 def advance_records(
-    fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, marks: Any, kept: Any, notes: Any, out: Any
+    fmt: Any,
+    form: int,
+    model: Any,
+    z: Any,
+    first: int,
+    x: Any,
+    P: Any,
+    checkpoint_steps: Any,
+    kept: Any,
+    notes: Any,
+    out: Any,
 ) -> None:
     """Take as many steps as z has; after each, write the first states of all records to `out`."""
     work = workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
     X, G, C = kept
     for step in range(z.shape[0]):
         answer = filter_step(fmt, form, model, first + step, z[step], x, P, work)
-        if not record_step(fmt, first + step, answer, x, work[1][0], P, marks, X, G, C, notes):
+        if not record_step(fmt, first + step, answer, x, work[1][0], P, checkpoint_steps, X, G, C, notes):
             return
         for i in range(out.shape[1]):
             for j in range(out.shape[2]):
