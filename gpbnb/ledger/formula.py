@@ -77,8 +77,8 @@ class Relation:
         ----------
         names : values of names, as in ``{"n": 3}``; functions for calls and for indices:
             ``{"a": lambda i, j: ...}`` gives ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
-            ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy symbol, an indexed name the symbol ``a[i,j]``, and a call a
-            SymPy function.
+            ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy
+            symbol, an indexed name the symbol ``a[i,j]``, and a call a SymPy function.
         number : turns the exact value of a printed number into the arithmetic wanted; SymPy rationals by default.
 
         Returns
