@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact, inverse_of
+from gpbnb.arithmetic.rational import exact, inverse_of
 
 
 class ExactStep(NamedTuple):
@@ -37,7 +37,7 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
 
     Raises
     ------
-    ZeroDivisionError : :math:`HP_pH^T + R` is singular.
+    numpy.linalg.LinAlgError : :math:`HP_pH^T + R` is singular.
     """
     Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
     predicted = Phi @ P @ Phi.T + Q

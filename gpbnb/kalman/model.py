@@ -1,4 +1,4 @@
-"""What a Kalman filter is told: a linear model, checked once."""
+"""What a Kalman filter is given: a linear model, checked once."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,14 +6,14 @@ import numpy as np
 import steps
 import sympy as sp
 
-from gpbnb.arithmetic.bounds import exact, inverse_of
+from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.kalman import derivation, exact_step
 
 DERIVATIONS = steps.collected(
     derivation.report,
     derivation.propagated,
     derivation.general,
-    derivation.mended,
+    derivation.corrected,
     derivation.scalar_conditions,
     derivation.smallest,
     derivation.contraction,

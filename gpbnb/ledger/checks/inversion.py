@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, inverse_of
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
 from gpbnb.inversion import derivation, example, experiment, procedure, theory
 from gpbnb.inversion.theory import Reduction
 from gpbnb.ledger.finding import Finding, Verdict, compare, unverifiable

@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.display.derivation import first_order
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
 from gpbnb.ledger.registry import Checks, both

@@ -12,8 +12,8 @@ import pytest
 from faults import all_of, always, breaks, finding, replace, times
 
 from gpbnb import ledger
-from gpbnb.arithmetic.bounds import row_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import row_sum_norm
 from gpbnb.ledger.checks import rounding as checks
 from gpbnb.ledger.finding import Verdict
 from gpbnb.rounding import derivation, experiment, theory
