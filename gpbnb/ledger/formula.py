@@ -13,8 +13,9 @@ In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``
 printed sequence; a part that contains it can be typeset but not evaluated.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
-``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and ``Largest`` prints the same as a subscript.
-``group(x)`` and ``bracket(x)`` keep printed parentheses and brackets, and ``op(x, y)`` stands for any operation x * y.
+``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
+``Largest`` prints the same as a subscript. ``group(x)`` and ``bracket(x)`` keep printed parentheses and brackets, and
+``op(x, y)`` stands for any operation x * y.
 """
 
 from __future__ import annotations
