@@ -13,7 +13,8 @@ from typing import Any
 
 import sympy as sp
 
-from gpbnb.integration.derivation import OMEGA, P, T, noise, transition_matrix
+from gpbnb.integration import derivation
+from gpbnb.integration.derivation import OMEGA, P, T
 
 Names = dict[str, Any]
 N = sp.Symbol("n")
@@ -52,20 +53,19 @@ class Case:
     @property
     def phi(self) -> sp.Matrix:
         """The transition matrix of (4) over a cycle."""
-        return transition_matrix().applyfunc(self.number)
+        return derivation.transition_matrix().applyfunc(self.number)
 
 
 @cache
 def cases() -> tuple[Case, ...]:
     """Two cases with different numbers, none of them 0 or 1."""
-    return tuple(
-        Case(
-            *(sp.Rational(v) for v in values[:3]),
-            int(values[3]),
-            *(tuple(sp.Rational(v) for v in group) for group in before),
-        )
-        for values, before in zip(_VALUES, _BEFORE, strict=True)
-    )
+    found = []
+    for values, (states_before, noises) in zip(_VALUES, _BEFORE, strict=True):
+        omega, period, variance = (sp.Rational(v) for v in values[:3])
+        before = tuple(sp.Rational(v) for v in states_before)
+        drawn = tuple(sp.Rational(v) for v in noises)
+        found.append(Case(omega, period, variance, int(values[3]), before, drawn))
+    return tuple(found)
 
 
 def at(now: Any, before: Any) -> Callable[[Any], Any]:
@@ -121,7 +121,7 @@ def extended(case: Case) -> tuple[sp.Matrix, sp.Matrix]:
     phi = case.phi
     rule = sp.Matrix([[1, 0], [0, 1], [half, 0]])
     step = sp.Matrix([[phi[0, 0], 0, 0], [phi[1, 0], 1, 0], [half * (1 + phi[0, 0]), 0, 1]])
-    return step, rule * noise().applyfunc(case.number) * rule.T
+    return step, rule * derivation.noise().applyfunc(case.number) * rule.T
 
 
 def covariances(case: Case, before: sp.Matrix) -> Names:
@@ -203,5 +203,3 @@ def walk_rate(case: Case) -> sp.Expr:
     """Growth of the error variance per second after many cycles: (r_0 + 2 r_1/(1-φ))/T."""
     r0, r1 = errors_of_cycles(case)
     return (r0 + 2 * r1 / (1 - case.phi[0, 0])) / case.period
-
-

@@ -12,8 +12,8 @@ from gpbnb.integration import derivation, theory
 from gpbnb.integration.derivation import MU, OMEGA, P22, TIME, X2, X3, P, T
 from gpbnb.ledger.agreement import hold, vanishes
 from gpbnb.ledger.checks.integration.cases import (
-    N,
     Case,
+    N,
     Names,
     arbitrary,
     at,
@@ -301,5 +301,3 @@ def complete_set(printed: Statement) -> Finding:
         otherwise_note="no equation is missing, but the misprints of (18) and (25) spoil the numbers",
         root="savage-18-missing-half",
     )
-
-

@@ -66,7 +66,7 @@ def abstract(printed: Statement) -> Finding:
 
 @cache
 def _growth() -> tuple[float, float, float]:
-    """Unevenness of the growth of the variance for two inputs; variance of an input with a sharp edge, early and late."""
+    """Unevenness of the variance's growth for two inputs; variance for an input with a sharp edge, early and late."""
     f_c, uneven = 2.0, 0.0
     for process in (theory.first_order(1.0, 1.0), theory.resonant(1.0, 3.0, 0.2)):
         variance = theory.rule_variance(process, f_c, theory.RULES["trapezoidal"], 400)
@@ -351,5 +351,3 @@ def uncorrelated(printed: Statement) -> Finding:
         "$E(q_1x_1)=E(q_2x_1)=0$ for $x_1$ at $t_{n-1}$ and at any time before, of which $x_2$ and $x_3$ are made, "
         "from $E(x_1x_1')=\\sigma_x^2e^{-\\omega_{bw}|\\tau|}$",
     )
-
-
