@@ -9,7 +9,7 @@ from html import escape
 from itertools import groupby
 
 from gpbnb.display.tables import POWER, Table, one_line
-from gpbnb.ledger.checking import Row, counts, examine, in_reading_order
+from gpbnb.ledger.checking import Row, counts, examine_once, in_reading_order
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.ledger.render import OUTCOMES, describe, section_name
@@ -113,7 +113,7 @@ def of_ids(*ids: str) -> tuple[Row, ...]:
 
 
 def _checked(chosen: Sequence[Statement]) -> tuple[Row, ...]:
-    found = examine(chosen)
+    found = examine_once(chosen)
     errors = list(dict.fromkeys(row.error for row in found if row.error))
     if errors:
         raise ExceptionGroup(f"checks of {sum(row.error is not None for row in found)} entries failed", errors)
