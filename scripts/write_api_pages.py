@@ -11,7 +11,7 @@ PAGES = ROOT / "book" / "api"
 
 
 def public_modules() -> dict[str, str]:
-    """Dotted name → first line of the docstring, of each public module; checks and kernels are not meant to be called."""
+    """Dotted name → first line of the docstring of each public module; checks and kernels are left out."""
     found = {}
     for path in sorted((ROOT / "gpbnb").rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
