@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import Rounding, prints_as
-from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+from gpbnb.arithmetic.search import smallest_precision
 
 # -- the counts of the report -----------------------------------------------------------------------------------------
 
