@@ -12,6 +12,7 @@ from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.calculators import derivation
 from gpbnb.calculators.javascript import Definition
+from gpbnb.calculators.page import form
 from gpbnb.integration import theory as integration
 from gpbnb.kalman import report_bounds
 from gpbnb.measurement import YEAR
@@ -117,8 +118,6 @@ class Calculator:
         return {each.name: each.number(self.examples[example][each.name]) for each in self.inputs}
 
     def _repr_html_(self) -> str:
-        from gpbnb.calculators.page import form
-
         return form(self)
 
     def __repr__(self) -> str:
