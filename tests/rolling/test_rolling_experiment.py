@@ -10,8 +10,8 @@ import pytest
 from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.ledger.checks import experiment, theory
 from gpbnb.ledger.checks.rolling import material
+from gpbnb.rolling import experiment, theory
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
 
 

@@ -11,8 +11,8 @@ from matplotlib.container import ErrorbarContainer
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.display import style
-from gpbnb.ledger.checks import experiment, figures, theory
 from gpbnb.ledger.checks.rolling import material
+from gpbnb.rolling import experiment, figures, theory
 
 
 @pytest.fixture
