@@ -111,7 +111,7 @@ def year_end(
     answers : name and numbers of digits, open markers on the goal; the last is drawn upright, through it.
     """
     artists: list[Artist] = []
-    looks = [(form, rounding) for rounding in Rounding for form in Form]
+    looks = [(form, rounding) for rounding in Rounding.documented() for form in Form]
     for form, rounding in looks:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
         if points := _points(group):

@@ -59,12 +59,14 @@ def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
 def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
     assert answers.find(100.0).observed[Rounding.NEAREST] < answers.find().observed[Rounding.NEAREST]
     runs = answers.find().runs
-    best = max(min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
+    best = max(
+        min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding.documented()
+    )
     with pytest.raises(ValueError, match=f"needed one that some year meets: the best rounds to {best:.2g}"):
         answers.find(1e-12)
 
 
-@pytest.mark.parametrize("rounding", Rounding)
+@pytest.mark.parametrize("rounding", Rounding.documented())
 def test_the_goal_itself_is_met_and_what_is_just_below_is_not(rounding):
     found = answers.find()
     digits = found.observed[rounding]
