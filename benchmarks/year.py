@@ -52,7 +52,9 @@ def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
     """Run both arithmetics and NumPy in turns, block by block; NumPy takes every twentieth, and its time is scaled."""
     usual = year_cases.MODELS[0]
     runs = {
-        FloatFormat(base, precision): Run(year_cases.model(usual, base), FloatFormat(base, precision), Form.USUAL, ())
+        FloatFormat(base, precision): Run(
+            year_cases.model(usual, base), FloatFormat(base, precision), Form.INNOVATION, ()
+        )
         for base, precision in ((2, 24), (10, 8))
     }
     given = year_cases.model(usual, 2).to_float()
@@ -61,7 +63,7 @@ def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
     x, P, identity = given["x0"].reshape(-1, 1), given["P0"], np.eye(len(Phi))
     source, truth = year_cases.simulation(usual), np.array(TRUTH)
     for fmt in runs:  # compiles
-        Run(year_cases.model(usual, fmt.base), fmt, Form.USUAL, ()).take(source.measurements(1))
+        Run(year_cases.model(usual, fmt.base), fmt, Form.INNOVATION, ()).take(source.measurements(1))
     total, numpy_steps, numpy_total = dict.fromkeys(runs, 0.0), 0, 0.0
     for number in tqdm(range(-(-steps // BLOCK)), desc="a year, thrice", unit="block"):
         before = number * BLOCK

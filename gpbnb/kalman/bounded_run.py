@@ -16,13 +16,13 @@ from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import follow
+from gpbnb.kalman.kernels.bounded import advance_bounded
 from gpbnb.kalman.kernels.step import STOPPED
 from gpbnb.kalman.model import LinearModel
 
 
 @dataclass(frozen=True, eq=False)
-class Bounded:
+class BoundedHistory:
     """A history, and the contraction bound of each entry of its errors, infinite where there is none.
 
     Parameters
@@ -46,19 +46,21 @@ class Bounded:
         return np.stack(each, axis=1)
 
 
-class Followed(Run):
-    """A run that takes the contraction bound of :mod:`gpbnb.kalman.contraction` along; see :class:`Run`.
+class BoundedRun(Run):
+    """A run together with its contraction bound, :mod:`gpbnb.kalman.contraction`; see :class:`Run`.
 
     Of the reference itself, in double-double, the bound says how far it may be from what is exact.
     """
 
-    def __init__(self, model: LinearModel, fmt: FloatFormat | None, form: Form, marks: Sequence[int]) -> None:
-        super().__init__(model, fmt, form, marks)
+    def __init__(
+        self, model: LinearModel, fmt: FloatFormat | None, form: Form, checkpoint_steps: Sequence[int]
+    ) -> None:
+        super().__init__(model, fmt, form, checkpoint_steps)
         self.stored = model if fmt is None else model.rounded(fmt)
         given = self.stored.to_float()
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
-        self._exact = Run(self.stored, None, Form.USUAL, ())._parts
-        n, m, count = model.n, model.m, len(self.marks)
+        self._exact = Run(self.stored, None, Form.INNOVATION, ())._matrices
+        n, m, count = model.n, model.m, len(self.checkpoint_steps)
         self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
         zero_n, size = np.zeros(n), np.zeros((n, n))
         if self.form is Form.UD:  # the first factors may be off
@@ -81,23 +83,25 @@ class Followed(Run):
         packed = self._packed(z)
         values = double_doubles(self.exactly(packed))
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        kept = (self.marks, (self.X, self.G, self.C), self.bounds, self.notes)
-        told = (self.tag, int(self.form), self._parts, self._exact, self._plain)
+        outputs = (self.checkpoint_steps, (self.X, self.G, self.C), self.bounds, self.notes)
+        inputs = (self.tag, int(self.form), self._matrices, self._exact, self._plain)
         try:
-            self.bound = follow(*told, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *kept)
+            self.bound = advance_bounded(
+                *inputs, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *outputs
+            )
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1
 
 
-def bounded(
-    model: LinearModel, z: Any, fmt: FloatFormat, form: Form = Form.REPORT, marks: Sequence[int] | None = None
-) -> Bounded:
+def emulate_with_bound(
+    model: LinearModel, z: Any, fmt: FloatFormat, form: Form = Form.HUNG, checkpoint_steps: Sequence[int] | None = None
+) -> BoundedHistory:
     """Run the filter rounded, in double-double, and with its contraction bound; arguments as of :func:`emulate`."""
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
-    chosen = log_spaced(len(measured)) if marks is None else tuple(marks)
-    run = Followed(model, fmt, form, chosen)
+    chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
+    run = BoundedRun(model, fmt, form, chosen)
     run.take(measured)
     history = compare_runs(run, reference(run.stored, measured.to_fractions(), chosen))
     c = len(history.steps)
     state, gain, covariance = run.bounds
-    return Bounded(history, state[:c], gain[:c], covariance[:c])
+    return BoundedHistory(history, state[:c], gain[:c], covariance[:c])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.filter_run import Kept, Run, log_spaced, reference
+from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
@@ -36,7 +36,7 @@ class History:
     state: NDArray[np.float64]
     gain: NDArray[np.float64]
     covariance: NDArray[np.float64]
-    reference: Kept
+    reference: Checkpoints
     indefinite: int | None
     stopped: int | None
 
@@ -71,16 +71,19 @@ def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
-def compare_runs(run: Run, true: Kept) -> History:
-    """What a run kept, minus the reference at the same steps."""
-    kept = run.kept()
-    c = len(kept.steps)
-    if kept.steps != true.steps[:c]:
-        raise ValueError(f"got marks {kept.steps} and, of the reference, {true.steps}; needed the same")
+def compare_runs(run: Run, true: Checkpoints) -> History:
+    """Subtract the reference from the checkpoints of a run, at the same steps."""
+    checkpoints = run.checkpoints()
+    c = len(checkpoints.steps)
+    if checkpoints.steps != true.steps[:c]:
+        raise ValueError(
+            f"got checkpoint steps {checkpoints.steps} and, of the reference, {true.steps}; needed the same"
+        )
     x, K, P = (
-        (each - other[:c]).astype(np.float64) for each, other in ((kept.x, true.x), (kept.K, true.K), (kept.P, true.P))
+        (each - other[:c]).astype(np.float64)
+        for each, other in ((checkpoints.x, true.x), (checkpoints.K, true.K), (checkpoints.P, true.P))
     )
-    fmt, steps = cast(FloatFormat, run.fmt), np.array(kept.steps, dtype=np.int64)
+    fmt, steps = cast(FloatFormat, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
     return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped)
 
 
@@ -88,9 +91,9 @@ def emulate(
     model: LinearModel,
     z: Any,
     fmt: FloatFormat,
-    form: Form = Form.REPORT,
-    marks: Sequence[int] | None = None,
-    true: Kept | None = None,
+    form: Form = Form.HUNG,
+    checkpoint_steps: Sequence[int] | None = None,
+    true: Checkpoints | None = None,
     fused: bool = False,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
@@ -100,13 +103,13 @@ def emulate(
     model : n states, m measurements.
     z : (steps, m), measurements.
     fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13; or fixed point.
-    marks : steps at which to compare; by default four a decade.
+    checkpoint_steps : steps at which to compare; by default four a decade.
     true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
         errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
     fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
     """
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
-    chosen = log_spaced(len(measured)) if marks is None else tuple(marks)
+    chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     run = Run(model, fmt, form, chosen, fused)
     run.take(measured)
     if true is None:

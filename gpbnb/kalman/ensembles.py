@@ -1,6 +1,6 @@
 """Many filters at once: models x formats x forms x seeds, on any executor; ``python -m gpbnb.kalman.ensembles``.
 
-Each trial is told by a few numbers, so that it may run anywhere, and gives the same there. What the command found is
+Each trial is given by a few numbers, so that it may run anywhere, and gives the same there. What the command found is
 kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
 """
 
@@ -26,7 +26,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import report_bounds
-from gpbnb.kalman.bounded_run import Bounded, bounded
+from gpbnb.kalman.bounded_run import BoundedHistory, emulate_with_bound
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year import machine
@@ -137,7 +137,9 @@ def trial(task: Task) -> Outcome:
     rng = np.random.default_rng([task.seed, KINDS.index(task.kind)])
     model, size = random_model(rng, task.kind)
     z = _short(size * rng.standard_normal((task.steps, model.m)))
-    found = bounded(model, np.abs(z) if task.kind == "one sign" else z, task.fmt, task.form, range(1, task.steps + 1))
+    found = emulate_with_bound(
+        model, np.abs(z) if task.kind == "one sign" else z, task.fmt, task.form, range(1, task.steps + 1)
+    )
     ratios = found.ratios()
     finite = np.isfinite(found.state).all(axis=1)
     largest = ratios.max(axis=0, initial=0.0) if len(ratios) else np.zeros(3)
@@ -149,7 +151,7 @@ def trial(task: Task) -> Outcome:
     return Outcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
 
 
-def printed_ratios(found: Bounded, task: Task) -> tuple[float, float, float]:
+def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
     """Largest error over (105) and (108), of all entries and steps, and over (125), of all steps."""
     history, beta = found.history, float(task.fmt.unit_roundoff)
     c = len(history.steps)
@@ -163,7 +165,9 @@ def printed_ratios(found: Bounded, task: Task) -> tuple[float, float, float]:
         return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, task, x, K))
 
 
-def _printed_state(found: Bounded, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]) -> NDArray[np.float64]:
+def _printed_state(
+    found: BoundedHistory, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(125) as printed, after each step, with the least B of (122)."""
     model, beta = found.history.model, float(task.fmt.unit_roundoff)
     given = model.to_float()

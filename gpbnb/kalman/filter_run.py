@@ -16,34 +16,41 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.step import DONE, INDEFINITE, MARK, STOPPED, advance, prepare
+from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, STOPPED, advance, prepare
 from gpbnb.kalman.model import LinearModel
 
 
 class Run:
-    """A filter on its way: what it has been told, where it is, and what it kept at the marked steps.
+    """A resumable run of a filter: inputs, state and checkpoints.
 
     Parameters
     ----------
     model : n states, m measurements.
     fmt : the format in which all of it is stored and computed; None for double-double.
     form : how a step is computed.
+    checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in rising order.
     fused : whether products are added by fused multiply-add; base 2 or 16.
-    marks : steps, 1 or more, after which estimate, gain and covariance are kept, in rising order.
 
     Raises
     ------
-    ValueError : a format without compiled loops; marks that do not rise.
+    ValueError : a format without compiled loops; checkpoint steps that do not rise.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
     def __init__(
-        self, model: LinearModel, fmt: FloatFormat | None, form: Form, marks: Sequence[int], fused: bool = False
+        self,
+        model: LinearModel,
+        fmt: FloatFormat | None,
+        form: Form,
+        checkpoint_steps: Sequence[int],
+        fused: bool = False,
     ) -> None:
         self.model, self.fmt, self.form = model, fmt, Form(form)
-        self.marks = np.array(marks, dtype=np.int64).reshape(-1)
-        if np.any(np.diff(self.marks, prepend=0) <= 0):
-            raise ValueError(f"got marks {list(marks)[:5]} …; needed steps of 1 or more, each above the one before")
+        self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
+        if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
+            raise ValueError(
+                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed steps of 1 or more, each above the last"
+            )
         if fmt is not None and not isinstance(fmt.backend, Compiled):
             raise ValueError(
                 f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
@@ -52,7 +59,7 @@ class Run:
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused)
         Phi, H, Q, R = (self._packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
-        n, m, count = model.n, model.m, len(self.marks)
+        n, m, count = model.n, model.m, len(self.checkpoint_steps)
         identity = self._packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
         self.x, self.P = self._packed(model.x0.reshape(n, 1)), self._packed(model.P0)
         RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
@@ -61,15 +68,15 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         try:
-            fine = prepare(self.tag, int(form), Q, R, self.P, RI, self.UQ, self.UR)
+            definite = prepare(self.tag, int(form), Q, R, self.P, RI, self.UQ, self.UR)
         except ZeroDivisionError:
-            fine = False
-        if not fine:
+            definite = False
+        if not definite:
             raise ValueError(
                 f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
                 "this format; use more digits, or add a little to the diagonals of Q and P0"
             )
-        self._parts = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
+        self._matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
 
     @property
     def steps(self) -> int:
@@ -94,9 +101,9 @@ class Run:
             return
         packed = self._packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        kept = (self.marks, self.X, self.G, self.C, self.notes)
+        outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
-            advance(self.tag, int(self.form), self._parts, packed, self.steps, self.x, self.P, *kept)
+            advance(self.tag, int(self.form), self._matrices, packed, self.steps, self.x, self.P, *outputs)
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1
 
@@ -126,20 +133,20 @@ class Run:
             FloatArray.from_components(backend, backend.unpack(packed), self.fmt).to_fractions(), dtype=object
         )
 
-    def kept(self) -> Kept:
-        """Estimate, gain and covariance at the marked steps that were reached."""
-        count = int(self.notes[MARK])
+    def checkpoints(self) -> Checkpoints:
+        """Estimate, gain and covariance at the checkpoint steps that were reached."""
+        count = int(self.notes[NEXT_CHECKPOINT])
         x, K, P = (self.exactly(each[:count]) for each in (self.X, self.G, self.C))
         if self.form is Form.UD:
             K, P = self._from_factors(K, P)
-        return Kept(tuple(int(mark) for mark in self.marks[:count]), x[..., 0], K, P)
+        return Checkpoints(tuple(int(step) for step in self.checkpoint_steps[:count]), x[..., 0], K, P)
 
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Gains and covariances that the factors, and the gains of one measurement after the other, stand for."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
-        H, UR, n = self.exactly(self._parts[2]), self.exactly(self.UR), self.model.n
+        H, UR, n = self.exactly(self._matrices[2]), self.exactly(self.UR), self.model.n
         unit = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
-        for at, step in enumerate(self.marks[: len(K)] - 1):
+        for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
             h, ur = H[step % len(H)], UR[step % len(UR)]
             upper = np.triu(ur, 1) + np.array([[Fraction(int(i == j)) for j in range(len(ur))] for i in range(len(ur))])
             inverse_upper = _unit_upper_inverse(upper)
@@ -165,7 +172,7 @@ def _unit_upper_inverse(upper: NDArray[Any]) -> NDArray[Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class Kept:
+class Checkpoints:
     """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n)."""
 
     steps: tuple[int, ...]
@@ -174,33 +181,33 @@ class Kept:
     P: NDArray[Any]
 
 
-def log_spaced(steps: int, a_decade: int = 4) -> tuple[int, ...]:
+def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
     """Steps from 1 to the last, at equal ratios.
 
     Raises
     ------
     ValueError : no steps, or none a decade.
     """
-    if steps < 1 or a_decade < 1:
-        raise ValueError(f"got {steps} steps, {a_decade} a decade; needed both at least 1")
-    grid = np.rint(10 ** (np.arange(0, int(math.log10(steps) * a_decade) + 1) / a_decade))
+    if steps < 1 or per_decade < 1:
+        raise ValueError(f"got {steps} steps, {per_decade} a decade; needed both at least 1")
+    grid = np.rint(10 ** (np.arange(0, int(math.log10(steps) * per_decade) + 1) / per_decade))
     return tuple(sorted({int(k) for k in grid if k <= steps} | {steps}))
 
 
-def reference(model: LinearModel, z: Any, marks: Sequence[int], form: Form = Form.USUAL) -> Kept:
+def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form: Form = Form.INNOVATION) -> Checkpoints:
     """Run the filter in double-double, whose operations have relative errors below 2**-102.
 
     Parameters
     ----------
     z : (steps, m), measurements; float64 or Fractions.
-    marks : steps whose results are kept.
+    checkpoint_steps : steps whose results are saved.
 
     Raises
     ------
     ArithmeticError : a division by zero or a number beyond 2**1000, even so: the model is degenerate.
     """
-    run = Run(model, None, form, marks)
+    run = Run(model, None, form, checkpoint_steps)
     run.take(z)
     if run.stopped:
-        raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or mend the model")
-    return run.kept()
+        raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
+    return run.checkpoints()

@@ -52,7 +52,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     Parameters
     ----------
     roll : period in seconds, "600" (as in the reports) or "77.5" (as flown); or another multiple of half a second.
-    process_noise : whether drift, misalignments and scale wander; without, gains fall for ever.
+    process_noise : whether drift, misalignments and scale perform a random walk; without it, gains fall for ever.
 
     References
     ----------
@@ -73,12 +73,12 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     H = np.stack([gyro, telescope], axis=1)
     Phi = _diagonal("1 1 1 1 0.9 0.9 1 1 0.999 1")
     Phi[0, 2] = Phi[1, 3] = Fraction(1, YEAR)
-    wander = "1e-8 1e-8 1e-8 1e-8 76 76 1e-6 1e-6 0.01 1e-10"
-    still = "0 0 0 0 76 76 0 0 0.01 0"
+    random_walk = "1e-8 1e-8 1e-8 1e-8 76 76 1e-6 1e-6 0.01 1e-10"
+    noiseless = "0 0 0 0 76 76 0 0 0.01 0"
     return LinearModel(
         Phi=Phi,
         H=H,
-        Q=_diagonal(wander if process_noise else still),
+        Q=_diagonal(random_walk if process_noise else noiseless),
         R=_diagonal("2500 25"),
         x0=np.array([Fraction(0)] * 10, dtype=object),
         P0=_diagonal("1e4 1e4 1e8 1e8 400 400 1e4 1e4 5 100"),

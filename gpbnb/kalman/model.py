@@ -1,4 +1,4 @@
-"""What a Kalman filter is told: a linear model, checked once."""
+"""What a Kalman filter is given: a linear model, checked once."""
 
 from __future__ import annotations
 

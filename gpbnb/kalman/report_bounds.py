@@ -1,6 +1,6 @@
 r"""The rounding error bounds of hung1984, ch. II, section 12, and its closing example.
 
-:func:`coefficients` gives (125) as printed and with each of its faults mended. All functions are exact: ints and
+:func:`coefficients` gives (125) as printed and with each of its faults corrected. All functions are exact: ints and
 Fractions in, Fractions out.
 """
 
@@ -75,7 +75,7 @@ class Coefficients(NamedTuple):
 def coefficients(
     k: int, n: int, m: int, once: bool = False, free_signs: bool = False, carried: bool = False
 ) -> Coefficients:
-    r"""Return the coefficients of (125), as printed or with faults mended.
+    r"""Return the coefficients of (125), as printed or with faults corrected.
 
     With :math:`c_j` roundings of the closed loop of step j and :math:`d_j` of its input, the report bounds
     :math:`\|\tilde x_k\|` by :math:`\beta\{a_0\|x_k\| + \sum_{i=1}^k (a_0 - a_i)B\}`,
@@ -108,13 +108,13 @@ def coefficients(
     return Coefficients(first, 2 * k * first - loops + inputs if free_signs else loops - inputs)
 
 
-MENDINGS: dict[str, dict[str, bool]] = {
+CORRECTIONS: dict[str, dict[str, bool]] = {
     "as printed": {},
     "counted once": {"once": True},
     "and signs free": {"once": True, "free_signs": True},
     "and errors carried on": {"once": True, "free_signs": True, "carried": True},
 }
-"""Arguments of :func:`coefficients`, one more fault of (125) mended on each line."""
+"""Arguments of :func:`coefficients`, one more fault of (125) corrected on each line."""
 
 
 def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fraction:
@@ -144,28 +144,28 @@ def state_bound(
     return beta * (counts.first * x_norm + counts.second * B)
 
 
-def required_precision(
-    coefficient: int | Fraction, goal: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
+def precision_for_coefficient(
+    coefficient: int | Fraction, tolerance: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
 ) -> int:
-    r"""Smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{goal}`.
+    r"""Smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{tolerance}`.
 
     Parameters
     ----------
-    coefficient : what multiplies β. goal : the error that is granted, in the same units.
+    coefficient : what multiplies β. tolerance : the error that is granted, in the same units.
     base, rounding : of the format.
 
     Raises
     ------
-    ValueError : coefficient or goal not positive.
+    ValueError : coefficient or tolerance not positive.
 
     References
     ----------
     hung1984, ch. II, (8), (13) and the example of section 12.
     """
-    if coefficient <= 0 or goal <= 0:
-        raise ValueError(f"got coefficient {coefficient} and goal {goal}; needed both positive")
+    if coefficient <= 0 or tolerance <= 0:
+        raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
     precision = 1
-    while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > goal:
+    while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > tolerance:
         precision += 1
     return precision
 
@@ -196,7 +196,7 @@ def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction
     return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
 
 
-def one_figure_slips(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
+def one_digit_misprints(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
     """Every (a, b, c) that differs from (7, 3, 6) in one figure and for which k(an + bm + c) comes out as `printed`."""
     right = (7, 3, 6)
     changed = [(*right[:i], figure, *right[i + 1 :]) for i in range(3) for figure in range(10) if figure != right[i]]

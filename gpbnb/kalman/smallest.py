@@ -128,7 +128,7 @@ def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -
     )
 
 
-def mildest(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
+def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
     """The largest R up to 1 in :func:`scalar` that breaks each bound, of all R of the format above b**-t.
 
     Returns

@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import Rounding
-from gpbnb.kalman.bounded_run import Followed
+from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import History, relative
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import YEAR
 from gpbnb.kalman.year_cases import CASES, Case
-from gpbnb.kalman.year_runs import Journey, history, reference_checkpoints, travel
+from gpbnb.kalman.year_runs import ResumableRun, history, reference_checkpoints, run_cases
 
 _HERE = Path(__file__).parent
 _COLUMNS = ("drift_2", "drift_3", "rate_2", "rate_3", "state", "gain", "covariance", "least_eigenvalue")
@@ -90,8 +90,8 @@ class Bounds:
 
 def bound_rows(case: Case, directory: Path, steps: int) -> list[tuple[str, ...]]:
     """Lines of ``bounds.csv``, if the reference is followed: six significant digits, rounded upwards."""
-    run, true = Journey(case, directory, steps).run, reference_checkpoints(case, directory, steps)
-    if not isinstance(run, Followed):
+    run, true = ResumableRun(case, directory, steps).run, reference_checkpoints(case, directory, steps)
+    if not isinstance(run, BoundedRun):
         return []
     states, gains, covariances = (each[: len(true.steps)] for each in run.bounds)
     norms = [relative(gains, true.K), relative(covariances, true.P)]
@@ -116,16 +116,16 @@ def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = 
     about: dict[str, Any] = {}
     references: dict[str, Any] = {}
     for case in cases:
-        journey = Journey(case, directory, steps)
-        if not journey.finished:
+        resumable = ResumableRun(case, directory, steps)
+        if not resumable.finished:
             continue
         found = history(case, directory, steps)
         lines += rows(case, found)
         about[case.name] = {
             "indefinite": found.indefinite,
             "stopped": found.stopped,
-            "seconds": round(journey.seconds, 1),
-            "told": journey.told,
+            "seconds": round(resumable.seconds, 1),
+            "fingerprint": resumable.fingerprint,
         }
         if case.reference.name not in references:
             references[case.reference.name] = _of_reference(case.reference, directory, steps)
@@ -153,14 +153,14 @@ def machine() -> dict[str, Any]:
 
 def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
     """What the unrounded filter knew at the end: how far it was from the truth, and how far it thought it was."""
-    journey = Journey(case, directory, steps)
+    resumable = ResumableRun(case, directory, steps)
     true = reference_checkpoints(case, directory, steps)
     x, deviation = true.x[-1].astype(np.float64), np.sqrt(true.P[-1].diagonal().astype(np.float64))
     return {
-        "seconds": round(journey.seconds, 1),
-        "told": journey.told,
+        "seconds": round(resumable.seconds, 1),
+        "fingerprint": resumable.fingerprint,
         "estimate": [float(f"{each:.9g}") for each in x],
-        "estimate minus truth": [float(f"{each:.6g}") for each in x - journey.truth],
+        "estimate minus truth": [float(f"{each:.6g}") for each in x - resumable.truth],
         "standard deviation": [float(f"{each:.6g}") for each in deviation],
     }
 
@@ -191,7 +191,7 @@ def load(directory: Path = _HERE) -> tuple[Year, ...]:
 
 @cache
 def bounds(directory: Path = _HERE) -> dict[Case, Bounds]:
-    """The contraction bounds of :data:`FOLLOWED` that the package brings."""
+    """The contraction bounds of :data:`BOUNDED_CASES` that the package brings."""
     return {
         case: Bounds(
             case, numbers[:, 0].astype(np.int64), numbers[:, 1:3], numbers[:, 3:5], *(numbers[:, i] for i in (5, 6, 7))
@@ -230,7 +230,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, default=_HERE, help="where year.csv and year.json go")
     given = parser.parse_args(arguments)
     try:
-        travel(CASES[: given.cases], given.directory, given.steps)
+        run_cases(CASES[: given.cases], given.directory, given.steps)
     except KeyboardInterrupt:
         print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
         return 130

@@ -39,7 +39,7 @@ class Case(NamedTuple):
     @property
     def reference(self) -> Case:
         """The case whose results are true for this one."""
-        return Case(self.model, self.base, 0, Rounding.NEAREST, Form.USUAL)
+        return Case(self.model, self.base, 0, Rounding.NEAREST, Form.INNOVATION)
 
     @property
     def name(self) -> str:
@@ -49,34 +49,34 @@ class Case(NamedTuple):
 
 
 def _cases() -> tuple[Case, ...]:
-    usual, flown, still = MODELS
+    usual, flown, noiseless = MODELS
     nearest, chop = Rounding
-    others = (Form.USUAL, Form.JOSEPH, Form.UD)
-    cases = [Case(usual, 2, t, nearest, Form.REPORT) for t in (24, 18, 32, 14, 20, 53)]
-    cases += [Case(usual, 2, t, chop, Form.REPORT) for t in (24, 18, 32)]
+    others = (Form.INNOVATION, Form.JOSEPH, Form.UD)
+    cases = [Case(usual, 2, t, nearest, Form.HUNG) for t in (24, 18, 32, 14, 20, 53)]
+    cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (24, 18, 32)]
     cases += [Case(usual, 2, 24, nearest, form) for form in others]
-    cases += [Case(usual, 10, 8, nearest, Form.REPORT), Case(usual, 10, 6, nearest, Form.REPORT)]
-    cases += [Case(flown, 2, 24, nearest, Form.REPORT), Case(still, 2, 24, nearest, Form.REPORT)]
-    cases += [Case(usual, 2, t, nearest, Form.REPORT) for t in (22, 28)]
+    cases += [Case(usual, 10, 8, nearest, Form.HUNG), Case(usual, 10, 6, nearest, Form.HUNG)]
+    cases += [Case(flown, 2, 24, nearest, Form.HUNG), Case(noiseless, 2, 24, nearest, Form.HUNG)]
+    cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (22, 28)]
     cases += [Case(usual, 2, 18, nearest, form) for form in others]
-    cases += [Case(usual, 2, 24, nearest, Form.SECOND), Case(usual, 10, 8, chop, Form.REPORT)]
-    cases += [Case(usual, 10, 8, nearest, Form.UD), Case(usual, 10, 10, nearest, Form.REPORT)]
+    cases += [Case(usual, 2, 24, nearest, Form.HUNG_SECOND_GAIN), Case(usual, 10, 8, chop, Form.HUNG)]
+    cases += [Case(usual, 10, 8, nearest, Form.UD), Case(usual, 10, 10, nearest, Form.HUNG)]
     cases += [Case(usual, 2, 24, chop, form) for form in others]
     cases += [Case(usual, 10, 8, nearest, form) for form in others[:2]]
-    cases += [Case(usual, 10, 4, nearest, Form.REPORT), Case(usual, 10, 16, nearest, Form.REPORT)]
-    cases += [Case(usual, 2, t, nearest, Form.REPORT) for t in (16, 26, 40)]
-    cases += [Case(usual, 2, t, chop, Form.REPORT) for t in (14, 20, 28, 53)]
+    cases += [Case(usual, 10, 4, nearest, Form.HUNG), Case(usual, 10, 16, nearest, Form.HUNG)]
+    cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (16, 26, 40)]
+    cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (14, 20, 28, 53)]
     cases += [Case(usual, 2, 53, nearest, form) for form in others]
     # The neighbours of the smallest that meet a milliarcsecond a year, so that these are known to the digit.
-    cases += [Case(usual, 10, 9, nearest, Form.REPORT), *(Case(usual, 2, t, nearest, Form.REPORT) for t in (31, 33))]
+    cases += [Case(usual, 10, 9, nearest, Form.HUNG), *(Case(usual, 2, t, nearest, Form.HUNG) for t in (31, 33))]
     return tuple(cases)
 
 
-#: All runs, the most telling first.
+#: All runs, the most informative first.
 CASES = _cases()
 
-#: Runs with the contraction bound at their side, the references of the first model, on which the others' bounds rest.
-FOLLOWED = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.USUAL) for base in STORED)
+#: Runs with their own contraction bound: the references of the first model, on which the bounds of the others rest.
+BOUNDED_CASES = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.INNOVATION) for base in STORED)
 
 
 @cache
@@ -92,6 +92,6 @@ def simulation(name: str) -> Simulation:
     return gravity_probe_b_year(model(name, 2))
 
 
-def marks(steps: int = YEAR) -> tuple[int, ...]:
-    """The steps whose results are kept: three a decade."""
+def checkpoint_steps(steps: int = YEAR) -> tuple[int, ...]:
+    """The steps whose results are saved: three a decade."""
     return log_spaced(steps, 3)

@@ -14,39 +14,39 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.kalman.bounded_run import Followed
+from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.contraction import Contraction
 from gpbnb.kalman.emulation import History, compare_runs
-from gpbnb.kalman.filter_run import Kept, Run
+from gpbnb.kalman.filter_run import Checkpoints, Run
 from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
 from gpbnb.kalman.simulation import BLOCK
-from gpbnb.kalman.year_cases import FOLLOWED, Case, marks, model, simulation
+from gpbnb.kalman.year_cases import BOUNDED_CASES, Case, checkpoint_steps, model, simulation
 
-_SAVED_EACH = 64  # blocks
-_TRIED = 200  # steps by which a change of the code is told
+_BLOCKS_PER_SAVE = 64  # blocks
+_FINGERPRINT_STEPS = 200  # steps that show whether the code computes the same
 
 
-class Journey:
-    """A run of a case, kept in a file; with the contraction bound at its side, if it is among :data:`FOLLOWED`."""
+class ResumableRun:
+    """A run of a case, saved in a file; with its contraction bound if it is among :data:`BOUNDED_CASES`."""
 
     def __init__(self, case: Case, directory: Path, steps: int) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0
         self.run = _run(case, steps)
         self.truth: NDArray[np.float64] = np.array(TRUTH)
         self.file = directory / f"{case.name}.npz"
-        self.told = fingerprint(case, steps)
+        self.fingerprint = fingerprint(case, steps)
         if self.file.exists():
             with np.load(self.file) as saved:
-                if str(saved["told"]) == self.told:
-                    for name, array in self._kept().items():
+                if str(saved["fingerprint"]) == self.fingerprint:
+                    for name, array in self._arrays().items():
                         array[...] = saved[name]
-                    if isinstance(self.run, Followed):
+                    if isinstance(self.run, BoundedRun):
                         self.run.bound = Contraction(*(saved[f"bound_{name}"][()] for name in Contraction._fields))
                     self.truth, self.seconds = saved["truth"], float(saved["seconds"])
 
-    def _kept(self) -> dict[str, NDArray[Any]]:
+    def _arrays(self) -> dict[str, NDArray[Any]]:
         arrays = {name: getattr(self.run, name) for name in ("x", "P", "X", "G", "C", "notes")}
-        if isinstance(self.run, Followed):
+        if isinstance(self.run, BoundedRun):
             arrays |= dict(zip(("states", "gains", "covariances"), self.run.bounds, strict=True))
         return arrays
 
@@ -54,7 +54,7 @@ class Journey:
     def finished(self) -> bool:
         return self.run.steps >= self.steps or self.run.stopped is not None
 
-    def go_on(self, blocks: int, bar: Any = None) -> None:
+    def advance(self, blocks: int, bar: Any = None) -> None:
         """Take at most so many blocks of measurements, and save."""
         source = simulation(self.case.model)
         for _ in range(blocks):
@@ -71,42 +71,44 @@ class Journey:
     def save(self) -> None:
         """Write all of it, or nothing."""
         draft = self.file.with_suffix(f".{os.getpid()}.npz")
-        arrays = self._kept()
-        if isinstance(self.run, Followed):
+        arrays = self._arrays()
+        if isinstance(self.run, BoundedRun):
             arrays |= {f"bound_{name}": np.asarray(each) for name, each in self.run.bound._asdict().items()}
-        arrays |= {"truth": self.truth, "seconds": np.array(self.seconds), "told": np.array(self.told)}
+        arrays |= {"truth": self.truth, "seconds": np.array(self.seconds), "fingerprint": np.array(self.fingerprint)}
         np.savez(draft, allow_pickle=False, **arrays)
         os.replace(draft, self.file)
 
 
 def _run(case: Case, steps: int) -> Run:
-    kind = Followed if case in FOLLOWED else Run
-    return kind(model(case.model, case.base), case.fmt, case.form, marks(steps))
+    kind = BoundedRun if case in BOUNDED_CASES else Run
+    return kind(model(case.model, case.base), case.fmt, case.form, checkpoint_steps(steps))
 
 
 @cache
 def fingerprint(case: Case, steps: int) -> str:
-    """A digest of all that a run is told, and of what it makes of the first measurements, to the last digit.
+    """Digest the inputs of a run and its results for the first measurements, to the last digit.
 
-    Code that computes otherwise makes runs begin again; code that is only written otherwise does not.
+    Saved runs are discarded when the code's results change, but not when only its text changes.
     """
-    told, run = model(case.model, case.base), _run(case, steps)
-    digest = hashlib.sha256(repr((case.name, steps, marks(steps), TRUTH, BLOCK, case in FOLLOWED)).encode())
+    given, run = model(case.model, case.base), _run(case, steps)
+    digest = hashlib.sha256(
+        repr((case.name, steps, checkpoint_steps(steps), TRUTH, BLOCK, case in BOUNDED_CASES)).encode()
+    )
     for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
-        digest.update(" ".join(map(str, getattr(told, letter).flat)).encode())
-    run.take(simulation(case.model).measurements(_TRIED))
-    bound = run.bound if isinstance(run, Followed) else ()
+        digest.update(" ".join(map(str, getattr(given, letter).flat)).encode())
+    run.take(simulation(case.model).measurements(_FINGERPRINT_STEPS))
+    bound = run.bound if isinstance(run, BoundedRun) else ()
     for each in (run.x, run.P, run.notes, *bound):
         digest.update(np.ascontiguousarray(each).tobytes())
     return digest.hexdigest()
 
 
-def travel(
+def run_cases(
     cases: Sequence[Case],
     directory: Path,
     steps: int = YEAR,
     progress: bool = True,
-    each: int = _SAVED_EACH,
+    each: int = _BLOCKS_PER_SAVE,
 ) -> None:
     """Run the cases and their references, one after another, each from where it was saved.
 
@@ -122,10 +124,10 @@ def travel(
             if _is_finished(case, directory, steps):
                 bar.update(steps)
                 continue
-            journey = Journey(case, directory, steps)
-            bar.update(journey.run.steps)
-            while not journey.finished:
-                journey.go_on(each, bar)
+            run = ResumableRun(case, directory, steps)
+            bar.update(run.run.steps)
+            while not run.finished:
+                run.advance(each, bar)
 
 
 def _is_finished(case: Case, directory: Path, steps: int) -> bool:
@@ -134,14 +136,16 @@ def _is_finished(case: Case, directory: Path, steps: int) -> bool:
         return False
     with np.load(file) as saved:
         done, _, _, stopped = saved["notes"]
-        return str(saved["told"]) == fingerprint(case, steps) and (done >= steps or stopped > 0)
+        return str(saved["fingerprint"]) == fingerprint(case, steps) and (done >= steps or stopped > 0)
 
 
 def history(case: Case, directory: Path, steps: int = YEAR) -> History:
     """Errors of a finished run."""
-    return compare_runs(Journey(case, directory, steps).run, reference_checkpoints(case.reference, directory, steps))
+    return compare_runs(
+        ResumableRun(case, directory, steps).run, reference_checkpoints(case.reference, directory, steps)
+    )
 
 
 @cache
-def reference_checkpoints(case: Case, directory: Path, steps: int) -> Kept:
-    return Journey(case, directory, steps).run.kept()
+def reference_checkpoints(case: Case, directory: Path, steps: int) -> Checkpoints:
+    return ResumableRun(case, directory, steps).run.checkpoints()

@@ -38,7 +38,7 @@ def to_text(rows: Iterable[Row]) -> str:
     for row in rows:
         found = (row.finding.recomputed, row.finding.note) if row.finding else ()
         cells = (row.statement.id, *filter(None, map(one_line, found)))
-        lines.append(f"{_outcome(row):<12}  {'  '.join(cells)}\n")
+        lines.append(f"{outcome_name(row.outcome):<12}  {'  '.join(cells)}\n")
     return "".join(lines)
 
 
@@ -61,7 +61,7 @@ def table(rows: Iterable[Row]) -> Table:
     body = tuple(
         (
             _place(row.statement),
-            _outcome(row),
+            outcome_name(row.outcome),
             row.statement.printed,
             row.finding.recomputed if row.finding else "",
             row.finding.note if row.finding else "",
@@ -85,7 +85,7 @@ def summary_table(rows: Iterable[Row]) -> Table:
         for place, inside in summary(rows).items()
     ]
     body.append(("all", "", *map(str, total.values()), str(len(rows))))
-    header = ("Document", "Section", *(OUTCOMES.get(outcome, outcome) for outcome in total), "entries")
+    header = ("Document", "Section", *(outcome_name(outcome) for outcome in total), "statements")
     return Table(f"{_title(rows)}; by section", header, tuple(body))
 
 
@@ -94,12 +94,13 @@ def describe(counted: dict[str, int]) -> str:
     return ", ".join(f"{number} {OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
 
 
-def _outcome(row: Row) -> str:
-    return OUTCOMES.get(row.outcome, row.outcome)
+def outcome_name(outcome: str) -> str:
+    """Write an outcome in words: a verdict, ``no check`` or ``check failed``."""
+    return OUTCOMES.get(outcome, outcome)
 
 
 def _title(rows: tuple[Row, ...]) -> str:
-    return f"Ledger of {len(rows)} entries: {describe(counts(rows)) or 'none'}"
+    return f"Ledger of {len(rows)} statements: {describe(counts(rows)) or 'none'}"
 
 
 def _place(entry: Statement) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 
 from gpbnb.ledger.checking import Row
@@ -26,6 +27,7 @@ class Root:
     explanation: str
 
 
+@cache
 def load_roots() -> dict[str, Root]:
     """Read ``roots.csv``: root id → root, in the order of the file."""
     text = (files(__package__) / "roots.csv").read_text(encoding="utf-8")

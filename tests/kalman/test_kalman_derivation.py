@@ -13,7 +13,7 @@ DERIVATIONS = steps.collected(
     derivation.report,
     derivation.propagated,
     derivation.general,
-    derivation.mended,
+    derivation.corrected,
     derivation.scalar_conditions,
     derivation.smallest,
     derivation.contraction,

@@ -23,7 +23,7 @@ def floats(entries):
 # -- counts ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("faults", report_bounds.MENDINGS.values())
+@pytest.mark.parametrize("faults", report_bounds.CORRECTIONS.values())
 @pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (4, 3, 5), (17, 10, 2), (3_153_600, 10, 2)])
 def test_coefficients_are_those_derived(faults, k, n, m):
     c, d = derivation.ONCE if faults.get("once") else derivation.TWICE
@@ -96,29 +96,29 @@ def test_the_least_b():
 @pytest.mark.parametrize(("base", "rounding"), [(2, Rounding.NEAREST), (10, Rounding.NEAREST), (10, Rounding.CHOP)])
 @pytest.mark.parametrize("coefficient", [1, 82, 999_999, 10**9, Fraction(1, 7)])
 def test_required_precision_is_enough_and_the_least(base, rounding, coefficient):
-    t = report_bounds.required_precision(coefficient, Fraction(1, 3), base, rounding)
+    t = report_bounds.precision_for_coefficient(coefficient, Fraction(1, 3), base, rounding)
     assert coefficient * FloatFormat(base, t, rounding).unit_roundoff <= Fraction(1, 3)
     assert t == 1 or coefficient * FloatFormat(base, t - 1, rounding).unit_roundoff > Fraction(1, 3)
 
 
-@pytest.mark.parametrize(("coefficient", "goal"), [(0, 1), (1, 0), (-1, 1)])
-def test_required_precision_needs_positive_numbers(coefficient, goal):
+@pytest.mark.parametrize(("coefficient", "tolerance"), [(0, 1), (1, 0), (-1, 1)])
+def test_required_precision_needs_positive_numbers(coefficient, tolerance):
     with pytest.raises(ValueError, match="needed both positive"):
-        report_bounds.required_precision(coefficient, goal)
+        report_bounds.precision_for_coefficient(coefficient, tolerance)
 
 
 def test_the_closing_example():
     first, second = report_bounds.coefficients(*report_bounds.EXAMPLE)
     assert (first, second) == (258_595_200, 407_752_879_824_000)
-    assert (report_bounds.required_precision(first), report_bounds.required_precision(second)) == (10, 16)
-    assert report_bounds.required_precision(second, base=2) == 49  # IEEE double has 53
+    assert (report_bounds.precision_for_coefficient(first), report_bounds.precision_for_coefficient(second)) == (10, 16)
+    assert report_bounds.precision_for_coefficient(second, base=2) == 49  # IEEE double has 53
 
 
-def test_which_slip_leads_to_which_printed_number():
+def test_which_misprint_leads_to_which_printed_number():
     k, n, m = report_bounds.EXAMPLE
     printed = report_bounds.PRINTED
     assert not prints_as(report_bounds.coefficients(k, n, m).first, printed["first coefficient"])
-    assert report_bounds.one_figure_slips(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
+    assert report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
     assert prints_as(report_bounds.read_as_product(k, n, m, 84), printed["second coefficient"])
     assert not prints_as(report_bounds.read_as_product(k, n, m), printed["second coefficient"])
     for name in ("first", "second"):
@@ -382,8 +382,8 @@ def test_nothing_is_broken_where_nothing_cancels():
 
 @pytest.mark.parametrize("second", [False, True])
 @pytest.mark.parametrize("fmt", [FloatFormat(10, 2), FloatFormat(2, 6)], ids=str)
-def test_the_mildest_is_the_mildest(fmt, second):
-    found = smallest.mildest(fmt, second)
+def test_the_largest_violating_noise_is_the_largest(fmt, second):
+    found = smallest.largest_violating_noise(fmt, second)
     numbers = {Fraction(d, fmt.base ** (fmt.precision - 1 + e)) for e in range(3) for d in range(1, 100)}
     for name, largest in found.items():
         assert getattr(smallest.ratios(fmt, smallest.scalar(fmt, largest), second), name) > 1

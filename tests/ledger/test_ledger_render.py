@@ -151,10 +151,10 @@ def test_rows_may_be_an_iterator():
 
 
 def test_representations_are_short_and_stable():
-    title = "Ledger of 6 entries: 1 verified, 1 misprint, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
+    title = "Ledger of 6 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
     assert repr(table(ROWS)) == f"<{title}>"
     assert repr(summary_table(ROWS)) == f"<{title}; by section>"
-    assert repr(table(())) == "<Ledger of 0 entries: none>"
+    assert repr(table(())) == "<Ledger of 0 statements: none>"
     assert table(ROWS)._repr_markdown_() == table(ROWS).markdown() == to_markdown(ROWS)[:-1]
 
 
@@ -164,7 +164,7 @@ def test_summary_table():
     plain = Row(Statement("hung1984.I.x", "hung1984", "I", "-", "x", "claim", "a"), None)
     found = [[prose for _, prose in row] for row in rendered(summary_table((*ROWS[:2], far, apart, plain)).markdown())]
     assert found == [
-        ["Document", "Section", "verified", "misprint", "no check", "entries"],
+        ["Document", "Section", "verified", "misprint", "no check", "statements"],
         ["hung1984", "II.6", "1", "1", "0", "2"],
         ["hung1984", "II.9.2", "1", "0", "0", "1"],
         ["hung1984", "I", "0", "0", "1", "1"],

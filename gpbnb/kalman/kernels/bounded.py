@@ -10,6 +10,7 @@ from numba import njit
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import (
     difference,
     product,
@@ -33,9 +34,9 @@ from gpbnb.kalman.kernels.contraction import (
     gain_error_bound,
     state_error_bound,
 )
-from gpbnb.kalman.kernels.step import MARK, decorrelate, filter_step, record_step, workspace
+from gpbnb.kalman.kernels.step import NEXT_CHECKPOINT, decorrelate, filter_step, record_step, workspace
 
-_USUAL, _UD = int(Form.USUAL), int(Form.UD)
+_INNOVATION, _UD = int(Form.INNOVATION), int(Form.UD)
 _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 
@@ -129,8 +130,8 @@ def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U
                 put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
 
 
-@njit(cache=True, nogil=True)
-def follow(
+@compiled
+def advance_bounded(
     fmt: Any,
     form: int,
     model: Any,
@@ -142,8 +143,8 @@ def follow(
     x: Any,
     P: Any,
     bound: Any,
-    marks: Any,
-    kept: Any,
+    checkpoint_steps: Any,
+    outputs: Any,
     bounds: Any,
     notes: Any,
 ) -> Any:
@@ -152,7 +153,7 @@ def follow(
     Each step is repeated in double-double from where the run stood: its residuals enter the bound.
     """
     exactly, unit = DoubleDouble(), 2.0**-100
-    (X, G, C), (states, gains, covariances) = kept, bounds
+    (X, G, C), (states, gains, covariances) = outputs, bounds
     n, m = x.shape[0], z.shape[1]
     work = workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
     xe, Pe, xn = np.empty((n, 1, 2)), np.empty((n, n, 2)), np.empty((n, n, 2))
@@ -174,11 +175,12 @@ def follow(
         product(exactly, exact_model[0][k % Phi.shape[0]], xe, hx)
         product(exactly, exact_model[2][k % H.shape[0]], hx, y)
         difference(exactly, exact_z[step], y, y)
-        found = filter_step(exactly, _USUAL, exact_model, k, exact_z[step], xe, Pe, exact_work)
+        found = filter_step(exactly, _INNOVATION, exact_model, k, exact_z[step], xe, Pe, exact_work)
         _symmetrize(Pe)
         answer = filter_step(fmt, form, model, k, z[step], x, P, work)
-        at, marked = notes[MARK], notes[MARK] < marks.shape[0] and marks[notes[MARK]] == k + 1
-        if not record_step(fmt, k, answer, x, work[1][0], P, marks, X, G, C, notes):
+        at = notes[NEXT_CHECKPOINT]
+        is_checkpoint = at < checkpoint_steps.shape[0] and checkpoint_steps[at] == k + 1
+        if not record_step(fmt, k, answer, x, work[1][0], P, checkpoint_steps, X, G, C, notes):
             return bound
         _widen(fmt, form, P, xn, U, UD)
         for i in range(n):
@@ -197,7 +199,7 @@ def follow(
         bound = contraction_step(bound, phi, h, qk, rk, K, S, innovation, q, T, dq, dT, dK, dinnovation)
         if found == 0:
             bound = contraction_start(np.full((n, n), np.inf), np.zeros(n), np.zeros((n, n)))
-        if marked:
+        if is_checkpoint:
             hk, ur = exact_model[2][k % H.shape[0]], model[8][k % R.shape[0]]
             _whole_gain(fmt, form, work[1][0], hk, ur, used, HD, UR)
             states[at] = state_error_bound(bound)

@@ -9,8 +9,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from gpbnb.arithmetic.kernels.compiling import compiled
 
 _U = 2.0**-53
 
@@ -33,7 +34,7 @@ class Contraction(NamedTuple):
     gain: NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def contraction_start(P: Any, de: Any, dE: Any) -> Any:
     """Begin the bound.
 
@@ -56,7 +57,7 @@ def contraction_start(P: Any, de: Any, dE: Any) -> Any:
     return Contraction(L, eta * up, zeta * up, 1.0, np.zeros(1))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def contraction_step(
     before: Any,
     Phi: Any,
@@ -133,7 +134,7 @@ def contraction_step(
     return Contraction(new, eta, (size_T + alpha * alpha * zeta / known) * up, alpha, columns)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
     r"""Bound the errors of the evaluation of one step, componentwise.
 
@@ -173,21 +174,21 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
     return dq[:, 0], dT, dK, many * seen[:, 0]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def state_error_bound(bound: Any) -> Any:
     r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,), in its units."""
     rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
     return rows * bound.eta
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def covariance_error_bound(bound: Any) -> Any:
     r"""Bound each entry of the error of the covariance, :math:`\zeta\sqrt{(LL^T)_{ii}(LL^T)_{jj}}`; (n, n)."""
     rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
     return bound.zeta * np.outer(rows, rows)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
     r"""Bound each entry of the error of the gain that the program used in the step that led to `bound`; (n, m).
 
@@ -202,13 +203,13 @@ def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
     return (np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(rows, bound.gain)) * up
 
 
-@njit(cache=True)
+@compiled
 def _many(n: int, m: int) -> float:
     """Bounds the relative error, by magnitudes, of what a step computes in float64."""
     return (16 * (n + m) + 64) * _U
 
 
-@njit(cache=True)
+@compiled
 def _times(A: Any, B: Any) -> Any:
     rows, inner, columns = A.shape[0], A.shape[1], B.shape[1]
     product = np.zeros((rows, columns))
@@ -221,7 +222,7 @@ def _times(A: Any, B: Any) -> Any:
     return product
 
 
-@njit(cache=True)
+@compiled
 def _norm(A: Any) -> float:
     total = 0.0
     for i in range(A.shape[0]):
@@ -230,7 +231,7 @@ def _norm(A: Any) -> float:
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@compiled
 def _norm2(X: Any) -> float:
     """Upper bound of the largest singular value: mu - X'X proved positive by elimination, mu found by bisection.
 
@@ -255,7 +256,7 @@ def _norm2(X: Any) -> float:
     return math.sqrt(high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace) * (1 + 4 * _U)
 
 
-@njit(cache=True)
+@compiled
 def _is_positive(mu: float, B: Any) -> bool:
     n = len(B)
     M = -B
@@ -271,7 +272,7 @@ def _is_positive(mu: float, B: Any) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def _weights(W: Any) -> Any:
     """A nonsingular lower factor of about W: any will do, so a pivot that is lost is replaced by a small one."""
     n = len(W)
@@ -292,7 +293,7 @@ def _weights(W: Any) -> Any:
     return L
 
 
-@njit(cache=True)
+@compiled
 def _inverse(L: Any) -> Any:
     """Y near the inverse of a lower matrix, and a bound of the Frobenius norm of YL - I."""
     n = len(L)
@@ -307,7 +308,7 @@ def _inverse(L: Any) -> Any:
     return Y, _norm(_times(Y, L) - np.eye(n)) + _many(n, 0) * _norm(_times(np.abs(Y), np.abs(L)))
 
 
-@njit(cache=True)
+@compiled
 def _inverse_general(S: Any) -> Any:
     """Inverse of S by elimination with pivoting, and a componentwise bound of its error; infinite if singular."""
     m = len(S)

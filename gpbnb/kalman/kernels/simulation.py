@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from gpbnb.arithmetic.kernels.compiling import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def measured(Phi: Any, H: Any, process: Any, noise: Any, first: int, w: Any, v: Any, x: Any, z: Any) -> None:
     """Move the truth x by Phi and roots of Q times w, and measure it by H and roots of R times v."""
     n, m = x.shape[0], z.shape[1]

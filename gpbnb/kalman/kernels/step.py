@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import (
     copy,
     difference,
@@ -36,18 +37,18 @@ from gpbnb.arithmetic.kernels.scalar import (
 )
 from gpbnb.kalman.forms import Form
 
-_REPORT, _SECOND, _USUAL, _JOSEPH, _UD = (int(each) for each in Form)
+_HUNG, _HUNG_SECOND_GAIN, _INNOVATION, _JOSEPH, _UD = (int(each) for each in Form)
 
-#: Entries of the notes of a run: steps done, the next mark, the first step with a variance or pivot that is not
-#: positive, and the step that a division by zero ended.
-DONE, MARK, INDEFINITE, STOPPED = range(4)
+#: Entries of the status of a run: steps done, the next checkpoint, the first step with a variance or pivot that is
+#: not positive, and the step that a division by zero ended.
+DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
 
 
 @njit(nogil=True)
 def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: Any) -> Any:
     """Thornton's modified weighted Gram-Schmidt: the factors of Phi U D U' Phi' + UQ DQ UQ', in place of U."""
     n = U.shape[0]
-    fine = True
+    definite = True
     for i in range(n):
         for j in range(n):
             put(fmt, T, (i, j), load(fmt, U, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
@@ -67,7 +68,7 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
                 d = add(fmt, d, multiply(fmt, w, c))
         store(fmt, U, (j, j), d)
         sign = compare(fmt, d, zero(fmt))
-        fine = fine and sign > 0
+        definite = definite and sign > 0
         for i in range(j):
             put(fmt, U, (j, i), zero(fmt))
             s = zero(fmt)
@@ -84,7 +85,7 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
                     if not is_zero(fmt, w):
                         w = multiply(fmt, s, w)
                         store(fmt, W, (i, k), subtract(fmt, load(fmt, W, (i, k)), w))
-    return fine
+    return definite
 
 
 @njit(nogil=True)
@@ -150,25 +151,25 @@ def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
             store(fmt, c, (i, j), s)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def prepare(fmt: Any, form: int, Q: Any, R: Any, P: Any, RI: Any, UQ: Any, UR: Any) -> Any:
     """What a form needs beside the model, computed in its arithmetic: the inverses of R, the factors of Q, R and P."""
     T, S = np.empty_like(P), np.empty_like(R[0])
-    fine = True
-    if form == _SECOND:
+    definite = True
+    if form == _HUNG_SECOND_GAIN:
         for k in range(R.shape[0]):
             copy(fmt, R[k], S)
-            fine = inverse(fmt, S, RI[k]) > 0 and fine
+            definite = inverse(fmt, S, RI[k]) > 0 and definite
     if form == _UD:
         for k in range(Q.shape[0]):
             copy(fmt, Q[k], T)
-            fine = factor_ud(fmt, T, UQ[k]) and fine
+            definite = factor_ud(fmt, T, UQ[k]) and definite
         for k in range(R.shape[0]):
             copy(fmt, R[k], S)
-            fine = factor_ud(fmt, S, UR[k]) and fine
+            definite = factor_ud(fmt, S, UR[k]) and definite
         copy(fmt, P, T)
-        fine = factor_ud(fmt, T, P) and fine
-    return fine
+        definite = factor_ud(fmt, T, P) and definite
+    return definite
 
 
 @njit(nogil=True)
@@ -230,12 +231,12 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
         matrix_sum(fmt, F, T, P)
     else:
         product(fmt, W, V, P)
-    if form == _SECOND:
+    if form == _HUNG_SECOND_GAIN:
         product_by_sparse(fmt, P, hT, B)
         product(fmt, B, RI[k % R.shape[0]], K)
         product_by_sparse(fmt, K, h, T)
         difference(fmt, identity, T, W)
-    if form in (_REPORT, _SECOND):
+    if form in (_HUNG, _HUNG_SECOND_GAIN):
         product_by_sparse(fmt, W, phi, F)
         product(fmt, F, x, u)
         product(fmt, K, z, v)
@@ -253,33 +254,44 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
 
 @njit(nogil=True)
 def record_step(
-    fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, marks: Any, X: Any, G: Any, C: Any, notes: Any
+    fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, checkpoint_steps: Any, X: Any, G: Any, C: Any, notes: Any
 ) -> Any:
-    """Keep what step k + 1 gave, if it is marked; returns whether the run goes on."""
+    """Record the result of step k + 1 if it is a checkpoint step; return whether the run continues."""
     if answer == 0:
         notes[STOPPED] = k + 1
         return False
     if answer < 0 and notes[INDEFINITE] == 0:
         notes[INDEFINITE] = k + 1
     notes[DONE] = k + 1
-    at = notes[MARK]
-    if at < marks.shape[0] and marks[at] == k + 1:
+    at = notes[NEXT_CHECKPOINT]
+    if at < checkpoint_steps.shape[0] and checkpoint_steps[at] == k + 1:
         copy(fmt, x, X[at])
         copy(fmt, K, G[at])
         copy(fmt, P, C[at])
-        notes[MARK] += 1
+        notes[NEXT_CHECKPOINT] += 1
     return True
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def advance(
-    fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, marks: Any, X: Any, G: Any, C: Any, notes: Any
+    fmt: Any,
+    form: int,
+    model: Any,
+    z: Any,
+    first: int,
+    x: Any,
+    P: Any,
+    checkpoint_steps: Any,
+    X: Any,
+    G: Any,
+    C: Any,
+    notes: Any,
 ) -> None:
-    """Go on from the step `first` by as many as z has; at the marked steps, keep x, the gain and P in X, G and C."""
+    """Take one step per row of z, from the step `first`; save x, gain and P in X, G and C at the checkpoint steps."""
     if z.shape[0] == 0:
         return
     work = workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
     for step in range(z.shape[0]):
         answer = filter_step(fmt, form, model, first + step, z[step], x, P, work)
-        if not record_step(fmt, first + step, answer, x, work[1][0], P, marks, X, G, C, notes):
+        if not record_step(fmt, first + step, answer, x, work[1][0], P, checkpoint_steps, X, G, C, notes):
             return

@@ -628,7 +628,7 @@ def example_number(name: str, value: Fraction | int, text: str, note: str) -> Fi
 @CHECKS.add(*both("s12.example-first-coefficient"))
 def first_coefficient() -> Finding:
     value = report_bounds.coefficients(*report_bounds.EXAMPLE).first
-    slips = report_bounds.one_figure_slips(*report_bounds.EXAMPLE, report_bounds.PRINTED["first coefficient"])
+    slips = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, report_bounds.PRINTED["first coefficient"])
     ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in slips)
     return example_number(
         "first coefficient",
@@ -691,7 +691,10 @@ def _digits(which: str) -> tuple[int, int, float]:
     """Digits that the formula asks for, that the printed β does, and that β as a real number."""
     coefficient = getattr(report_bounds.coefficients(*report_bounds.EXAMPLE), which)
     beta = Fraction(report_bounds.PRINTED[f"{which} beta"])
-    formula, printed = report_bounds.required_precision(coefficient), report_bounds.required_precision(1 / beta)
+    formula, printed = (
+        report_bounds.precision_for_coefficient(coefficient),
+        report_bounds.precision_for_coefficient(1 / beta),
+    )
     return formula, printed, 1 - math.log10(2 * float(beta))
 
 
@@ -734,7 +737,7 @@ def criterion() -> Finding:
     counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
     granted = [coefficient * Fraction(1, coefficient) for coefficient in counts]
     goal = Fraction(GOAL, SIGNAL)
-    digits = [report_bounds.required_precision(coefficient, goal) for coefficient in counts]
+    digits = [report_bounds.precision_for_coefficient(coefficient, goal) for coefficient in counts]
     return compare(
         all(grant <= goal for grant in granted),
         f"it grants an error of all of $\\|x_k\\|$, or of $B$; for {GOAL} mas in {SIGNAL} the terms ask for "
@@ -857,7 +860,7 @@ def needed_precision(base: int) -> int | None:
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
         usual = found.case._replace(precision=0) == year_cases.Case(
-            year_cases.MODELS[0], base, 0, Rounding.NEAREST, forms.Form.REPORT
+            year_cases.MODELS[0], base, 0, Rounding.NEAREST, forms.Form.HUNG
         )
         if usual:
             if found.steps[-1] != report_bounds.EXAMPLE[0] or np.abs(found.rate).max() > GOAL:
@@ -871,7 +874,7 @@ def remark_2() -> Finding:
     again, decimal, binary = year_again(), needed_precision(10), needed_precision(2)
     _, n, m = report_bounds.EXAMPLE
     counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
-    asked = report_bounds.required_precision(counts.second, Fraction(GOAL, SIGNAL))
+    asked = report_bounds.precision_for_coefficient(counts.second, Fraction(GOAL, SIGNAL))
     return answer(
         again and decimal is not None and binary is not None,
         f"a filter of our own with {n} states and {m} measurements, run for a year: "
