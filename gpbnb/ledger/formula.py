@@ -11,6 +11,11 @@ In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` and ``approx(a, b)`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
 printed sequence; a part that contains it can be typeset but not evaluated.
+
+``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
+``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
+``Largest`` prints the same as a subscript. ``group(x)`` and ``bracket(x)`` keep printed parentheses and brackets, and
+``op(x, y)`` stands for any operation x * y.
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
 import sympy as sp
 from sympy.core.alphabets import greeks
 
@@ -33,6 +39,7 @@ OPERATORS: dict[type[ast.cmpop], tuple[str, str, Callable[[Any, Any], Any]]] = {
     ast.Lt: ("<", "<", operator.lt),
     ast.GtE: (">=", r"\ge ", operator.ge),
     ast.Gt: (">", ">", operator.gt),
+    ast.Is: ("≈", r"\approx ", operator.eq),
 }
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -52,6 +59,24 @@ class Link:
     symbol: str
     right: Any
 
+    @property
+    def holds(self) -> bool:
+        """Whether the comparison holds exactly; matrices are compared entry by entry.
+
+        Raises
+        ------
+        ValueError : the symbol is ``≈``; the check must say how close is close enough.
+        """
+        if self.symbol == "≈":
+            raise ValueError(f"{self.left} ≈ {self.right}: compare the two sides of ≈ in the check")
+        left, right = self.left, self.right
+        if self.symbol == "==" and isinstance(left, sp.Basic | sp.MatrixBase):
+            difference = left - right
+            zero = sp.simplify(difference)
+            return bool(zero.is_zero_matrix if isinstance(zero, sp.MatrixBase) else zero == 0)
+        compare = next(function for symbol, _, function in OPERATORS.values() if symbol == self.symbol)
+        return bool(np.all(compare(left, right)))
+
 
 @dataclass(frozen=True)
 class Relation:
@@ -62,11 +87,30 @@ class Relation:
     @property
     def tree(self) -> ast.expr:
         """The syntax tree; each number keeps its printed digits as ``literal``."""
-        tree = ast.parse(self.text, mode="eval").body
+        text = self.text.replace("≈", " is ")
+        tree = ast.parse(text, mode="eval").body
         for node in ast.walk(tree):
             if isinstance(node, ast.Constant):
-                node.literal = ast.get_source_segment(self.text, node)  # type: ignore[attr-defined]
+                node.literal = ast.get_source_segment(text, node)  # type: ignore[attr-defined]
         return tree
+
+    @property
+    def sides(self) -> tuple[Relation, ...]:
+        """The sides of the chain, each as a relation without a comparison."""
+        text, tree = self.text.replace("≈", " is "), self.tree
+        nodes = (tree.left, *tree.comparators) if isinstance(tree, ast.Compare) else (tree,)
+        return tuple(Relation(ast.get_source_segment(text, node) or "") for node in nodes)
+
+    def terms(
+        self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
+    ) -> tuple[Any, ...]:
+        """Evaluate each term of the last side: ``x == a - b`` has the terms a and -b."""
+        tree = self.tree
+        evaluate = _Evaluation(names or {}, number)
+        return tuple(
+            -evaluate(term) if negative else evaluate(term)
+            for negative, term in _terms(tree.comparators[-1] if isinstance(tree, ast.Compare) else tree)
+        )
 
     def links(
         self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
@@ -77,8 +121,8 @@ class Relation:
         ----------
         names : values of names, as in ``{"n": 3}``; functions for calls and for indices:
             ``{"a": lambda i, j: ...}`` gives ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
-            ``.inv``. A name that is missing becomes a SymPy symbol, an indexed name the symbol ``a[i,j]``, and a call a
-            SymPy function.
+            ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy
+            symbol, an indexed name the symbol ``a[i,j]``, and a call a SymPy function.
         number : turns the exact value of a printed number into the arithmetic wanted; SymPy rationals by default.
 
         Returns
@@ -100,6 +144,19 @@ class Relation:
 
     def latex(self) -> str:
         return _typeset(self.tree, 0)
+
+    def markdown(self) -> str:
+        return f"${self.latex()}$"
+
+
+def _terms(node: ast.expr) -> list[tuple[bool, ast.expr]]:
+    """The terms of a sum, each with whether it is subtracted."""
+    match node:
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return [*_terms(left), *_terms(right)]
+        case ast.BinOp(left=left, op=ast.Sub(), right=right):
+            return [*_terms(left), *((not negative, term) for negative, term in _terms(right))]
+    return [(False, node)]
 
 
 @dataclass(frozen=True)
@@ -123,6 +180,9 @@ class Number:
         unit = rf"\ \text{{{self.unit}}}" if self.unit else ""
         return number_latex(self.literal) + unit
 
+    def markdown(self) -> str:
+        return f"${self.latex()}$"
+
 
 @dataclass(frozen=True)
 class Words:
@@ -136,8 +196,8 @@ class Words:
     def text(self) -> str:
         return f"{self.label}: {' | '.join((self.printed, *self.others))}"
 
-    def latex(self) -> str:
-        return rf"\text{{{self.printed}}}"
+    def markdown(self) -> str:
+        return self.printed
 
 
 Part = Relation | Number | Words
@@ -188,6 +248,9 @@ class _Evaluation:
 
     def __call__(self, node: ast.expr) -> Any:
         match node:
+            case ast.Compare(left=left, ops=ops, comparators=rights):
+                sides = [self(side) for side in (left, *rights)]
+                return all(OPERATORS[type(op)][2](a, b) for a, op, b in zip(sides[:-1], ops, sides[1:], strict=True))
             case ast.Constant(value=int() | float()):
                 return self.number(Fraction(getattr(node, "literal", None) or ast.unparse(node)))
             case ast.Name(id=name):
@@ -205,14 +268,17 @@ class _Evaluation:
                 found = getattr(inner, attribute)
                 return found() if callable(found) else found
             case ast.Call(func=ast.Name(id=name), args=arguments):
-                if name in ("Sum", "Prod", "Int") and name not in self.names:
+                if name in ("Sum", "Prod", "Int", "Max", "Largest") and name not in self.names:
                     return self._repeated(name, arguments)
+                if name == "cases":
+                    return self._cases(arguments)
                 function = self.names.get(name) or _FUNCTIONS.get(name) or sp.Function(name)
                 return function(*map(self, arguments))
             case ast.Call(func=ast.Subscript(value=ast.Name(id=name), slice=index), args=arguments):
                 return self.names[name](*self._indices(index), *map(self, arguments))
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
-                return [self(row) for row in rows]
+                found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
+                return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
         raise ValueError(f"{ast.unparse(node)} cannot be evaluated")
 
     def _indices(self, index: ast.expr) -> list[Any]:
@@ -235,24 +301,39 @@ class _Evaluation:
                 _Evaluation({**self.names, index: self.number(Fraction(i))}, self.number)(term)
                 for i in range(int(first), int(last) + 1)
             ]
+            if name in ("Max", "Largest"):
+                return max(terms)
             total = self.number(Fraction(0 if name == "Sum" else 1))
             for each in terms:
                 total = total + each if name == "Sum" else total * each
             return total
+        if name in ("Max", "Largest"):
+            raise ValueError(f"{name} needs a range of numbers, got {first} to {last}")
         inner = _Evaluation({**self.names, index: sp.Symbol(index, integer=name != "Int")}, self.number)(term)
         operation = {"Sum": sp.summation, "Prod": sp.product, "Int": sp.integrate}[name]
         return operation(inner, (sp.Symbol(index, integer=name != "Int"), first, last))
 
+    def _cases(self, arguments: list[ast.expr]) -> Any:
+        """The value of the only case whose condition holds."""
+        values = [
+            self(argument.elts[0])
+            for argument in arguments
+            if isinstance(argument, ast.Tuple) and self(argument.elts[1])
+        ]
+        if len(values) != 1:
+            raise ValueError(f"{len(values)} cases hold; exactly one is needed")
+        return values[0]
+
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": abs, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan,
-    "max": sp.Max, "min": sp.Min, "diff": sp.diff,
+    "max": sp.Max, "min": sp.Min, "diff": sp.diff, "group": lambda inside: inside,
 }  # fmt: skip
 
 
 # -- typesetting ----------------------------------------------------------------------------------
 
-_GREEK = {name: name.replace("lamda", "lambda") for small in greeks for name in (small, small.capitalize())}
+_GREEK = {name: name for small in greeks for name in (small, small.capitalize())} | {"lamda": "lambda"}
 _ACCENTS = ("hat", "tilde", "bar", "dot", "ddot", "underline", "overline")
 _NAMED = ("sin", "cos", "tan", "exp", "log", "ln", "max", "min", "dim")
 
@@ -285,8 +366,8 @@ def number_latex(literal: str) -> str:
 def _base(word: str) -> str:
     if word in _GREEK:
         return rf"\{_GREEK[word]}"
-    if word.startswith("Delta") and len(word) > len("Delta"):
-        return rf"\Delta {_base(word[len('Delta') :])}"
+    if word.lower().startswith("delta") and len(word) > len("delta"):
+        return rf"\{word[: len('delta')]} {_base(word[len('delta') :])}"
     if word == "inf":
         return r"\infty"
     return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word
@@ -311,7 +392,8 @@ def _typeset(node: ast.expr, level: int) -> str:
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return _wrap("-" + _typeset(operand, 2), level > 1)
         case ast.BinOp(left=left, op=ast.Add(), right=right):
-            return _wrap(f"{_typeset(left, 1)}+{_typeset(right, 1)}", level > 1)
+            b = _typeset(right, 1)
+            return _wrap(f"{_typeset(left, 1)}+{_wrap(b, b.startswith('-'))}", level > 1)
         case ast.BinOp(left=left, op=ast.Sub(), right=right):
             return _wrap(f"{_typeset(left, 1)}-{_typeset(right, 2)}", level > 1)
         case ast.BinOp(left=left, op=ast.Mult() | ast.MatMult(), right=right):
@@ -352,8 +434,19 @@ def _with_index(base: str, index: ast.expr) -> str:
 
 def _call(function: ast.expr, arguments: list[ast.expr]) -> str:
     name = function.id if isinstance(function, ast.Name) else ""
-    if name in ("Sum", "Prod", "Int") and len(arguments) == 2 and isinstance(arguments[1], ast.Tuple):
+    if name == "cases":
+        lines = [[_typeset(e, 0) for e in a.elts] for a in arguments if isinstance(a, ast.Tuple)]
+        return (
+            r"\begin{cases}"
+            + r" \\ ".join(rf"{value} & \text{{if }} {where}" for value, where in lines)
+            + r"\end{cases}"
+        )
+    if name in ("Sum", "Prod", "Int", "Max", "Largest") and len(arguments) == 2 and isinstance(arguments[1], ast.Tuple):
         term, bounds = _typeset(arguments[0], 2), [_typeset(b, 0) for b in arguments[1].elts]
+        if name == "Max":
+            return rf"\max_{{{bounds[0]}}}{term}"
+        if name == "Largest":
+            return rf"{term}_{{\max}}"
         if name == "Int":
             return rf"\int_{{{bounds[1]}}}^{{{bounds[2]}}}{term}\,d{bounds[0]}"
         return rf"\{'sum' if name == 'Sum' else 'prod'}_{{{bounds[0]}={bounds[1]}}}^{{{bounds[2]}}}{term}"
@@ -363,6 +456,12 @@ def _call(function: ast.expr, arguments: list[ast.expr]) -> str:
             return rf"\left\|{x}\right\|"
         case "abs", [x]:
             return rf"\left|{x}\right|"
+        case "group", [x]:
+            return rf"\left({x}\right)"
+        case "bracket", [x]:
+            return rf"\left[{x}\right]"
+        case "op", [x, y]:
+            return f"{x}*{y}"
         case "sqrt", [x]:
             return rf"\sqrt{{{x}}}"
         case "approx", [a, b]:

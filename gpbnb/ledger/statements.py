@@ -55,7 +55,7 @@ class Statement:
     @cached_property
     def printed(self) -> str:
         """The printed text with its formulas typeset from the machine-readable form."""
-        return _PLACE.sub(lambda place: f"${self.parts[int(place[1]) - 1].latex()}$", self.text)
+        return _PLACE.sub(lambda place: self.parts[int(place[1]) - 1].markdown(), self.text)
 
     def relation(self, number: int = 1) -> Relation:
         """The relation with this number among the relations of the form, counted from 1.

@@ -64,7 +64,7 @@ def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
             if text not in seen:
                 seen.add(text)
                 yield f"{name} at {k}", text
-    if isinstance(tree, ast.Compare):
+    if isinstance(tree, ast.Compare) and ast.unparse(tree.comparators[-1]) != "0":
         new = copy.deepcopy(tree)
         new.comparators[-1] = ast.BinOp(ast.Constant(2), ast.Mult(), new.comparators[-1])
         yield "twice the last side", ast.unparse(new)
@@ -88,8 +88,15 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield f"coefficient, {name}", ast.parse(text, mode="eval").body
         case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Tuple):
             yield "index", ast.Subscript(value, ast.BinOp(index, ast.Add(), ast.Constant(1)), ast.Load())
-        case ast.Compare(left=left, ops=ops, comparators=rights) if type(ops[0]) in _OPPOSITE:
-            yield "direction", ast.Compare(left, [_OPPOSITE[type(ops[0])](), *ops[1:]], rights)
+        case ast.Subscript(value=value, slice=ast.Tuple(elts=indices)):
+            for i, index in enumerate(indices):
+                moved = [*indices[:i], ast.BinOp(index, ast.Add(), ast.Constant(1)), *indices[i + 1 :]]
+                yield f"index {i + 1}", ast.Subscript(value, ast.Tuple(moved, ast.Load()), ast.Load())
+        case ast.Compare(left=left, ops=ops, comparators=rights):
+            for i, op in enumerate(ops):
+                if type(op) in _OPPOSITE:
+                    name = "direction" if i == 0 else f"direction {i + 1}"
+                    yield name, ast.Compare(left, [*ops[:i], _OPPOSITE[type(op)](), *ops[i + 1 :]], rights)
 
 
 def _substitute(tree: ast.AST, place: ast.AST, new: ast.AST) -> None:
