@@ -154,7 +154,7 @@ def test_a_summary_counts():
             outcome(),
         ]
     )
-    assert [each.form for each in found] == ["ud", "usual"]
+    assert [each.form for each in found] == ["ud", "innovation"]
     ud, usual = found
     assert (ud.trials, usual.trials) == (4, 1)
     assert ud.contraction_violations == 3  # no number is no bound
