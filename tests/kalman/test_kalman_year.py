@@ -185,7 +185,7 @@ def test_checkpoint_steps_are_at_equal_ratios():
 def test_cases_have_names_of_their_own():
     names = {case.name for case in CASES} | {case.reference.name for case in CASES}
     assert len(names) == len(CASES) + 4
-    assert SINGLE.name == "roll-600-s-2-24-nearest-report"
+    assert SINGLE.name == "roll-600-s-2-24-nearest-hung"
     assert SINGLE.fmt == FloatFormat(2, 24, NEAREST)
     assert SINGLE.reference.fmt is None
 
