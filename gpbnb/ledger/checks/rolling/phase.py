@@ -86,7 +86,8 @@ def printed_cosine(printed: Statement) -> Finding:
     literal = printed.relation().text.rsplit("==", 1)[1].strip()
     cosine = math.cos(math.radians(1))
     return compare(
-        prints_as(float(link.left), literal, *Rounding) and prints_as(cosine, ".9998", *Rounding),
+        prints_as(float(link.left), literal, *Rounding.documented())
+        and prints_as(cosine, ".9998", *Rounding.documented()),
         f"$1-.9998^2={1 - 0.9998**2:.8f}$; $\\cos1°={cosine:.6f}$",
         note=f"from the full cosine, {1 - cosine**2:.4f}",
     )
