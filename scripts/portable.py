@@ -28,24 +28,6 @@ NEHALEM = frozenset(
     ("64bit", "cmov", "crc32", "cx16", "cx8", "fxsr", "mmx", "popcnt", "sahf")
     + ("sse", "sse2", "sse3", "ssse3", "sse4.1", "sse4.2")
 )
-    [
-        "64bit",
-        "cmov",
-        "crc32",
-        "cx16",
-        "cx8",
-        "fxsr",
-        "mmx",
-        "popcnt",
-        "sahf",
-        "sse",
-        "sse2",
-        "sse3",
-        "ssse3",
-        "sse4.1",
-        "sse4.2",
-    ]
-)
 NOT_HASWELL = ("avx512", "amx", "avxvnni", "avxifma", "avxneconvert", "avx10", "evex512")
 SPACES = "Prüf stand/Gravity Probe B"
 
