@@ -53,7 +53,9 @@ def key_of(notebook: Any) -> str:
     return hashlib.sha256(repr((code, caching.digest(files), caching.environment())).encode()).hexdigest()[:24]
 
 
-def executed(paths: Sequence[Path], jobs: int | None = None, say: Callable[[str], None] = print) -> dict[Path, Any]:
+def executed(
+    paths: Sequence[Path], jobs: int | None = None, say: Callable[[str], None] = print, findings: bool = True
+) -> dict[Path, Any]:
     """Notebooks with the outputs of an execution in the present state, from the cache where they are there.
 
     Parameters
@@ -61,6 +63,7 @@ def executed(paths: Sequence[Path], jobs: int | None = None, say: Callable[[str]
     paths : of notebooks; they are not changed.
     jobs : how many to execute at a time; by default as many as there are processors.
     say : is told of each start and end.
+    findings : whether to run the checks of the ledger meanwhile, for the pages that show them.
 
     Raises
     ------
@@ -75,7 +78,7 @@ def executed(paths: Sequence[Path], jobs: int | None = None, say: Callable[[str]
     waiting = [path for path, file in stored.items() if _outputs(file) is None]
     if waiting:
         say(f"{len(waiting)} of {len(paths)} notebooks to execute: what they depend on has changed")
-        _execute_all({path: stored[path] for path in _longest_first(waiting)}, jobs or _processors(), say)
+        _execute_all({path: stored[path] for path in _longest_first(waiting)}, jobs or _processors(), say, findings)
     for path, notebook in notebooks.items():
         outputs = _outputs(stored[path])
         if outputs is None:
@@ -84,7 +87,7 @@ def executed(paths: Sequence[Path], jobs: int | None = None, say: Callable[[str]
     return notebooks
 
 
-def _execute_all(files: dict[Path, Path], jobs: int, say: Callable[[str], None]) -> None:
+def _execute_all(files: dict[Path, Path], jobs: int, say: Callable[[str], None], findings: bool) -> None:
     """Execute notebooks, each in a process of its own, which writes its outputs to a file."""
     began = time.monotonic()
     running: list[str] = []
@@ -106,8 +109,7 @@ def _execute_all(files: dict[Path, Path], jobs: int, say: Callable[[str], None])
             raise Failure(f"{name} failed:\n{worker.stdout}{worker.stderr}")
         return time.monotonic() - started
 
-    # Most notebooks and pages show findings: the checks run first, as one more task, and once.
-    tasks: list[Path | None] = [None, *files]
+    tasks: list[Path | None] = [None, *files] if findings else [*files]
     with ThreadPoolExecutor(jobs) as pool:
         futures = {pool.submit(run, task): task for task in tasks}
         say(f"  running: {', '.join(_name(task) for task in tasks[:jobs])}")
@@ -225,7 +227,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         work(*given.notebooks)
         return 0
     try:
-        found = executed([path.resolve() for path in given.notebooks] or sorted(BOOK.glob("*.ipynb")), given.jobs)
+        paths = [path.resolve() for path in given.notebooks] or sorted(BOOK.glob("*.ipynb"))
+        found = executed(paths, given.jobs, findings=not given.notebooks)
     except ExceptionGroup as group:
         for failure in group.exceptions:
             print(failure, file=sys.stderr)

@@ -24,10 +24,8 @@ from gpbnb import caching
 ROOT = Path(__file__).resolve().parents[1]
 # Tests of files of this project, of its prose and of pages give the same result everywhere.
 NOT_NUMERICAL = ("pages", "test_environment.py", "test_prose.py", "test_book_extensions.py", "test_single_page.py")
-NEHALEM = frozenset(
-    ("64bit", "cmov", "crc32", "cx16", "cx8", "fxsr", "mmx", "popcnt", "sahf")
-    + ("sse", "sse2", "sse3", "ssse3", "sse4.1", "sse4.2")
-)
+NEHALEM = {"64bit", "cmov", "crc32", "cx16", "cx8", "fxsr", "mmx", "popcnt", "sahf"}
+NEHALEM |= {"sse", "sse2", "sse3", "ssse3", "sse4.1", "sse4.2"}
 NOT_HASWELL = ("avx512", "amx", "avxvnni", "avxifma", "avxneconvert", "avx10", "evex512")
 SPACES = "Prüf stand/Gravity Probe B"
 
