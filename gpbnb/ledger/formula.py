@@ -2,10 +2,10 @@ r"""The machine-readable form of a printed statement: read, evaluated and typese
 
 A form is one or more parts, separated by semicolons. Each part is one of:
 
-relation : a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``.
-number : ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional.
-words : ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others are
-    what it could have said instead.
+- a relation: a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``;
+- a number: ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional;
+- words: ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others
+  are what it could have said instead.
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
