@@ -25,6 +25,8 @@ def execute(app: Sphinx) -> None:
     """Execute the notebooks whose outputs are not known, and lay executed copies of all beside the pages."""
     if app.parallel == 1:
         app.parallel = min(os.cpu_count() or 1, MOST_JOBS)
+    if numbering := app.extensions.get("sphinx_multitoc_numbering"):
+        numbering.parallel_read_safe = True  # it works after reading, and does not say so
     found = app.project.discover(app.config.exclude_patterns, app.config.include_patterns)
     paths = [path for each in sorted(found) if (path := Path(app.env.doc2path(each))).suffix == ".ipynb"]
     try:
