@@ -2,15 +2,16 @@ r"""The machine-readable form of a printed statement: read, evaluated and typese
 
 A form is one or more parts, separated by semicolons. Each part is one of:
 
-relation : a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``.
-number : ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional.
-words : ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others are
-    what it could have said instead.
+- a relation: a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``;
+- a number: ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional;
+- words: ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others
+  are what it could have said instead.
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` and ``approx(a, b)`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
-printed sequence; a part that contains it can be typeset but not evaluated.
+printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that
+a printed series leaves out; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
@@ -121,8 +122,8 @@ class Relation:
         ----------
         names : values of names, as in ``{"n": 3}``; functions for calls and for indices:
             ``{"a": lambda i, j: ...}`` gives ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
-            ``.inv``. A name that is missing becomes a SymPy symbol, an indexed name the symbol ``a[i,j]``, and a call a
-            SymPy function.
+            ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy
+            symbol, an indexed name the symbol ``a[i,j]``, and a call a SymPy function.
         number : turns the exact value of a printed number into the arithmetic wanted; SymPy rationals by default.
 
         Returns
@@ -277,7 +278,8 @@ class _Evaluation:
             case ast.Call(func=ast.Subscript(value=ast.Name(id=name), slice=index), args=arguments):
                 return self.names[name](*self._indices(index), *map(self, arguments))
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
-                return [self(row) for row in rows]
+                found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
+                return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
         raise ValueError(f"{ast.unparse(node)} cannot be evaluated")
 
     def _indices(self, index: ast.expr) -> list[Any]:
@@ -365,8 +367,10 @@ def number_latex(literal: str) -> str:
 def _base(word: str) -> str:
     if word in _GREEK:
         return rf"\{_GREEK[word]}"
-    if word.startswith("Delta") and len(word) > len("Delta"):
-        return rf"\Delta {_base(word[len('Delta') :])}"
+    if word.lower().startswith("delta") and len(word) > len("delta"):
+        return rf"\{word[: len('delta')]} {_base(word[len('delta') :])}"
+    if word == "dots":
+        return r"\cdots"
     if word == "inf":
         return r"\infty"
     return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word
