@@ -10,11 +10,11 @@ from itertools import pairwise
 import numpy as np
 import sympy as sp
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.display.tables import scientific
 from gpbnb.ledger.agreement import hold
 from gpbnb.ledger.checks.rolling.process import fixed, low_frequency, signals
-from gpbnb.ledger.checks.rolling.registry import ALLOWED, CHECKS, ONE_DIMENSION, SIX, TEN, entry
+from gpbnb.ledger.checks.rolling.registry import ALLOWED, CHECKS, ONE_DIMENSION, PRINTED, SIX, TEN, entry
 from gpbnb.ledger.finding import Finding, Verdict, compare, given, unverifiable
 from gpbnb.ledger.statements import Statement
 from gpbnb.measurement import YEAR
@@ -103,8 +103,7 @@ def omega_r(printed: Statement) -> Finding:
     names = {"omega_r": float(rate), "T": PERIOD, "pi": math.pi}
     (link,) = printed.links(names, float)
     return compare(
-        math.isclose(link.left, link.right)
-        and prints_as(rate, printed.number("omega_r").literal, *Rounding.documented()),
+        math.isclose(link.left, link.right) and prints_as(rate, printed.number("omega_r").literal, *PRINTED),
         f"${float(rate) * 10:.7f}\\times10^{{-1}}$",
     )
 
@@ -128,8 +127,7 @@ def period_1(printed: Statement) -> Finding:
     period = 2 * math.pi / offset
     (link,) = printed.links({"T_Deltaomega": period, "Deltaomega": offset, "pi": math.pi}, float)
     return compare(
-        math.isclose(link.left, link.right)
-        and prints_as(period, printed.number("period").literal, *Rounding.documented()),
+        math.isclose(link.left, link.right) and prints_as(period, printed.number("period").literal, *PRINTED),
         f"{scientific(period, 5)} s",
     )
 
@@ -224,7 +222,7 @@ def cosine_2(printed: Statement) -> Finding:
     years = round(2 * math.pi / float(half_unit(TEN)) / YEAR, -4)
     literal = printed.relation().text.rsplit("==", 1)[1].strip()
     return compare(
-        math.isclose(2 * math.pi / bare.left, years) and prints_as(link.left, literal, *Rounding.documented()),
+        math.isclose(2 * math.pi / bare.left, years) and prints_as(link.left, literal, *PRINTED),
         f"{math.cos(2 * math.pi / years):.11f}",
         note="chopped to nine digits",
     )
@@ -233,9 +231,7 @@ def cosine_2(printed: Statement) -> Finding:
 @CHECKS.add(entry("s4.sample-2-1-234e-6"))
 def percent_2(printed: Statement) -> Finding:
     value = 100 * 2 * math.sin(math.pi / 40000) ** 2
-    return compare(
-        prints_as(value, printed.number("error").literal, *Rounding.documented()), f"{scientific(value, 5)} %"
-    )
+    return compare(prints_as(value, printed.number("error").literal, *PRINTED), f"{scientific(value, 5)} %")
 
 
 @CHECKS.add(entry("s4.sample-2-negligible"))

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import sympy as sp
 
-from gpbnb.arithmetic.formats import Rounding, prints_as
+from gpbnb.arithmetic.formats import prints_as
 from gpbnb.ledger.agreement import hold
-from gpbnb.ledger.checks.rolling.registry import ALLOWED, CHECKS, ONE_DIMENSION, entry
+from gpbnb.ledger.checks.rolling.registry import ALLOWED, CHECKS, ONE_DIMENSION, PRINTED, entry
 from gpbnb.ledger.finding import Finding, Verdict, compare, unverifiable
 from gpbnb.ledger.statements import Statement
 from gpbnb.rolling import experiment, theory
@@ -86,8 +86,7 @@ def printed_cosine(printed: Statement) -> Finding:
     literal = printed.relation().text.rsplit("==", 1)[1].strip()
     cosine = math.cos(math.radians(1))
     return compare(
-        prints_as(float(link.left), literal, *Rounding.documented())
-        and prints_as(cosine, ".9998", *Rounding.documented()),
+        prints_as(float(link.left), literal, *PRINTED) and prints_as(cosine, ".9998", *PRINTED),
         f"$1-.9998^2={1 - 0.9998**2:.8f}$; $\\cos1°={cosine:.6f}$",
         note=f"from the full cosine, {1 - cosine**2:.4f}",
     )
