@@ -60,7 +60,7 @@ def pages() -> list[str]:
 
 
 def opened() -> list[str]:
-    """The pages that tests open: of the listings of source, and of the API reference, the longest stands for the rest."""
+    """The pages that tests open; the longest listing of source and the longest API page stand for the others."""
     left = pages()
     for folder in ("_modules/gpbnb/", "book/api/"):
         alike = sorted(
