@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
 from gpbnb.arithmetic.kernels.tags import Double
 from gpbnb.integration import theory
+from gpbnb.integration.arguments import positive_number
 from gpbnb.integration.theory import Process, Rule, Step
 
 Floats = NDArray[np.float64]
@@ -416,7 +417,7 @@ def emulate(
         if fmt.precision * math.log2(fmt.base) > 40:
             raise ValueError(f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer digits")
     process = theory.first_order(sigma_x, omega_bw)
-    cycles = round(theory._scalar("duration", duration) * theory._scalar("f_c", f_c))
+    cycles = round(positive_number("duration", duration) * positive_number("f_c", f_c))
     running = [Accumulator(fmt, 1 / f_c, paths) for fmt in formats]
     error, reference, half = np.zeros(paths), np.zeros(paths), np.array([0.5 / f_c])
     for piece in pieces(process, f_c, cycles, rng, paths):

@@ -178,7 +178,7 @@ class Number:
         return f"{self.label}: {self.literal} {self.unit}".strip()
 
     def latex(self) -> str:
-        unit = rf"\ \text{{{self.unit}}}" if self.unit else ""
+        unit = rf"\ \text{{{self.unit.replace(chr(37), chr(92) + chr(37))}}}" if self.unit else ""
         return number_latex(self.literal) + unit
 
     def markdown(self) -> str:

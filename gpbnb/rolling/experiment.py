@@ -5,236 +5,73 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-import mpmath
 import numpy as np
 from numpy.typing import NDArray
 from scipy import signal
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
-from gpbnb.rolling.flicker import flicker, record
+from gpbnb.rolling.flicker import flicker
+from gpbnb.rolling.rotations import Rotation, digits_needed_observed, direct, recursion, rounded_rate_error
+from gpbnb.rolling.spectra import (
+    HANN,
+    YEAR_SAMPLES,
+    Slope,
+    Spectra,
+    Spectrum,
+    derolled_record,
+    fit_slope,
+    in_bands,
+    noise_spectrum,
+    periodogram,
+    samples_in,
+    spectra,
+    welch,
+)
 from gpbnb.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
 from gpbnb.sweeps import Column, read
 
-YEAR_SAMPLES = round(YEAR / INTERVAL)
-
-
-def _samples(duration: float, interval: float) -> int:
-    if not (0 < interval < math.inf and 0 < duration < math.inf):
-        raise ValueError(f"got {duration} s with a sample every {interval} s; needed two finite positive numbers")
-    n = round(duration / interval)
-    if n < 2:
-        raise ValueError(f"got {duration:g} s with a sample every {interval:g} s; needed at least 2 samples")
-    return n
-
-
-# -- spectra -------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """One-sided density, mas²/Hz, averaged in bands: `averages` is the number of independent values in each."""
-
-    frequency: NDArray[np.float64]
-    density: NDArray[np.float64]
-    averages: NDArray[np.float64]
-
-    @property
-    def error(self) -> NDArray[np.float64]:
-        """Relative standard error of the density, a mean of so many values that are chi-square of two degrees."""
-        return 1 / np.sqrt(self.averages)
-
-
-def in_bands(frequency: Any, density: Any, averages: float, first: float, last: float, bands: int) -> Spectrum:
-    """Average a density over bands of equal logarithmic width; bands without a frequency are left out."""
-    edges = np.geomspace(first, last, bands + 1)
-    place = np.digitize(frequency, edges) - 1
-    counts = np.array([np.count_nonzero(place == i) for i in range(bands)])
-    full = np.flatnonzero(counts)
-    middle = np.array([math.exp(np.mean(np.log(frequency[place == i]))) for i in full])
-    # Of f times the density, so that 1/f noise has no bias within a band.
-    mean = np.array([np.mean((frequency * density)[place == i]) for i in full]) / middle
-    return Spectrum(middle, mean, averages * counts[full])
-
-
-def welch(records: NDArray[np.float64], interval: float, segment: int) -> tuple[Any, Any, float]:
-    """Welch's estimate, Hann windows overlapping by half, of records (samples, channels).
-
-    Returns
-    -------
-    frequency, density : without that of frequency zero, and of the two next to it, into which the mean leaks.
-    averages : number of independent periodograms that it is worth.
-    """
-    f, p = signal.welch(records, 1 / interval, "hann", segment, axis=0)
-    count = 2 * (len(records) // segment) - 1
-    # Overlapping by half, Hann-windowed segments have a correlation of their periodograms of 1/36 (Welch 1967); and
-    # neighbouring frequencies are correlated too: a sum over a band is worth 18/35 of its number (see below).
-    worth = count / (1 + 2 * (count - 1) / count / 36)
-    return f[3:], np.mean(p[3:], axis=1), worth * records.shape[1] * HANN
-
-
-HANN = 18 / 35
-r"""Independent values in a band of a Hann-windowed periodogram, a frequency, :math:`1/(1 + 2(4/9) + 2/36)`."""
-
-
-@dataclass(frozen=True)
-class Slope:
-    """Exponent of a power law fitted to a density, and its standard error."""
-
-    value: float
-    error: float
-    decades: float
-
-
-def fit_slope(spectrum: Spectrum, interval: float = INTERVAL) -> Slope:
-    """Fit a line to log density against log frequency, each band with its weight; sampling is accounted for."""
-    x = np.log10(spectrum.frequency)
-    # The logarithm of a mean of m values is low by 1/(2m); samples have a density higher by x/sin x, x = πfΔt.
-    y = np.log10(spectrum.density * np.sinc(spectrum.frequency * interval)) + np.log10(np.e) / (2 * spectrum.averages)
-    w = spectrum.averages
-    x = x - np.sum(w * x) / np.sum(w)
-    square = np.sum(w * x**2)
-    return Slope(float(np.sum(w * x * y) / square), 1 / math.log(10) / math.sqrt(square), float(np.ptp(x)))
-
-
-def noise_spectrum(
-    rng: np.random.Generator,
-    samples: int = 2**21,
-    channels: int = 4,
-    segment: int = 2**19,
-    interval: float = INTERVAL,
-    bands: int = 24,
-) -> Spectrum:
-    """Density of the generated noise by Welch's method, in bands from 4 cycles a segment to f = 0.12/Δt."""
-    records = record(LEVEL, samples, channels, rng)
-    f, p, averages = welch(records, interval, segment)
-    return in_bands(f, p, averages, 4 / (segment * interval), 0.12 / interval, bands)
-
-
-@dataclass(frozen=True)
-class Spectra:
-    """One-sided densities, mas²/Hz, of a year of a drift and of the noise, before rolling, rolled, and derolled.
-
-    `ramp`, `noise` and `derolled` (noise) are averages in bands. `offset` is in cycles a record, as distance from the
-    roll frequency of one readout (`line_signal`, `line_noise`), or as frequency of a derolled component
-    (`base_signal`, `base_noise`, from one cycle on).
-    """
-
-    drift: float
-    level: float
-    period: float
-    duration: float
-    interval: float
-    ramp: Spectrum
-    noise: Spectrum
-    derolled: Spectrum
-    offset: NDArray[np.int64]
-    line_signal: NDArray[np.float64]
-    line_noise: NDArray[np.float64]
-    base_signal: NDArray[np.float64]
-    base_noise: NDArray[np.float64]
-
-
-def periodogram(x: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
-    """One-sided density of a whole record without a window, from one cycle a record on; the record is real."""
-    return np.asarray(2 * np.abs(np.fft.rfft(x)[1:]) ** 2 * interval / len(x))
-
-
-def spectra(
-    drift: float,
-    rng: np.random.Generator,
-    gyros: int = 4,
-    level: float = LEVEL,
-    period: float = PERIOD,
-    samples: int = YEAR_SAMPLES,
-    interval: float = INTERVAL,
-    offsets: int = 25,
-    bands: int = 40,
-) -> Spectra:
-    """Simulate what Figures III-1 and III-3 sketch: a drift along x, and noise of gyros with two readouts each.
-
-    The record is a whole number of turns.
-    """
-    duration = samples * interval
-    turns = round(duration / period)
-    if abs(turns * period - duration) > 1e-9 * duration or turns <= offsets:
-        raise ValueError(f"got {duration / period:g} turns; needed a whole number above {offsets}")
-    offset = np.concatenate([np.arange(-offsets, 0), np.arange(1, offsets + 1)])
-    near, base = turns + offset - 1, np.arange(offsets)
-    frequency = np.arange(1, samples // 2 + 1) / duration
-
-    def banded(density: NDArray[np.float64], averages: int) -> Spectrum:
-        return in_bands(frequency, density, averages, 0.99 / duration, 0.5 / interval, bands)
-
-    before, after = np.zeros((2, samples // 2))
-    for child in rng.spawn(gyros):
-        stages = derolled_record((0.0, 0.0), level, period, child, samples, interval)
-        before += (periodogram(stages["noise"].real, interval) + periodogram(stages["noise"].imag, interval)) / 2
-        after += (periodogram(stages["derolled"].real, interval) + periodogram(stages["derolled"].imag, interval)) / 2
-    clean = derolled_record((drift, 0.0), 0.0, period, rng, samples, interval)
-    ramp, rolled = (periodogram(clean[name].real, interval) for name in ("signal", "measured"))
-    back = periodogram(clean["derolled"].real, interval)
-    return Spectra(
-        drift,
-        level,
-        period,
-        duration,
-        interval,
-        banded(ramp, 1),
-        banded(before / gyros, 2 * gyros),
-        banded(after / gyros, 2 * gyros),
-        offset,
-        rolled[near],
-        before[near] / gyros,
-        back[base],
-        after[base] / gyros,
-    )
-
-
-def derolled_record(
-    drift: tuple[float, float],
-    level: float,
-    period: float,
-    rng: np.random.Generator,
-    samples: int = YEAR_SAMPLES,
-    interval: float = INTERVAL,
-    phase_error: Callable[[Any], Any] | None = None,
-) -> dict[str, NDArray[np.complex128]]:
-    """One gyro with two readouts through (5)-(7), x and y as real and imaginary part.
-
-    Parameters
-    ----------
-    drift : of x and y, mas a year.
-    level : of the noise of each readout, mas²; 0 for none.
-    period, interval : of roll and between samples, s.
-    phase_error : by how much the deroll is ahead, rad, a function of times (n,) in s; None for not.
-
-    Returns
-    -------
-    stages : "signal", "rolled", "noise", "measured" and "derolled", each (samples,) complex, in mas.
-    """
-    if not all(map(math.isfinite, drift)):
-        raise ValueError(f"got drifts {drift}; needed finite numbers, in mas a year")
-    n = np.arange(samples)
-    ramp = np.asarray(complex(*drift) * (n * interval / YEAR))
-    pair = record(level, samples, 2, rng)
-    noise = pair[:, 0] + 1j * pair[:, 1]
-    turn = np.exp(1j * theory.roll_phase(n, period, interval))
-    rolled = ramp * np.conj(turn)
-    if phase_error is not None:
-        turn = turn * np.exp(1j * np.asarray(phase_error(n * interval)))
-    measured = rolled + noise
-    return {"signal": ramp, "rolled": rolled, "noise": noise, "measured": measured, "derolled": measured * turn}
+__all__ = [
+    "HANN",
+    "SURVEY",
+    "SURVEY_COLUMNS",
+    "SURVEY_GYROS",
+    "SURVEY_PERIODS",
+    "YEAR_SAMPLES",
+    "DriftStudy",
+    "FilterStudy",
+    "Rotation",
+    "Slope",
+    "Spectra",
+    "Spectrum",
+    "clean_drift_error",
+    "derolled_record",
+    "digits_needed_observed",
+    "direct",
+    "drift_rates",
+    "filter_study",
+    "fit_drift",
+    "fit_slope",
+    "image_behind",
+    "in_bands",
+    "noise_spectrum",
+    "periodogram",
+    "rate_sines",
+    "rate_walks",
+    "recursion",
+    "roll_rate_errors",
+    "rounded_rate_error",
+    "spectra",
+    "survey",
+    "survey_rng",
+    "survey_rows",
+    "welch",
+]
 
 
 def fit_drift(derolled: NDArray[np.complex128], interval: float = INTERVAL) -> NDArray[np.float64]:
@@ -252,7 +89,7 @@ def clean_drift_error(
 ) -> NDArray[np.float64]:
     """Errors (2,) of both drifts, mas a year, of a record without noise that is derolled with a phase error."""
     stages = derolled_record(
-        drift, 0.0, period, np.random.default_rng(0), _samples(duration, interval), interval, phase_error
+        drift, 0.0, period, np.random.default_rng(0), samples_in(duration, interval), interval, phase_error
     )
     return fit_drift(stages["derolled"], interval) - np.array(drift)
 
@@ -318,7 +155,7 @@ def drift_rates(
     drift : of x and y, mas a year.
     progress : show a bar.
     """
-    n = _samples(duration, interval)
+    n = samples_in(duration, interval)
     if gyros < 1 or not periods:
         raise ValueError(f"got {gyros} gyros and {len(periods)} roll periods; needed at least 1 of each")
     for period in periods:
@@ -421,7 +258,7 @@ def filter_study(
 
     Both components of each gyro, rolled and derolled, are a record. Averages are taken from ten time constants on.
     """
-    n = _samples(duration, interval)
+    n = samples_in(duration, interval)
     names = [*("single pole" for _ in bandwidths), *("moving average" for _ in bandwidths)]
     if not len(bandwidths) or not min(bandwidths) > 0:
         raise ValueError(f"got bandwidths {tuple(bandwidths)} Hz; needed at least one, and each above 0")
@@ -522,147 +359,3 @@ def rate_sines(
     t = np.arange(steps) * step
     for _ in range(trials):
         yield amplitude * np.cos(2 * np.pi * (t / period + rng.random()))
-
-
-# -- rotations in t digits -----------------------------------------------------------------------
-
-
-def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
-    """What the register of a format does to ω_r = 2π/T: the rounded less the true, rad/s."""
-    rate = theory.roll_rate(period)
-    return float(fmt.round(rate) - rate)
-
-
-@dataclass(frozen=True)
-class Rotation:
-    """A rotation (cos nδ, sin nδ) computed in a format: relative amplitude and phase errors, and size of both.
-
-    `method` is "recursion" or "direct", `step` the samples n looked at, `bound` that of the size.
-    """
-
-    fmt: FloatFormat
-    period: float
-    interval: float
-    method: str
-    step: NDArray[np.int64]
-    amplitude: NDArray[np.float64]
-    phase: NDArray[np.float64]
-    size: NDArray[np.float64]
-    bound: NDArray[np.float64]
-
-    def drift_error(self, drift: float) -> float:
-        """Largest error in mas of a ramp of `drift` mas a year, derolled with this rotation."""
-        return float(np.max(self.size * self.step * (drift * self.interval / YEAR)))
-
-
-@compiled
-def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
-    a, b = load(fmt, step, 0), load(fmt, step, 1)
-    c, s = load(fmt, state, 0), load(fmt, state, 1)
-    n = 0
-    for k in range(len(marks)):
-        for _ in range(marks[k] - n):
-            c, s = (
-                subtract(fmt, multiply(fmt, c, a), multiply(fmt, s, b)),
-                add(fmt, multiply(fmt, s, a), multiply(fmt, c, b)),
-            )
-        n = marks[k]
-        store(fmt, out, (k, 0), c)
-        store(fmt, out, (k, 1), s)
-
-
-def _exact_turn(n: int, period: float, interval: float) -> tuple[Fraction, Fraction]:
-    """Cosine and sine of n steps, to 60 digits."""
-    turns = n * Fraction(interval) / Fraction(period) % 1
-    with mpmath.workdps(60):
-        angle = 2 * mpmath.mpf(turns.numerator) / turns.denominator
-        return _fraction(mpmath.cospi(angle)), _fraction(mpmath.sinpi(angle))
-
-
-def _fraction(x: Any) -> Fraction:
-    sign, mantissa, exponent, _ = x._mpf_
-    return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** exponent
-
-
-def _compared(
-    fmt: FloatFormat, period: float, interval: float, method: str, steps: Any, values: Any, bounds: Any
-) -> Rotation:
-    """Errors of computed pairs (m, 2) of exact Fractions."""
-    errors = []
-    for n, (c, s) in zip(steps, values, strict=True):
-        cosine, sine = _exact_turn(int(n), period, interval)
-        # z e^{-inδ} - 1, without cancellation
-        errors.append(complex((c - cosine) * cosine + (s - sine) * sine, (s - sine) * cosine - (c - cosine) * sine))
-    e = np.array(errors)
-    amplitude = np.hypot(1 + e.real, e.imag) - 1
-    small = np.abs(e) < 1e-8
-    amplitude[small] = e.real[small]
-    return Rotation(
-        fmt, period, interval, method, np.asarray(steps), amplitude, np.arctan2(e.imag, 1 + e.real), np.abs(e), bounds
-    )
-
-
-def recursion(
-    fmt: FloatFormat,
-    period: float,
-    steps: Sequence[int],
-    interval: float = INTERVAL,
-) -> Rotation:
-    """Rotate by one sample's angle again and again, with every operation rounded: the deroll of (7), recursively.
-
-    Parameters
-    ----------
-    fmt : base 2, 10 or 16 of a precision that has compiled loops.
-    period, interval : of roll and between samples, s.
-    steps : samples to look at, ascending.
-
-    Raises
-    ------
-    ValueError : a format without compiled loops; steps that do not ascend.
-    """
-    marks = np.asarray(steps, dtype=np.int64)
-    if marks.ndim != 1 or not len(marks) or marks[0] < 0 or np.any(np.diff(marks) <= 0):
-        raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
-    backend = fmt.backend
-    if not isinstance(backend, Compiled):
-        raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer")
-    angle = fmt.array(list(_exact_turn(1, period, interval)))
-    start = fmt.array([1, 0])
-    step, state = (backend.pack(a.components) for a in (angle, start))
-    out = np.empty((len(marks), *step.shape), dtype=step.dtype)
-    _rotate(backend.tag, step, state, marks, out)
-    values = FloatArray.from_components(backend, backend.unpack(out), fmt).to_fractions()
-    bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
-    return _compared(fmt, period, interval, "recursion", marks, values, bounds)
-
-
-def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
-    """Cosine and sine of the product of a rounded roll rate and a rounded time, each rounded: in any format."""
-    marks = np.asarray(steps, dtype=np.int64)
-    rate = fmt.array(theory.roll_rate(period))
-    values = []
-    for n in marks:
-        angle = Fraction((rate * fmt.array(int(n) * Fraction(interval))).to_fractions())
-        with mpmath.workdps(60):
-            x = mpmath.mpf(angle.numerator) / angle.denominator
-            values.append([fmt.round(_fraction(mpmath.cos(x))), fmt.round(_fraction(mpmath.sin(x)))])
-    phases = 2 * np.pi * marks * (interval / period)
-    bounds = np.array([theory.direct_bound(float(phase), fmt.unit_roundoff) for phase in phases])
-    return _compared(fmt, period, interval, "direct", marks, values, bounds)
-
-
-def digits_needed_observed(
-    method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
-) -> int:
-    """Least precision from which on a year's deroll of a drift stays within `error` mas.
-
-    Tried downwards from what the bound proves to be enough, and no further than to the first that is not: with fewer
-    digits still, it may stay within by luck.
-    """
-    bound = theory.rotation_bound(method, period, steps[-1])
-    rotate = {"recursion": recursion, "direct": direct}[method]
-    enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
-    for precision in range(min(LARGEST_PRECISION[base], enough), 1, -1):
-        if rotate(FloatFormat(base, precision), period, steps).drift_error(drift) > error:
-            return precision + 1
-    return 2

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.integration import experiment, theory
+from gpbnb.integration import experiment, inputs, theory
 
 RULES = list(theory.RULES.values())
 each_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
@@ -187,7 +187,7 @@ def test_a_resonance_can_be_sampled_at_any_rate(f_c):
 @pytest.mark.parametrize("f_c", [0.3, 5.0, 200.0, 1e5])
 def test_the_closed_step_is_the_one_of_the_matrix_exponential(f_c):
     closed = theory.exact_step(FIRST, f_c)
-    a, b = theory._moments(FIRST, 1 / f_c)
+    a, b = inputs._moments(FIRST, 1 / f_c)
     assert closed.a == pytest.approx(a, rel=1e-13, abs=0)
     assert closed.b == pytest.approx(b, rel=1e-12, abs=0)
 
@@ -310,7 +310,7 @@ def test_folding_is_right_where_it_cancels_nearly_everything():
     """Σ c p = 0: the random walk of a resonance is of fourth order in T, -T⁴ Σ Re(c p³)/360."""
     process, f_c = theory.resonant(1.0, 1.0, 0.3), 1e9
     with mpmath.workdps(50):
-        third = sum(mpmath.re(c * p**3) for c, p in theory._exact_modes(process))
+        third = sum(mpmath.re(c * p**3) for c, p in inputs._exact_modes(process))
     assert theory.walk_rate(process, f_c) == pytest.approx(float(-third / 360) * f_c**-4, rel=1e-12, abs=0)
 
 

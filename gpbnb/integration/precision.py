@@ -1,0 +1,212 @@
+r"""Integration errors in t-digit arithmetic: the integration error and the rounding error together.
+
+The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input in rad/s, T cycle time in s,
+:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. What
+is called a factor has the units of the input and of T divided out. Arrays of :math:`\mu` are taken entry by entry.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize_scalar
+from scipy.special import erf
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.search import smallest_precision
+from gpbnb.integration.arguments import Floats, bandwidth_ratio, positive_array, positive_number
+from gpbnb.integration.walk import discretize, error_variance
+
+# -- both errors, in t-digit arithmetic ----------------------------------------------------------
+
+
+def mean_square_rounding(fmt: FloatFormat) -> float:
+    r"""Mean square of the relative error of one rounding to nearest, :math:`\kappa = b^{-2t}(b^2-1)/(24\ln b)`.
+
+    For a number whose logarithm is spread evenly: an error spread evenly over a spacing :math:`b^{e-t}`.
+    """
+    b = fmt.base
+    return float(b) ** (-2 * fmt.precision) * (b * b - 1) / (24 * math.log(b))
+
+
+def mean_chopping(fmt: FloatFormat) -> float:
+    r"""Mean relative error of chopping, :math:`\kappa_1 = b^{-t}(b-1)/(2\ln b)`, for the same numbers."""
+    return float(fmt.base) ** -fmt.precision * (fmt.base - 1) / (2 * math.log(fmt.base))
+
+
+class Errors(NamedTuple):
+    """Standard deviations of the error of an integral, in the unit of the input times seconds."""
+
+    discretization: float
+    rounding: float
+
+    @property
+    def total(self) -> float:
+        """Both, as independent errors add up."""
+        return math.hypot(*self)
+
+
+def correlation_factor(change: ArrayLike) -> Floats:
+    r"""How much roundings that follow each other add up beyond independent ones.
+
+    .. math:: F = 1 + \sum_{k\ge1} \frac{6}{\pi^2k^2\,\sinh(2\pi^2k^2s^2)}
+
+    The accumulator is a multiple of its spacing u, so that the error of adding p depends on the fraction of p/u alone.
+    While p changes little from cycle to cycle, so does the error. s is the rms change of p from one cycle to the
+    next, in spacings; F is 1.05 at s = 0.5 and near :math:`1/(30s^2)` below.
+
+    Parameters
+    ----------
+    change : s, positive. The formula is right while p itself is spread over more than a spacing.
+    """
+    s = positive_array("change", change)[..., np.newaxis]
+    k = np.arange(1, 65)
+    with np.errstate(over="ignore"):
+        return np.asarray(1 + np.sum(6 / (np.pi**2 * k**2 * np.sinh(2 * np.pi**2 * k**2 * s**2)), axis=-1))
+
+
+def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt: FloatFormat) -> Errors:
+    r"""Errors of the trapezoidal rule run in a format, at the end of a `duration` t of many correlation times.
+
+    Discretization: :func:`error_variance`. Rounding to nearest: the sum of
+
+    - the errors of the additions to the accumulator, whose variance grows as (23); their mean square is that of a
+      spacing u of the accumulator, :math:`u^2F/12`;
+    - what ties add in an even base: one addition in u over the spacing of the increment is a tie, and half away from
+      zero moves it outwards, by :math:`\kappa_1E|p|` in the mean. The sum has the rms
+      :math:`\kappa_1\sigma_xt\sqrt{(1+\varphi)/2\pi}`, where 1/2 is the mean square of the share of time that a random
+      walk is more often on one side than on the other;
+    - the roundings of sample, sum and product, each of the mean square :math:`\kappa` of its number.
+
+    T/2 counts as exact: its one rounding changes the integral by a share that no rate changes.
+
+    Chopping: each addition takes the share :math:`\kappa_1` off the accumulator, which leaks. With
+    :math:`a = \kappa_1f_ct` the error has the variance
+    :math:`(2\sigma_x^2t/\omega_{bw})\,(2a-3+4e^{-a}-e^{-2a})/2a`, or :math:`2\sigma_x^2ta^2/3\omega_{bw}` for small a.
+
+    Parameters
+    ----------
+    duration : s; at least two cycles.
+
+    Raises
+    ------
+    ValueError : an argument is not positive and finite, or `duration` shorter than two cycles.
+    """
+    sigma_x, mu = positive_number("sigma_x", sigma_x), bandwidth_ratio(omega_bw, f_c)
+    period, n = 1 / f_c, positive_number("duration", duration) * f_c
+    if n < 2:
+        raise ValueError(f"got a duration of {n:.3g} cycles; needed at least 2")
+    discretization = sigma_x * period * math.sqrt(float(error_variance(n, mu)))
+    phi = math.exp(-mu)
+    excess = mu / 2 / math.tanh(mu / 2)  # of the digital integral's variance over that of the true one
+    share = mean_chopping(fmt)
+    if fmt.rounding is Rounding.CHOP:
+        leak = share * n
+        variance = sigma_x**2 * duration / omega_bw * leak * float(discretize(leak).q22) * excess
+        return Errors(discretization, math.sqrt(variance))
+    before = mean_square_rounding(fmt) * (period * sigma_x) ** 2 * (2 + phi)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    time = (nodes + 1) / 2 * omega_bw * duration
+    spread = sigma_x / omega_bw * np.sqrt(2 * excess * (time + np.expm1(-time)))  # (23)
+    change = period * sigma_x * math.sqrt(-math.expm1(-2 * mu) / 2)
+    added = float(np.sum(weights / 2 * _addition(spread, change, fmt)))
+    ties = share * sigma_x * duration * math.sqrt((1 + phi) / (2 * math.pi)) if fmt.base % 2 == 0 else 0.0
+    return Errors(discretization, math.sqrt(n * (before + added) + ties**2))
+
+
+def _addition(spread: Floats, change: float, fmt: FloatFormat) -> Floats:
+    """Mean square error, F included, of adding to normal accumulators of the standard deviations `spread`."""
+    b = float(fmt.base)
+    top = np.floor(np.log(spread * 8) / math.log(b)) + 1
+    # Sixteen octaves down from 8 standard deviations: what is below adds less than 2**-36 of the whole.
+    e = top - np.arange(math.ceil(16 / math.log2(b)) + 1)[:, np.newaxis]
+    spacing = b ** (e - fmt.precision)
+    within = erf(b**e / (spread * math.sqrt(2)))
+    share = within - np.concatenate([within[1:], np.zeros((1, len(spread)))])
+    return np.asarray(np.sum(share * spacing**2 / 12 * correlation_factor(change / spacing), axis=0))
+
+
+def independent_best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
+    r"""The best rate in Hz in closed form, for :math:`\mu\ll1` and independent roundings to nearest.
+
+    .. math:: f_c = \left(\frac{\omega_{bw}^2}{3\kappa t}\right)^{1/3}
+
+    There, the variance of the rounding error, :math:`\kappa\sigma_x^2t^2f_c/\omega_{bw}`, is twice that of the
+    discretization error, :math:`\sigma_x^2\omega_{bw}t/6f_c^2`. With chopping both grow and fall alike, in
+    :math:`f_c = (\omega_{bw}^2/4\kappa_1^2t^2)^{1/4}`. The rms of the input does not matter.
+    """
+    omega_bw, duration = positive_number("omega_bw", omega_bw), positive_number("duration", duration)
+    if fmt.rounding is Rounding.CHOP:
+        return math.sqrt(omega_bw / (2 * mean_chopping(fmt) * duration))
+    return float((omega_bw**2 / (3 * mean_square_rounding(fmt) * duration)) ** (1 / 3))
+
+
+def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
+    """Iteration rate in Hz at which the total of :func:`two_errors` is least; below :func:`stall_rate`.
+
+    Parameters
+    ----------
+    omega_bw : rad/s. `duration` : s, of many correlation times 1/omega_bw.
+
+    Raises
+    ------
+    ValueError : at no rate is the total error below half of the integral's own rms: use more digits.
+    """
+    guess = independent_best_rate(omega_bw, duration, fmt)
+
+    def total(log: float) -> float:
+        return two_errors(1.0, omega_bw, math.exp(log), duration, fmt).total
+
+    low, high = max(guess / 100, 2.001 / duration), max(guess * 10, 100 / duration)
+    found: Any = minimize_scalar(
+        total, bounds=(math.log(low), math.log(high)), method="bounded", options={"xatol": 1e-5}
+    )
+    if total(found.x) > math.sqrt(2 * duration / omega_bw) / 2:
+        raise ValueError(
+            f"got {fmt}, {duration:g} s, {omega_bw:g} rad/s; needed an error below half of the integral at some rate; "
+            "use more digits"
+        )
+    return math.exp(found.x)
+
+
+def needed_precision(
+    omega_bw: float,
+    f_c: float,
+    duration: float,
+    base: int = 2,
+    rounding: Rounding = Rounding.NEAREST,
+    share: float = 0.1,
+) -> int:
+    """Least digits with which the rounding error stays below `share` of the discretization error.
+
+    Raises
+    ------
+    ValueError : `share` not above 0, or an argument of :func:`two_errors` is refused.
+    """
+    if not 0 < share < math.inf:
+        raise ValueError(f"got share = {share}; needed a positive number, as 0.1 for a tenth")
+
+    def enough(fmt: FloatFormat) -> bool:
+        errors = two_errors(1.0, omega_bw, f_c, duration, fmt)
+        return errors.rounding <= share * errors.discretization
+
+    most = math.ceil(400 / math.log2(base))
+    found = smallest_precision(enough, base, rounding, largest=most, monotone=True)
+    if found is None:
+        raise ValueError(
+            f"got share = {share}, {f_c:g} Hz, {duration:g} s; needed at most {most} digits; allow a larger share"
+        )
+    return found.precision
+
+
+def stall_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
+    r"""Rate in Hz at which the rms increment is half a spacing of the accumulator at the end.
+
+    Near it and beyond, additions are lost, :func:`two_errors` is no longer right, and the integral stands still.
+    """
+    omega_bw, duration = positive_number("omega_bw", omega_bw), positive_number("duration", duration)
+    spacing = math.sqrt(12 * mean_square_rounding(fmt) * 2 * duration / omega_bw)
+    return 2 / spacing

@@ -1,0 +1,162 @@
+"""Rounded rotations, emulated digit by digit: by recursion, and each angle on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
+from gpbnb.measurement import YEAR
+from gpbnb.rolling import theory
+from gpbnb.rolling.theory import INTERVAL
+
+
+def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
+    """What the register of a format does to ω_r = 2π/T: the rounded less the true, rad/s."""
+    rate = theory.roll_rate(period)
+    return float(fmt.round(rate) - rate)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A rotation (cos nδ, sin nδ) computed in a format: relative amplitude and phase errors, and size of both.
+
+    `method` is "recursion" or "direct", `step` the samples n looked at, `bound` that of the size.
+    """
+
+    fmt: FloatFormat
+    period: float
+    interval: float
+    method: str
+    step: NDArray[np.int64]
+    amplitude: NDArray[np.float64]
+    phase: NDArray[np.float64]
+    size: NDArray[np.float64]
+    bound: NDArray[np.float64]
+
+    def drift_error(self, drift: float) -> float:
+        """Largest error in mas of a ramp of `drift` mas a year, derolled with this rotation."""
+        return float(np.max(self.size * self.step * (drift * self.interval / YEAR)))
+
+
+@compiled
+def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
+    a, b = load(fmt, step, 0), load(fmt, step, 1)
+    c, s = load(fmt, state, 0), load(fmt, state, 1)
+    n = 0
+    for k in range(len(marks)):
+        for _ in range(marks[k] - n):
+            c, s = (
+                subtract(fmt, multiply(fmt, c, a), multiply(fmt, s, b)),
+                add(fmt, multiply(fmt, s, a), multiply(fmt, c, b)),
+            )
+        n = marks[k]
+        store(fmt, out, (k, 0), c)
+        store(fmt, out, (k, 1), s)
+
+
+def _exact_turn(n: int, period: float, interval: float) -> tuple[Fraction, Fraction]:
+    """Cosine and sine of n steps, to 60 digits."""
+    turns = n * Fraction(interval) / Fraction(period) % 1
+    with mpmath.workdps(60):
+        angle = 2 * mpmath.mpf(turns.numerator) / turns.denominator
+        return _fraction(mpmath.cospi(angle)), _fraction(mpmath.sinpi(angle))
+
+
+def _fraction(x: Any) -> Fraction:
+    sign, mantissa, exponent, _ = x._mpf_
+    return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** exponent
+
+
+def _compared(
+    fmt: FloatFormat, period: float, interval: float, method: str, steps: Any, values: Any, bounds: Any
+) -> Rotation:
+    """Errors of computed pairs (m, 2) of exact Fractions."""
+    errors = []
+    for n, (c, s) in zip(steps, values, strict=True):
+        cosine, sine = _exact_turn(int(n), period, interval)
+        # z e^{-inδ} - 1, without cancellation
+        errors.append(complex((c - cosine) * cosine + (s - sine) * sine, (s - sine) * cosine - (c - cosine) * sine))
+    e = np.array(errors)
+    amplitude = np.hypot(1 + e.real, e.imag) - 1
+    small = np.abs(e) < 1e-8
+    amplitude[small] = e.real[small]
+    return Rotation(
+        fmt, period, interval, method, np.asarray(steps), amplitude, np.arctan2(e.imag, 1 + e.real), np.abs(e), bounds
+    )
+
+
+def recursion(
+    fmt: FloatFormat,
+    period: float,
+    steps: Sequence[int],
+    interval: float = INTERVAL,
+) -> Rotation:
+    """Rotate by one sample's angle again and again, with every operation rounded: the deroll of (7), recursively.
+
+    Parameters
+    ----------
+    fmt : base 2, 10 or 16 of a precision that has compiled loops.
+    period, interval : of roll and between samples, s.
+    steps : samples to look at, ascending.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops; steps that do not ascend.
+    """
+    marks = np.asarray(steps, dtype=np.int64)
+    if marks.ndim != 1 or not len(marks) or marks[0] < 0 or np.any(np.diff(marks) <= 0):
+        raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
+    backend = fmt.backend
+    if not isinstance(backend, Compiled):
+        raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer")
+    angle = fmt.array(list(_exact_turn(1, period, interval)))
+    start = fmt.array([1, 0])
+    step, state = (backend.pack(a.components) for a in (angle, start))
+    out = np.empty((len(marks), *step.shape), dtype=step.dtype)
+    _rotate(backend.tag, step, state, marks, out)
+    values = FloatArray.from_components(backend, backend.unpack(out), fmt).to_fractions()
+    bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
+    return _compared(fmt, period, interval, "recursion", marks, values, bounds)
+
+
+def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
+    """Cosine and sine of the product of a rounded roll rate and a rounded time, each rounded: in any format."""
+    marks = np.asarray(steps, dtype=np.int64)
+    rate = fmt.array(theory.roll_rate(period))
+    values = []
+    for n in marks:
+        angle = Fraction((rate * fmt.array(int(n) * Fraction(interval))).to_fractions())
+        with mpmath.workdps(60):
+            x = mpmath.mpf(angle.numerator) / angle.denominator
+            values.append([fmt.round(_fraction(mpmath.cos(x))), fmt.round(_fraction(mpmath.sin(x)))])
+    phases = 2 * np.pi * marks * (interval / period)
+    bounds = np.array([theory.direct_bound(float(phase), fmt.unit_roundoff) for phase in phases])
+    return _compared(fmt, period, interval, "direct", marks, values, bounds)
+
+
+def digits_needed_observed(
+    method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
+) -> int:
+    """Least precision from which on a year's deroll of a drift stays within `error` mas.
+
+    Tried downwards from what the bound proves to be enough, and no further than to the first that is not: with fewer
+    digits still, it may stay within by luck.
+    """
+    bound = theory.rotation_bound(method, period, steps[-1])
+    rotate = {"recursion": recursion, "direct": direct}[method]
+    enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
+    for precision in range(min(LARGEST_PRECISION[base], enough), 1, -1):
+        if rotate(FloatFormat(base, precision), period, steps).drift_error(drift) > error:
+            return precision + 1
+    return 2
