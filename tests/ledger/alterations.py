@@ -51,6 +51,22 @@ def _of_literal(literal: str) -> Iterator[tuple[str, str]]:
 
 
 def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
+    """The usual alterations; where they are few, dropped factors and the opposite sign as well."""
+    usual = dict(_usual(relation))
+    yield from usual.items()
+    if len(usual) < 3:
+        tree = relation.tree
+        for k, node in enumerate(ast.walk(tree)):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+                new = copy.deepcopy(tree)
+                _substitute(new, list(ast.walk(new))[k], node.left)
+                yield f"dropped factor at {k}", ast.unparse(new)
+        if "twice the last side" in usual and isinstance(tree, ast.Compare):
+            tree.comparators[-1] = ast.UnaryOp(ast.USub(), tree.comparators[-1])
+            yield "minus the last side", ast.unparse(tree)
+
+
+def _usual(relation: Relation) -> Iterator[tuple[str, str]]:
     """Signs, coefficients, exponents, indices, dropped terms, digits, and the direction of an inequality."""
     tree = relation.tree
     nodes = list(ast.walk(tree))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import operator
 from fractions import Fraction
 from functools import cache
 
@@ -10,7 +12,7 @@ import numpy as np
 from gpbnb.arithmetic.rational import column_sum_norm, inverse_of
 from gpbnb.inversion import procedure, theory
 from gpbnb.ledger.checks.inversion.environments import Elimination, runs, substitutions, weights
-from gpbnb.ledger.checks.inversion.first_order import EPSILON, FirstOrder
+from gpbnb.ledger.checks.inversion.first_order import EPSILON
 from gpbnb.ledger.checks.inversion.judging import corrected, holds, says, slip
 from gpbnb.ledger.checks.inversion.registry import CHECKS
 from gpbnb.ledger.checks.inversion.samples import of_example, samples
@@ -104,10 +106,9 @@ def assembled_1982(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("s11-2.claim-approximations"))
 def approximations(printed: Statement) -> Finding:
-    return compare(
-        holds(printed, substitutions(3)),
-        "both sides agree to first order where they are multiplied by ε, as in (78)",
-    )
+    links = [link for names in substitutions(3) for link in printed.links(names, Fraction)]
+    agrees = all(link.symbol == "≈" and EPSILON * link.left == EPSILON * link.right for link in links)
+    return compare(agrees, "multiplied by ε, as in (78), both sides agree to first order")
 
 
 @CHECKS.add(*both("eq77"))
@@ -159,22 +160,28 @@ def factored_three(printed: Statement) -> Finding:
 # -- n rows ---------------------------------------------------------------------------------------
 
 
-def _piecewise(printed: Statement, diagonal: Relation | None, off: Relation, where: Relation) -> bool:
-    """Whether a formula with a range of indices gives every entry one value, the true one."""
+_LESS = {"<=": operator.le, "<": operator.lt}
+
+
+def _piecewise(diagonal: Relation | None, off: Relation, where: Relation) -> bool:
+    """Whether a formula with a range of indices gives every entry one value, the true one, and names no others."""
     for names in GENERAL:
         n = int(names["n"])
-        for k in range(1, n + 1):
-            for j in range(1, n + 1):
-                here = {**names, "k": Fraction(k), "j": Fraction(j)}
-                links = where.links(here, Fraction)
-                inside = all(a <= b if symbol == "<=" else a < b if symbol == "<" else False for a, symbol, b in
-                             ((link.left, link.symbol, link.right) for link in links))  # fmt: skip
-                values = [off.value(here, Fraction)] if inside else []
-                if diagonal is not None and k == j:
-                    values.append(diagonal.value(here, Fraction))
-                true = off.links(here, Fraction)[0].left
-                if len(values) > 1 or true != (values[0] if values else FirstOrder(Fraction(0))):
+        for k, j in itertools.product(range(2 * n + 2), repeat=2):
+            here = {**names, "k": Fraction(k), "j": Fraction(j)}
+            inside = all(
+                _LESS.get(link.symbol, operator.gt)(link.left, link.right) for link in where.links(here, Fraction)
+            )
+            if not 1 <= min(k, j) <= max(k, j) <= n:
+                if inside:
                     return False
+                continue
+            rules = [off] * inside + [diagonal] * (diagonal is not None and k == j)
+            true = off.links(here, Fraction)[0].left
+            if len(rules) > 1 or (not rules and true != Fraction(0)):
+                return False
+            if any(link.left != link.right for rule in rules if rule for link in rule.links(here, Fraction)):
+                return False
     return True
 
 
@@ -182,9 +189,9 @@ def _piecewise(printed: Statement, diagonal: Relation | None, off: Relation, whe
 def weights_of_the_matrix(printed: Statement) -> Finding:
     diagonal, off, where = (printed.relation(i) for i in (1, 2, 3))
     return compare(
-        _piecewise(printed, diagonal, off, where),
+        _piecewise(diagonal, off, where),
         "$1\\le k<j\\le n$, for $n=4$ and 5; with $k\\le j$ the entries of the diagonal have two values",
-        Verdict.MISPRINT if _piecewise(printed, diagonal, off, Relation("1 <= k < j <= n")) else Verdict.WRONG,
+        Verdict.MISPRINT if _piecewise(diagonal, off, Relation("1 <= k < j <= n")) else Verdict.WRONG,
         note=COUNTED,
         otherwise_note="$k<j$ is meant, and printed in (87) and in hung1982",
     )
@@ -193,7 +200,7 @@ def weights_of_the_matrix(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.eq87")
 def weights_of_the_change(printed: Statement) -> Finding:
     return compare(
-        _piecewise(printed, None, printed.relation(1), printed.relation(2)),
+        _piecewise(None, printed.relation(1), printed.relation(2)),
         "counted in rows of up to four products",
         note=COUNTED,
     )
@@ -210,7 +217,7 @@ def weights_1982(printed: Statement) -> Finding:
     each = [{**names, "k": Fraction(k)} for names in GENERAL for k in range(1, int(names["n"]) + 1)]
     of_right = corrected(printed, f"{printed.relation(1).text}; {printed.relation(4).text}")
     return compare(
-        holds(of_right, each) and _piecewise(printed, None, printed.relation(2), printed.relation(3)),
+        holds(of_right, each) and _piecewise(None, printed.relation(2), printed.relation(3)),
         "counted in rows of up to four products",
         note=COUNTED,
     )

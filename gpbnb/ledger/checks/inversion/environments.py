@@ -74,7 +74,8 @@ class Elimination:
         """Matrices (A, b) after each step: the exact step on computed numbers, the computed one; and multipliers."""
         n, width, fl = self.n, self.n + self.b.shape[1], self.rounded
         first = FirstOrder(np.hstack([self.a, self.b]))
-        exact, computed, multipliers = [first], [first], {}
+        exact, computed = [first], [first]
+        multipliers: dict[tuple[int, ...], FirstOrder] = {}
         old = [[FirstOrder(x) for x in row] for row in first.value]
         for k in range(n - 1):
             true, new = [list(row) for row in old], [list(row) for row in old]
@@ -150,8 +151,8 @@ class Elimination:
             def look(*where: Any) -> FirstOrder:
                 i, *rest = map(int, where)
                 j, k = (self.n + 1, *rest) if right and rest else (self.n + 1, 0) if right else (*rest, 0)[:2]
-                if not 1 <= i <= self.n or not (right or 1 <= j <= self.n):
-                    raise KeyError(where)
+                if not 1 <= i <= self.n or not (right or 1 <= j <= self.n) or not 0 <= k < min(i, j):
+                    raise KeyError(f"no entry {where}: the documents name an entry by the last step that changed it")
                 return FirstOrder(stages[k].value[i - 1, j - 1], stages[k].slope[i - 1, j - 1])
 
             return look
@@ -178,7 +179,7 @@ class Elimination:
             "a_hat": a_computed,
             "b": b_exact,
             "b_hat": b_computed,
-            "a_tilde": lambda i, j, k: a_computed(i, j, k) - a_exact(i, j, k),
+            "a_tilde": lambda i, j, k: entries(self.errors(False)[int(k)])[int(i) - 1][int(j) - 1],
             "A": staged(exact, False),
             "A_hat": staged(computed, False),
             "A_tilde": staged(computed, False, errors=True),
@@ -316,7 +317,7 @@ def substitutions(n: int) -> tuple[Names, ...]:
     found = []
     for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1))):
         rng = random.Random(7000 + 10 * n + seed)
-        upper = np.where(np.tri(n, k=-1, dtype=bool), Fraction(0), random_matrix(rng, n, n))
+        upper = np.triu(random_matrix(rng, n, n)) + Fraction(0)
         right = random_matrix(rng, n, 1)
         e = EPSILON * sign
         run = Elimination(upper, right, lambda x, e=e: x * (1 + e))  # type: ignore[misc]
@@ -344,7 +345,7 @@ def substitutions(n: int) -> tuple[Names, ...]:
                 "Deltaa": square(change),
                 "Deltab": vector(right_change),
                 "Deltax": x_hat - x,
-                "A_D": FirstOrder(np.where(np.eye(n, dtype=bool), Fraction(0), upper)),
+                "A_D": FirstOrder(np.triu(upper, 1) + Fraction(0)),
                 "M_A": on_diagonal(diagonal([Fraction(x) for x in roundings(n)[0][0]])),
                 "M_b": on_diagonal(of_right),
             }

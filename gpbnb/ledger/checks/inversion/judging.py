@@ -15,6 +15,7 @@ from gpbnb.ledger.statements import Statement
 Names = Mapping[str, Any]
 _SYMBOLS: dict[str, Callable[[Any, Any], Any]] = {
     "==": operator.eq,
+    "≈": operator.eq,  # to first order
     "<=": operator.le,
     ">=": lambda a, b: b <= a,
     "<": lambda a, b: a <= b and a != b,
@@ -23,7 +24,6 @@ _SYMBOLS: dict[str, Callable[[Any, Any], Any]] = {
 COMMON: dict[str, Any] = {
     "matrix": matrix,
     "norm": lambda x: x.norm(),
-    "approx": lambda a, b: b if a == b else None,  # equal to first order
 }
 """Functions of every environment."""
 

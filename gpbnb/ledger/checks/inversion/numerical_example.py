@@ -62,7 +62,8 @@ def actual_norms(printed: Statement) -> Finding:
 
 
 @cache
-def _readings(column: str) -> tuple[example.Column, ...]:
+def readings(column: str) -> tuple[example.Column, ...]:
+    """Every reading of a column of Table 1, "proposed" or "actual"."""
     return tuple(example.bound_readings() if column == "proposed" else example.error_readings())
 
 
@@ -74,12 +75,12 @@ def _numbers(printed: Statement, column: str) -> dict[int, str]:
 
 def _reproduced(printed: Statement, column: str) -> tuple[int, int]:
     """How many readings give all printed numbers of a column to their four digits, and of how many."""
-    numbers, readings = _numbers(printed, column), _readings(column)
+    numbers = _numbers(printed, column)
     count = sum(
         all(example.agree(one.values[example.PLACES.index(places)], literal) for places, literal in numbers.items())
-        for one in readings
+        for one in readings(column)
     )
-    return count, len(readings)
+    return count, len(readings(column))
 
 
 @cache
@@ -185,7 +186,7 @@ def _margin() -> tuple[str, str]:
 def _mantissa() -> tuple[str, str]:
     _, text = _claim("same digits")
     printed = len({number.split("e")[0] for number in _columns()[0]}) == 1
-    more = [one for one in _readings("proposed") if one.detail.endswith("more digits")]
+    more = [one for one in readings("proposed") if one.detail.endswith("more digits")]
     same = sum(one.same_digits for one in more)
     right = printed and same == len(more)
     return (
