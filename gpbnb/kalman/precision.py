@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -14,6 +13,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -100,22 +100,17 @@ def required_precision(
         z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
-    most, tried, why = LARGEST_PRECISION[base], dict[int, float](), dict[int, str]()
+    tried, why = dict[int, float](), dict[int, str]()
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
 
-        def meets(precision: int) -> bool:
-            if precision not in tried:
-                fmt = FloatFormat(base, precision, rounding)
-                tried[precision], why[precision] = _error_over_tolerance(
-                    model, measured, fmt, form, checkpoint_steps, true, tolerances
-                )
-                bar.update()
-            return tried[precision] <= 1
+        def meets(fmt: FloatFormat) -> bool:
+            tried[fmt.precision], why[fmt.precision] = _error_over_tolerance(
+                model, measured, fmt, form, checkpoint_steps, true, tolerances
+            )
+            bar.update()
+            return tried[fmt.precision] <= 1
 
-        answer = 2 + bisect_left(range(2, most), True, key=meets)
-        while answer < most and not (meets(answer) and meets(answer + 1)):
-            answer += 1
-        found = FloatFormat(base, answer, rounding) if meets(answer) else None
+        found = smallest_precision(meets, base, rounding, least=2, largest=LARGEST_PRECISION[base])
     reasons = [f"in {digits} digits {reason}" for digits, reason in sorted(why.items()) if reason]
     return Requirement(found, basis, int(steps), tuple(sorted(tried.items())), reasons[-1] if reasons else "")
 

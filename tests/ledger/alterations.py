@@ -108,6 +108,8 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             for i, index in enumerate(indices):
                 moved = [*indices[:i], ast.BinOp(index, ast.Add(), ast.Constant(1)), *indices[i + 1 :]]
                 yield f"index {i + 1}", ast.Subscript(value, ast.Tuple(moved, ast.Load()), ast.Load())
+        case ast.Call(func=ast.Name(id="sin" | "cos" as name), args=arguments):
+            yield "function", ast.Call(ast.Name("cos" if name == "sin" else "sin", ast.Load()), arguments, [])
         case ast.Compare(left=left, ops=ops, comparators=rights):
             for i, op in enumerate(ops):
                 if type(op) in _OPPOSITE:
