@@ -12,7 +12,7 @@ binary32, binary64  random bit patterns, half of the pairs close to each other  
 ==================  ==========================================================================  =======================
 
 Ties go to even throughout. NumPy and ml_dtypes compute in float32 and round again, which is right for formats of at
-most 11 bits: no quotient, sum, product or root of theirs is, in 24 bits, a new tie. The other rounding modes are compared
+most 11 bits: no quotient, sum, product or root of theirs is, in 24 bits, a new tie. The other modes are compared
 with their definitions, in Fractions, by the tests.
 
 What is finite there must be the same number here; an infinity there must overflow here, and so must the NaN that E4M3
