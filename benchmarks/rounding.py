@@ -83,7 +83,9 @@ def measure_processors(x: Any) -> list[Row]:
         }
         for peer, work in works.items():
             # ml_dtypes rounds to float32 first: about six results in a million differ, at ties that this makes.
-            if peer not in ("gpbnb", "memory copy", "ml_dtypes") and not np.array_equal(fmt.array(x).to_float(), work()):
+            if peer not in ("gpbnb", "memory copy", "ml_dtypes") and not np.array_equal(
+                fmt.array(x).to_float(), work()
+            ):
                 raise RuntimeError(f"gpbnb and {peer} round differently")
         times = medians(works, 15)
         table += rows(f"round 10⁶ float64 to {name}", times, "gpbnb", {"memory copy": 0.5, "gfloat": 50, "pychop": 50})
