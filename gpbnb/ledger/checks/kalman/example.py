@@ -9,7 +9,7 @@ from functools import cache
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.display.tables import scientific
 from gpbnb.kalman import derivation, report_bounds
-from gpbnb.ledger.checks.kalman.registry import CHECKS, claims
+from gpbnb.ledger.checks.kalman.registry import CHECKS
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
@@ -64,8 +64,8 @@ def _value(printed: Statement) -> Fraction:
 @CHECKS.add(*both("s12.example-first-coefficient"))
 def first_coefficient(printed: Statement) -> Finding:
     value = coefficients()[0]
-    slips = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, printed.number("value").literal)
-    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in slips) or "no change of one digit"
+    misprints = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, printed.number("value").literal)
+    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in misprints) or "no change of one digit"
     return compare(
         _value(printed) == value and _number(printed, "value", value),
         scientific(value, 5),
@@ -83,7 +83,7 @@ def second_coefficient(printed: Statement) -> Finding:
         scientific(value, 5),
         otherwise_note="the printed number is $k(3n+1)\\cdot0.5(k-1)\\cdot84$: times for plus, and 84 for 82"
         if _number(printed, "value", product)
-        else "no slip was found that leads to the printed number",
+        else "no misprint was found that leads to the printed number",
         root=_SECOND,
     )
 
@@ -191,7 +191,7 @@ def criterion(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.s12.example-ocr-gp-beta")
 def name_of_the_experiment(printed: Statement) -> Finding:
     return compare(
-        claims(printed, "the experiment", {"GP-beta": False, "GP-B": True}),
+        printed.claims("the experiment", {"GP-beta": False, "GP-B": True}),
         "GP-B",
         Verdict.OCR,
         otherwise_note="the scan reads B as β here, and β as B in (122)",
