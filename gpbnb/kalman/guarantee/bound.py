@@ -38,6 +38,7 @@ from gpbnb.kalman.guarantee.envelope import (
     units,
 )
 from gpbnb.kalman.guarantee.gains import Schedule, schedule
+from gpbnb.kalman.guarantee.program import functionals
 from gpbnb.kalman.model import LinearModel
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
@@ -139,11 +140,12 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000) -> Guar
     steps = min(horizon, given.steps) if not given.settled else horizon
     period = given.steps - given.first
     most = _enough_lags(radius, period) if for_ever else steps
-    b, known = np.zeros(n), within
+    b, known, caps = np.zeros(n), within, None
     if not np.isfinite(within.state).all() or not np.isfinite(within.innovation).all():
         known = _from_measurements(given, within, most, for_ever, steps)
+        caps = _caps(given, known, most) if for_ever and given.first == 0 else None
     for _ in range(40):
-        found = _disturbances(given, known, b)
+        found = _disturbances(given, known, b, caps)
         history, parts, lags = _sums(given, found, b, most, for_ever, steps)
         new = history.max(axis=0)
         if (new <= b).all() or not np.isfinite(new).all():
@@ -157,8 +159,12 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000) -> Guar
     return Guarantee(b if np.isfinite(new).all() else new, ended, why, history, worst, known, given, lags, radius)
 
 
-def _disturbances(given: Schedule, within: Limits, b: NDArray[np.float64]) -> Disturbances:
+def _disturbances(
+    given: Schedule, within: Limits, b: NDArray[np.float64], caps: NDArray[np.float64] | None = None
+) -> Disturbances:
     program = given.program
+    if caps is None:
+        caps = np.full(len(program.operations), math.inf)
     return Disturbances(
         *disturbances(
             program.operations,
@@ -173,6 +179,7 @@ def _disturbances(given: Schedule, within: Limits, b: NDArray[np.float64]) -> Di
             given.dK,
             within,
             b,
+            caps,
         )
     )
 
@@ -236,9 +243,9 @@ def _sums(
         certificate = certify(*arrays, np.eye(n), phase, given.first, True, most, scale, small)
         sums.append(certificate)
         lags = max(lags, certificate.lags)
-    early = given.first + lags
+    early = given.first + lags if given.first else 0  # without a beginning of its own, sums of fewer terms
     history, parts, _ = transient(*arrays, given.first, early, most, _gap(given, early, lags), scale, small)
-    largest = np.maximum(b, history.max(axis=0))
+    largest = np.maximum(b, history.max(axis=0, initial=0.0))
     rows, row_parts = [], []
     for _ in range(200):  # the error of the last steps is carried on: raise the bound until it bounds itself
         rows, row_parts = [], []
@@ -272,7 +279,7 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     X, V = np.zeros(n), np.array(within.measurement)
     x0 = np.abs(given.x0.astype(np.float64)) * (1 + 2.0**-50)
     HPhi = np.ascontiguousarray(given.HPhi[..., 0])
-    early = given.first + most if for_ever else steps
+    early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
     for _ in range(60):
         limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
         slack = 2.0**-48 * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
@@ -298,3 +305,39 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
             return Limits(X, V, within.measurement)
         X, V = np.maximum(X, peak_x * (1 + 2.0**-30)), np.maximum(V, peak_v * (1 + 2.0**-30))
     return Limits(np.full(n, math.inf), np.full(m, math.inf), within.measurement)
+
+
+def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
+    """Peak of each operation's own linear function: less than what the peaks of the states allow it.
+
+    For a filter whose coefficients never change; the exact filter then is the program without roundings.
+    """
+    program, first = given.program, given.program.n + given.program.m
+    if given.steps != 1 or given.HPhi.any():
+        return np.full(len(program.operations), math.inf)
+    rows = np.empty((first + len(program.operations), first, 2))
+    sizes = np.empty(rows.shape[:2])
+    functionals(program.operations, given.coefficients[0], first, rows, sizes)
+    of_state, of_input = rows[first:, : program.n, 0], np.abs(rows[first:, program.n :, 0])
+    found = _disturbances(given, within, np.zeros(program.n))
+    limit = np.array(within.measurement)[None, :]
+    slack = 2.0**-48 * np.abs(found.K) @ within.measurement + found.spread @ within.state
+    size = np.abs(found.K[0]) @ within.measurement + 1e-300
+    peak = certify(
+        found.F,
+        found.spread,
+        found.K,
+        limit,
+        slack,
+        np.zeros(program.m, dtype=np.int64),
+        np.ascontiguousarray(of_state),
+        1,
+        0,
+        True,
+        most,
+        size,
+        1e-9 * float(size.max()),
+    )
+    total = peak.sums.sum(axis=1) + (peak.residual + peak.tail) @ within.state + of_input @ within.measurement
+    total += 2.0**-50 * sizes[first:] @ np.concatenate([within.state, within.measurement])
+    return np.asarray(total * (1 + 2.0**-40))

@@ -134,6 +134,7 @@ def disturbances(
     dK: Any,
     limits: Any,
     b: Any,
+    caps: Any,
 ) -> Any:
     r"""Disturbances of each step, :math:`e_k = \hat F e_{k-1} + q_k + \Delta F x_{k-1} + (\hat K - K)\nu_k`.
 
@@ -146,6 +147,7 @@ def disturbances(
     exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain, double-double, and a bound of its error.
     limits : of the filter without rounding.
     b : (n,), bound of the error before and after each step.
+    caps : (o,), bound of each operation's linear function of the exact filter; infinite if not known.
     """
     steps, n, m = coefficients.shape[0], Phi.shape[1], HPhi.shape[1]
     first, o_count, g_count = n + m, operations.shape[0], roots.shape[0]
@@ -189,7 +191,7 @@ def disturbances(
                 if size != 0.0:
                     seen += size * Z[i]
                     known += size * V[i]
-            size = min(seen, known) + carried
+            size = min(min(seen, known), caps[o]) + carried
             if code == MULTIPLY:
                 factor = abs(plain[a])
                 before = factor * off[c]

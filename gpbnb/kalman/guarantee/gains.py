@@ -130,7 +130,7 @@ def schedule(model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_00
     products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
     HPhi = double_doubles(products)[phases % cycle]
     x0 = model.rounded(fmt).x0
-    coefficients = _widened(fmt, packed)
+    coefficients = widened_array(packed)
     return Schedule(program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why)
 
 
@@ -203,8 +203,8 @@ def _of_cycle(matrices: NDArray[Any], rows: NDArray[np.int64], tail: tuple[int, 
     return matrices[rows % len(matrices)].reshape(len(rows), -1, *tail)
 
 
-def _widened(fmt: FloatFormat, packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Packed numbers of a format as double-double: exact in base 2 and 16, the nearest in base 10."""
+def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Packed numbers of any format as double-double: exact in base 2 and 16, the nearest in base 10."""
     if packed.dtype == np.float64:
         return np.stack([packed, np.zeros_like(packed)], axis=-1)
     significands, exponents = packed[..., 0], packed[..., 1]
