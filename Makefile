@@ -24,12 +24,10 @@ export JUPYTER_PLATFORM_DIRS := 1
 export JUPYTER_PREFER_ENV_PATH := 1
 export PYTEST_DEBUG_TEMPROOT := $(HERE)/.cache/tmp
 export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
-# numba sees when the file of a compiled function changes, but not when those of the kernels that it calls do.
-export NUMBA_CACHE_DIR := $(HERE)/.cache/numba/$(shell cat gpbnb/arithmetic/kernels/*.py | cksum | cut -d' ' -f1)
 export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
 export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1
-unexport PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
+unexport NUMBA_CACHE_DIR GPBNB_CACHE_DIR PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
 
 # IPython and pytest want theirs to be there.
 _ := $(shell mkdir -p .cache/tmp)

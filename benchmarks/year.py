@@ -19,8 +19,11 @@ from benchmarks.kalman import numpy_step
 from benchmarks.timing import machine
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.display.tables import Table
-from gpbnb.kalman import year
-from gpbnb.kalman.experiment import BLOCK, TRUTH, Form, Run
+from gpbnb.kalman import gravity_probe_b, year_cases
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import TRUTH
+from gpbnb.kalman.simulation import BLOCK
 
 RESULTS = Path(__file__).parent / "results"
 NUMPY_TAKES = 20  # one block of so many
@@ -45,20 +48,22 @@ def seconds(work: Callable[[], Any]) -> float:
     return time.process_time() - start
 
 
-def measure(steps: int = year.YEAR) -> list[Timed]:
+def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
     """Run both arithmetics and NumPy in turns, block by block; NumPy takes every twentieth, and its time is scaled."""
-    usual = year.MODELS[0]
+    usual = year_cases.MODELS[0]
     runs = {
-        FloatFormat(base, precision): Run(year.model(usual, base), FloatFormat(base, precision), Form.USUAL, ())
+        FloatFormat(base, precision): Run(
+            year_cases.model(usual, base), FloatFormat(base, precision), Form.INNOVATION, ()
+        )
         for base, precision in ((2, 24), (10, 8))
     }
-    given = year.model(usual, 2).to_float()
+    given = year_cases.model(usual, 2).to_float()
     Phi, H = given["Phi"][0], given["H"]
     plain = [(Phi, Phi.T, given["Q"][0], h, h.T, given["R"][0]) for h in H]
     x, P, identity = given["x0"].reshape(-1, 1), given["P0"], np.eye(len(Phi))
-    source, truth = year.simulation(usual), np.array(TRUTH)
+    source, truth = year_cases.simulation(usual), np.array(TRUTH)
     for fmt in runs:  # compiles
-        Run(year.model(usual, fmt.base), fmt, Form.USUAL, ()).take(source.measurements(1))
+        Run(year_cases.model(usual, fmt.base), fmt, Form.INNOVATION, ()).take(source.measurements(1))
     total, numpy_steps, numpy_total = dict.fromkeys(runs, 0.0), 0, 0.0
     for number in tqdm(range(-(-steps // BLOCK)), desc="a year, thrice", unit="block"):
         before = number * BLOCK

@@ -16,12 +16,13 @@ import sympy as sp
 
 from gpbnb import ledger
 from gpbnb.display.derivation import Derivation
-from gpbnb.ledger.checking import Row, load_checks
-from gpbnb.ledger.finding import Checks, Finding, Verdict
+from gpbnb.ledger.checking import Row
+from gpbnb.ledger.finding import Finding, Verdict
+from gpbnb.ledger.registry import Checks
 
 Change = Callable[[pytest.MonkeyPatch], None]
 
-INVENTORY = ledger.load_inventory()
+INVENTORY = ledger.load_statements()
 
 
 # -- what the checks found ------------------------------------------------------------------------
@@ -32,33 +33,33 @@ def functions(checks: Checks) -> dict[str, Callable[[], Finding]]:
     return {check.__name__: check for check in checks.values()}
 
 
-def examined(entries: Iterable[ledger.Entry]) -> tuple[Row, ...]:
+def examined(entries: Iterable[ledger.Statement]) -> tuple[Row, ...]:
     """What the checks of all topics find of some entries; none fails and none is missing."""
-    rows = ledger.examine(entries, load_checks(INVENTORY))
-    assert [row.entry.id for row in rows if row.error is not None or row.finding is None] == []
+    rows = ledger.examine(entries)
+    assert [row.statement.id for row in rows if row.error is not None or row.finding is None] == []
     return rows
 
 
 def finding(rows: Iterable[Row], key: str) -> Finding:
     """That of an entry."""
-    return next(row.finding for row in rows if row.entry.id == key)
+    return next(row.finding for row in rows if row.statement.id == key)
 
 
 def findings_of(rows: Iterable[Row], checks: Checks, name: str) -> list[Finding]:
     """Those of the entries that one function checks."""
-    return [row.finding for row in rows if row.entry.id in checks and checks[row.entry.id].__name__ == name]
+    return [row.finding for row in rows if row.statement.id in checks and checks[row.statement.id].__name__ == name]
 
 
 def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
     """Ids of the entries with each verdict."""
-    return {verdict: {row.entry.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
+    return {verdict: {row.statement.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
 
 
 def check_texts(rows: Iterable[Row]) -> None:
     """What differs has a note, and what was compared a number."""
     for row in rows:
-        assert row.finding.note or row.finding.verdict is Verdict.VERIFIED, row.entry.id
-        assert row.finding.recomputed or row.finding.agrees is None, row.entry.id
+        assert row.finding.note or row.finding.verdict is Verdict.VERIFIED, row.statement.id
+        assert row.finding.recomputed or row.finding.agrees is None, row.statement.id
 
 
 def check_again(rows: Iterable[Row], checks: Checks, *names: str) -> None:

@@ -11,7 +11,8 @@ import pytest
 from docutils import nodes
 from docutils.utils import new_document
 
-from gpbnb.ledger import load_inventory
+from gpbnb.ledger import PAGES, load_statements
+from gpbnb.ledger.page import address
 
 FOLDER = Path(__file__).resolve().parents[1] / "book" / "_ext"
 
@@ -112,13 +113,14 @@ def environment(*pages):
 
 
 def test_each_entry_has_a_label():
-    env = environment(ledger.PAGE, "book/index")
+    env = environment(*(f"book/{page.name}" for page in PAGES), "book/index")
     ledger.add_labels(None, env)
-    inventory = load_inventory()
-    assert env.standard.labels.keys() == env.standard.anonlabels.keys() == {entry.id.lower() for entry in inventory}
-    for entry in inventory:
-        assert env.standard.anonlabels[entry.id.lower()] == (ledger.PAGE, entry.id)
-        assert env.standard.labels[entry.id.lower()][:2] == (ledger.PAGE, entry.id)
+    statements = load_statements()
+    assert env.standard.labels.keys() == env.standard.anonlabels.keys() == {each.id.lower() for each in statements}
+    for each in statements:
+        place = f"book/{address(each).partition('.html')[0]}", each.id
+        assert env.standard.anonlabels[each.id.lower()] == place
+        assert env.standard.labels[each.id.lower()][:2] == place
     assert env.standard.labels["hung1984.ii.eq20"][2] == "hung1984, II, eq (20)"
     assert env.standard.labels["savage2016.main.eq8"][2] == "savage2016, eq (8)"
 
@@ -215,28 +217,3 @@ def table(*rows):
     made = [nodes.row("", *(nodes.entry("", nodes.paragraph("", cell)) for cell in row)) for row in rows]
     group += [nodes.thead("", made[0]), nodes.tbody("", *made[1:])]
     return nodes.table("", group)
-
-
-def test_a_chapters_part_of_the_ledger_has_the_columns_of_the_whole():
-    document = new_document("page")
-    document += [
-        table(ledger.HEADER, ("(20)", "wrong", "a*b*c", "b", "not *why*"), ("(21)", "open", "d", "", "why")),
-        table(("Item", "x"), ("1", "2")),
-    ]
-    ledger.join_columns(None, document)
-    (box,) = document.findall(nodes.container)
-    assert box["classes"] == ["ledger"]
-    head, row, short = box.findall(nodes.row)
-    assert [part["classes"] for part in short[2]] == [["printed"], ["note"]]
-    assert [cell.astext() for cell in head] == ["Item", "Verdict", "Printed, recomputed, and note"]
-    assert [cell.astext() for cell in row[:2]] == ["(20)", "wrong"]
-    assert [(part.astext(), part["classes"]) for part in row[2]] == [
-        ("a*b*c", ["printed"]),
-        ("b", ["recomputed"]),
-        ("not why", ["note"]),
-    ]
-    assert [word.astext() for word in row.findall(nodes.emphasis)] == ["why"]
-    (group,) = box.findall(nodes.tgroup)
-    assert group["cols"] == len(list(group.findall(nodes.colspec))) == 3
-    assert "ledger-table" in group.parent["classes"]
-    assert [cell.astext() for cell in document[1].findall(nodes.entry)] == ["Item", "x", "1", "2"]

@@ -18,7 +18,7 @@ NOT_PROSE = re.compile(
             r"^```\{glossary\}$|```.*?```|^```$",  # code and figures, but not the glossary
             r"^:{3,}.*?$|^:\w+:.*?$",  # directives and their options
             r"\$\$.*?\$\$|\$[^$]*\$",  # math
-            r"\{[\w:]+\}`[^`]*`|`[^`]*`",  # roles, glue among them, and inline code
+            r"\{[\w:-]+\}`[^`]*`|`[^`]*`",  # roles, glue among them, and inline code
             r"(?<=\])\([^)\s]*\)",  # where a link leads
             r'"[^"\n]{,200}"',  # quotations
             r"\(\d{1,3}[a-z]?\)",  # numbers of equations
@@ -32,9 +32,9 @@ NOT_PROSE = re.compile(
 NUMERAL = re.compile(r"(?<![\w-])\.?\d[\d.,]*")
 
 #: Phrases with a numeral that was not computed: what a document printed, what a computation was given, what follows
-#: from these by counting (exact), formats and names.
+#: from these by counting (exact), formats and names, and facts from a cited source (cited).
 TYPED = list(csv.DictReader((ROOT / "tests" / "typed_numerals.csv").read_text(encoding="utf-8").splitlines()))
-REASONS = {"printed", "given", "exact", "formats", "names"}
+REASONS = {"printed", "given", "exact", "formats", "names", "cited"}
 #: Sentences of the README, which cannot glue: what it says, and the number in the book, rounded to so many places.
 README = {
     "31 arcseconds of roll": ("rolling", "rolling_limit", 31, 0),

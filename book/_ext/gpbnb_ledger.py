@@ -1,70 +1,104 @@
-"""The ledger in the book: labels of its rows for ``{ref}``, MathJax for its HTML, and one form for its tables."""
+"""The ledger in the book: the directive ``ledger``, labels of its rows for ``{ref}``, and MathJax for its formulas."""
+
+from functools import cache
+from pathlib import Path
 
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
+from sphinx.util.docutils import SphinxDirective
 
-from gpbnb.ledger import load_inventory
-from gpbnb.ledger.page import EMPHASIS
+import gpbnb
+from gpbnb import ledger
+from gpbnb.ledger.finding import Verdict
 
-PAGE = "book/errata"
-HEADER = ["Item", "Verdict", "Printed", "Recomputed", "Note"]
+ERRORS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.NOT_REPRODUCED)
+"""What a chapter lists; misprints and faults of the scan are in the complete ledger."""
+
+
+@cache
+def all_rows() -> tuple[ledger.Row, ...]:
+    return ledger.rows()
+
+
+class Ledger(SphinxDirective):
+    """Show a part of the ledger.
+
+    ``page NAME`` is a page of the complete ledger; ``errors TOPIC`` the errors in the statements of a chapter;
+    ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
+    ``roots`` the root errors; ``claims`` the principal claims; ``counts BY`` counts by document, chapter or kind.
+    """
+
+    required_arguments = 1
+    optional_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        package = Path(gpbnb.__file__).parent
+        for path in (*package.rglob("*.py"), *package.rglob("*.csv")):
+            self.env.note_dependency(str(path))
+        what, *detail = self.arguments
+        if what == "counts":
+            return self.parse_text_to_nodes(ledger.count_table(all_rows(), detail[0]).markdown())
+        return [nodes.raw("", self.html(what, *detail), format="html")]
+
+    def html(self, what: str, detail: str = "") -> str:
+        rows = all_rows()
+        match what:
+            case "page":
+                page = next(page for page in ledger.PAGES if page.name == detail)
+                return ledger.ledger_page(rows, page).html
+            case "errors":
+                return ledger.error_table(ledger.select_topic(rows, detail, *ERRORS)).html
+            case "verdict":
+                chosen = Verdict(detail)
+                return ledger.note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html
+            case "undone":
+                chosen = Verdict(detail)
+                items = (row for row in rows if row.statement.kind == "open")
+                return ledger.note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
+            case "roots":
+                return ledger.root_table(rows).html
+            case "claims":
+                return ledger.claim_table(rows).html
+        raise self.error(f"no part of the ledger is called {what!r}")
+
+
+def count(name, rawtext, text, lineno, inliner, options=None, content=None):
+    """Write a count: of ``statements``, of ``roots``, of a document, of a verdict, or of both as ``hung1984 wrong``."""
+    rows = all_rows()
+    if text == "roots":
+        found = len(ledger.by_root(rows))
+    else:
+        words = text.replace("not reproduced", "not-reproduced").split()
+        kept = [
+            row for row in rows if {row.statement.document, row.outcome.replace(" ", "-"), "statements"} >= set(words)
+        ]
+        found = len(kept)
+    return [nodes.Text(f"{found:,}")], []
 
 
 def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
-    """Give each entry a label: the rows are HTML, in which Sphinx finds none."""
-    if PAGE not in env.found_docs:
-        return
+    """Give each statement a label: the rows are HTML, in which Sphinx finds none."""
     standard = env.get_domain("std")
-    for entry in load_inventory():
-        title = ", ".join(part for part in (entry.document, entry.chapter, entry.item) if part != "-")
-        standard.labels[entry.id.lower()] = (PAGE, entry.id, title)
-        standard.anonlabels[entry.id.lower()] = (PAGE, entry.id)
+    for statement in ledger.load_statements():
+        page = next(page for page in ledger.PAGES if page.holds(statement))
+        name = f"book/{page.name}"
+        if name not in env.found_docs:
+            continue
+        title = ", ".join(part for part in (statement.document, statement.chapter, statement.item) if part != "-")
+        standard.labels[statement.id.lower()] = (name, statement.id, title)
+        standard.anonlabels[statement.id.lower()] = (name, statement.id)
 
 
 def ask_for_mathjax(app: Sphinx, doctree: nodes.document) -> None:
-    """Have MathJax on pages whose only formulas are in HTML outputs."""
+    """Load MathJax on pages whose only formulas are in HTML."""
     if any('class="math' in node.astext() for node in doctree.findall(nodes.raw)):
         app.env.get_domain("math").data["has_equations"][app.env.docname] = True
 
 
-def join_columns(app: Sphinx, doctree: nodes.document) -> None:
-    """Give the chapters' tables of the ledger the three columns of the complete one: five do not fit the page."""
-    for group in list(doctree.findall(nodes.tgroup)):
-        head = next(group.findall(nodes.thead), None)
-        if head is None or [entry.astext() for entry in head.findall(nodes.entry)] != HEADER:
-            continue
-        for spec in [spec for spec in group if isinstance(spec, nodes.colspec)][3:]:
-            group.remove(spec)
-        group["cols"] = 3
-        next(group.findall(nodes.colspec))["stub"] = 1
-        for row in group.findall(nodes.row):
-            wide, *others = row[2:]
-            for cell in others:
-                row.remove(cell)
-            if row.parent is head:
-                wide.children = [nodes.paragraph("", "Printed, recomputed, and note")]
-                continue
-            parts = []
-            for name, cell in zip(("printed", "recomputed", "note"), (wide, *others), strict=True):
-                parts += [paragraph for paragraph in cell if paragraph.astext()]
-                for paragraph in cell:
-                    paragraph["classes"].append(name)
-            wide.children = []
-            wide.extend(parts)
-        for text in list(group.findall(nodes.Text)):
-            # Stars in the notes are the ledger's own, which Markdown was not to read.
-            parts = EMPHASIS.split(text.astext())
-            if len(parts) > 1 and not isinstance(text.parent, nodes.math):
-                marked = [nodes.emphasis("", p) if i % 2 else nodes.Text(p) for i, p in enumerate(parts)]
-                text.parent.replace(text, marked)
-        table = group.parent.deepcopy()
-        table["classes"].append("ledger-table")
-        group.parent.replace_self(nodes.container("", table, classes=["ledger"]))
-
-
 def setup(app: Sphinx) -> dict:
+    app.add_directive("ledger", Ledger)
+    app.add_role("ledger-count", count)
     app.connect("doctree-read", ask_for_mathjax)
-    app.connect("doctree-read", join_columns)
     app.connect("env-updated", add_labels)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

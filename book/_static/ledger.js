@@ -1,17 +1,12 @@
-// Search and filters above the tables of the ledger, and formulas set as they come near. Without this script the
-// page is the same, all rows in sight. It runs before MathJax, which takes the source of formulas out of the text.
+// Search and filters above the tables of the ledger, and formulas typeset when they come into view. Without this script
+// the page shows every row. The script runs before MathJax, which removes the source of formulas from the text.
 const GREEK = { α: "alpha", β: "beta", γ: "gamma", δ: "delta", ε: "epsilon", η: "eta", θ: "theta", μ: "mu", σ: "sigma", φ: "varphi", ω: "omega" };
 const plain = (text) => text.toLowerCase().replace(/[α-ω]/g, (letter) => GREEK[letter] ?? letter);
 
 for (const form of document.querySelectorAll("form.ledger-form")) {
   const tables = [...form.parentElement.querySelectorAll("table")];
   const rows = tables.flatMap((table) => {
-    const { document: name, part } = table.dataset;
-    return [...table.tBodies[0].rows].map((row) => ({
-      row,
-      text: plain(`${row.id} ${row.textContent} ${name}`),
-      values: { ...row.dataset, document: [name, `${name} ${part}`] },
-    }));
+    return [...table.tBodies[0].rows].map((row) => ({ row, text: plain(`${row.id} ${row.textContent}`), values: row.dataset }));
   });
   const filters = [...form.querySelectorAll("select")];
   const count = form.querySelector("output");
@@ -20,18 +15,18 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     const words = plain(form.elements.words.value).split(/\s+/);
     let shown = 0;
     for (const { row, text, values } of rows) {
-      const fits = filters.every(({ name, value }) => !value || [values[name]].flat().includes(value));
+      const fits = filters.every(({ name, value }) => !value || values[name] === value);
       row.hidden = !fits || !words.every((word) => text.includes(word));
       shown += !row.hidden;
     }
     for (const table of tables) table.hidden = !table.querySelector("tbody tr:not([hidden])");
-    count.value = `${shown} of ${rows.length} entries shown`;
+    count.value = `${shown} of ${rows.length} statements shown`;
   };
   const showAll = () => {
     for (const control of form.querySelectorAll("input, select")) control.value = "";
     show();
   };
-  // A link to an entry that is filtered away shows everything again.
+  // A link to a hidden statement clears the filters.
   const lead = () => {
     const id = decodeURIComponent(location.hash.slice(1));
     const row = rows.find((each) => each.row.id === id)?.row;
@@ -44,12 +39,16 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
   form.querySelector("button").addEventListener("click", showAll);
   window.addEventListener("hashchange", lead);
   form.hidden = false;
+  // A link such as ledger-2016.html?verdict=wrong sets the filters.
+  for (const [name, value] of new URLSearchParams(location.search)) {
+    if (form.elements[name]) form.elements[name].value = value;
+  }
   show();
   setFormulas(rows.map(({ row }) => row), lead);
 }
 
-// More than a thousand formulas would stop the page for seconds: those of a row are set when it comes near the window,
-// and all before the page is printed.
+// Typesetting a thousand formulas at once blocks the page for seconds: the formulas of a row are typeset when it comes
+// near the window, and all of them before the page is printed.
 function setFormulas(rows, whenReady) {
   const waiting = new Map();
   for (const row of rows) {

@@ -1,7 +1,4 @@
-"""Norms and error constants that every bound is made of; exact for exact input.
-
-Entries may be Fractions, ints, floats (taken at their exact binary value) or a FloatArray.
-"""
+"""Error constants and norms that every bound is made of."""
 
 from __future__ import annotations
 
@@ -9,82 +6,12 @@ import math
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import exact_ratio
 
-
-def exact(values: Any) -> NDArray[Any]:
-    """Entries as exact Fractions, in an object array of the same shape.
-
-    Raises
-    ------
-    ValueError : an entry is NaN or infinite.
-    TypeError : an entry is not a number.
-    """
-    if hasattr(values, "to_fractions"):
-        values = values.to_fractions()
-    entries: NDArray[Any] = np.asarray(values, dtype=object)
-    fractions = np.empty(entries.size, object)
-    for i, entry in enumerate(entries.ravel().tolist()):
-        if not isinstance(entry, Fraction):
-            try:
-                p, q, power = exact_ratio(entry)
-            except (TypeError, ValueError) as error:
-                index = np.unravel_index(i, entries.shape)
-                where = f"entry {', '.join(map(str, index))}: " if index else ""
-                raise type(error)(f"{where}{error}") from None
-            entry = Fraction(p, q) * Fraction(10) ** power
-        fractions[i] = entry
-    return fractions.reshape(entries.shape)
-
-
-def integers(fractions: NDArray[Any]) -> tuple[NDArray[Any], Fraction]:
-    """Integers, and the one unit that they count, of exact Fractions: sums and products of integers are much faster."""
-    common = math.lcm(*(entry.denominator for entry in fractions.flat))
-    counts = [entry.numerator * (common // entry.denominator) for entry in fractions.flat]
-    return np.array(counts, dtype=object).reshape(fractions.shape), Fraction(1, common)
-
-
-def inverse_of(a: Any) -> NDArray[Any]:
-    """The exact inverse of a square matrix (n, n), as Fractions.
-
-    Raises
-    ------
-    ZeroDivisionError : the matrix is singular.
-    """
-    entries = exact(a)
-    rows, columns = entries.shape
-    given = fmpq_mat(rows, columns, [fmpq(entry.numerator, entry.denominator) for entry in entries.flat])
-    found = [Fraction(int(entry.p), int(entry.q)) for entry in given.inv().entries()]
-    return np.array(found, dtype=object).reshape(entries.shape)
-
-
-def max_norm(x: Any) -> Fraction:
-    r"""Largest size of an entry of a vector, :math:`\max_j |x_j|`; hung1984, ch. II, (21)."""
-    entries = exact(x)
-    if entries.ndim != 1:
-        raise ValueError(f"got shape {entries.shape}; needed a vector (n,); take a matrix row by row")
-    return max(abs(entries), default=Fraction(0))
-
-
-def column_sum_norm(a: Any) -> Fraction:
-    r"""Largest column sum, :math:`\max_j \sum_i |a_{ij}|`, of a matrix; hung1984, ch. II, (22)."""
-    return max(_sizes(a).sum(axis=0), default=Fraction(0))
-
-
-def row_sum_norm(a: Any) -> Fraction:
-    r"""Largest row sum, :math:`\max_i \sum_j |a_{ij}|`: the matrix norm that belongs to (21)."""
-    return max(_sizes(a).sum(axis=1), default=Fraction(0))
-
-
-def _sizes(a: Any) -> NDArray[Any]:
-    entries = exact(a)
-    if entries.ndim != 2:
-        raise ValueError(f"got shape {entries.shape}; needed a matrix (m, n); reshape a vector to (n, 1)")
-    return np.asarray(abs(entries))
+def column_sum(a: NDArray[Any]) -> Any:
+    """Largest column sum of absolute values, (22), computed in the arithmetic of the entries."""
+    return abs(a).sum(axis=0).max()
 
 
 def gamma(n: int, unit_roundoff: Fraction) -> Fraction:

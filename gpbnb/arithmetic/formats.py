@@ -6,21 +6,17 @@ Source: hung1984, ch. II, sections 2-4; the same in hung1982, ch. III.
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
-from decimal import Decimal
 from enum import Enum
 from fractions import Fraction
-from numbers import Rational
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels.backends import Backend, backend
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
-
-if TYPE_CHECKING:
-    from gpbnb.arithmetic.array import FloatArray
 
 
 class Rounding(Enum):
@@ -98,6 +94,11 @@ class FloatFormat:
         return backend(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
     @property
+    def exact_backend(self) -> Exact:
+        """What holds every number of this format, slowly."""
+        return exact(self.base, self.precision, self.rounding is Rounding.NEAREST)
+
+    @property
     def unit_roundoff(self) -> Fraction:
         r"""Bound of the relative error of one rounding, exact.
 
@@ -169,8 +170,6 @@ class FloatFormat:
         TypeError, ValueError, OverflowError : as :meth:`round`, naming the entry; nested lists
             of unequal lengths.
         """
-        from gpbnb.arithmetic.array import FloatArray
-
         return FloatArray.from_values(values, self)
 
 
@@ -184,73 +183,3 @@ def prints_as(value: Any, printed: str, *roundings: Rounding) -> bool:
     figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
     formats = (FloatFormat(10, figures, rounding) for rounding in roundings or (Rounding.NEAREST,))
     return any(fmt.round(value) == Fraction(printed) for fmt in formats)
-
-
-_DECIMAL = re.compile(r"\s*([+-]?)(\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
-_RATIO = re.compile(r"\s*([+-]?\d+)\s*/\s*(\d+)\s*", re.ASCII)
-_ACCEPTED = "a str, int, float, Decimal or Fraction"
-
-
-def exact_ratio(value: Any) -> tuple[int, int, int]:
-    """Read a number without rounding it.
-
-    Returns
-    -------
-    p, q, k : integers with value = ``p / q * 10**k``, ``q > 0``.
-
-    Raises
-    ------
-    TypeError, ValueError : as :meth:`FloatFormat.round`.
-    """
-    if isinstance(value, str):
-        return _read(value)
-    if isinstance(value, (bool, np.bool_)):
-        raise TypeError(f"got the truth value {value!r}; needed {_ACCEPTED}; write 1 or 0")
-    if isinstance(value, np.timedelta64):  # an np.integer, yet with a unit
-        raise TypeError(f"got {value!r} of type timedelta64; needed {_ACCEPTED}")
-    if isinstance(value, (int, np.integer)):
-        return int(value), 1, 0
-    if isinstance(value, Rational):
-        return int(value.numerator), int(value.denominator), 0
-    if isinstance(value, Decimal):
-        sign, digits, exponent = value.as_tuple()
-        if not isinstance(exponent, int):
-            raise ValueError(_not_finite(value))
-        p = int(Decimal((0, digits, 0)))
-        return (-p if sign else p), 1, exponent
-    # Python's and NumPy's floats, those of gmpy2 and sympy, and whatever else converts exactly
-    if hasattr(value, "as_integer_ratio"):
-        try:
-            p, q = value.as_integer_ratio()
-        except (ValueError, OverflowError):
-            raise ValueError(_not_finite(value)) from None
-        return int(p), int(q), 0
-    raise TypeError(f"got {value!r} of type {type(value).__name__}; needed {_ACCEPTED}")
-
-
-def _read(text: str) -> tuple[int, int, int]:
-    if match := _DECIMAL.fullmatch(text):
-        sign, digits, exponent = match.groups()
-        whole, _, places = digits.partition(".")
-        p = _integer(whole + places)
-        return (-p if sign == "-" else p), 1, _integer(exponent or "0") - len(places)
-    if match := _RATIO.fullmatch(text):
-        p, q = _integer(match[1]), _integer(match[2])
-        if q == 0:
-            raise ValueError(f"got {text!r}; needed a denominator other than zero; correct it")
-        return p, q, 0
-    if re.fullmatch(r"\s*[+-]?(nan|inf|infinity)\s*", text, re.IGNORECASE):
-        raise ValueError(_not_finite(repr(text)))
-    raise ValueError(
-        f"got {text!r}; needed a number such as '765.4567', '1e-3' or '1/3', "
-        "with a point as decimal mark and no separators"
-    )
-
-
-def _integer(digits: str) -> int:
-    """Read an integer of any length; ``int`` refuses more than 4300 digits."""
-    return int(Decimal(digits))
-
-
-def _not_finite(value: object) -> str:
-    return f"got {value}; needed a finite number; remove or replace the entry"

@@ -235,6 +235,7 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
 
 @lru_cache(maxsize=1)
 def _loops() -> Any:
+    # Here, and not above: numba takes a second to import, and exact arithmetic does not need it.
     from gpbnb.arithmetic.kernels import elimination
 
     return elimination

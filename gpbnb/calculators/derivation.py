@@ -126,7 +126,7 @@ MENDED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
         ("and errors carried on", kalman.ONCE, kalman.GROWTH, 1),
     )
 )
-"""The name in ``gpbnb.kalman.theory.MENDINGS``, then the coefficients of ‖x‖ and of B."""
+"""The name in ``gpbnb.kalman.report_bounds.CORRECTIONS``, then the coefficients of ‖x‖ and of B."""
 
 
 @cache

@@ -12,8 +12,9 @@ from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.calculators import derivation
 from gpbnb.calculators.javascript import Definition
+from gpbnb.calculators.page import form
 from gpbnb.integration import theory as integration
-from gpbnb.kalman import theory as kalman
+from gpbnb.kalman import report_bounds
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory as rolling
 
@@ -117,8 +118,6 @@ class Calculator:
         return {each.name: each.number(self.examples[example][each.name]) for each in self.inputs}
 
     def _repr_html_(self) -> str:
-        from gpbnb.calculators.page import form
-
         return form(self)
 
     def __repr__(self) -> str:
@@ -192,7 +191,7 @@ def _kalman_reference(given: Values) -> dict[str, Any]:
         if 0 < given["f"] < 1
         else float(k if given["f"] else 1)
     )
-    counts = [kalman.coefficients(k, n, m, **faults) for faults in kalman.MENDINGS.values()]
+    counts = [report_bounds.coefficients(k, n, m, **faults) for faults in report_bounds.CORRECTIONS.values()]
     last = counts[-1]
     pairs = [(c.first, Fraction(c.second)) for c in counts]
     pairs.append((last.first, min(Fraction(last.second), 2 * last.first * Fraction(memory))))
@@ -200,11 +199,11 @@ def _kalman_reference(given: Values) -> dict[str, Any]:
     for i, (a, b) in enumerate(pairs, 1):
         size = a * x + b * u
         result |= {f"a{i}": a, f"b{i}": b, f"size{i}": size, f"bound{i}": size * fmt.unit_roundoff}
-        result[f"digits{i}"] = kalman.required_precision(size, goal, fmt.base, fmt.rounding)
+        result[f"digits{i}"] = report_bounds.precision_for_coefficient(size, goal, fmt.base, fmt.rounding)
     return result
 
 
-_KALMAN_NAMES = (*kalman.MENDINGS, "and old inputs forgotten")
+_KALMAN_NAMES = (*report_bounds.CORRECTIONS, "and old inputs forgotten")
 
 KALMAN = Calculator(
     id="kalman",

@@ -8,13 +8,15 @@ import re
 from dataclasses import asdict
 from html import escape
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import sympy as sp
 
-from gpbnb.calculators.forms import Calculator, Input
 from gpbnb.calculators.javascript import Definition, print_function
 from gpbnb.display.derivation import Step
+
+if TYPE_CHECKING:
+    from gpbnb.calculators.forms import Calculator, Input
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 

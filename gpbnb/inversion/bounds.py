@@ -27,13 +27,13 @@ from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import exact, gamma, gamma_probabilistic
+from gpbnb.arithmetic.bounds import column_sum, gamma, gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.linalg import LU
+from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
 
 # -- a priori: from the count of roundings --------------------------------------------------------
 
@@ -61,7 +61,7 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
     Wilkinson 1961; Higham 2002, Theorem 9.5.
     """
     n = len(x)
-    norm = _norm(abs(x.to_float()))
+    norm = float(column_sum(abs(x.to_float())))
     largest = float(np.max(abs(factors.lower.to_float()))) * float(np.max(abs(factors.upper.to_float())))
     g = _count(n, x.format) * n * n * largest * norm
     return _solved(norm * g, g, n)
@@ -131,7 +131,7 @@ def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
     rows = np.empty_like(product)
     rows[factors.permutation] = product
     g = weight * (rows @ sizes)
-    return _solved(_norm(sizes @ g), _norm(g), len(x))
+    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), len(x))
 
 
 def _solved(first: float, ratio: float, n: int) -> float:
@@ -140,10 +140,6 @@ def _solved(first: float, ratio: float, n: int) -> float:
     if not ratio * slack < 1:
         raise ValueError(f"got ‖G‖ = {ratio:.3g}; needed less than 1, or nothing is proved; use more digits")
     return first * slack / (1 - ratio * slack) * slack
-
-
-def _norm(sizes: NDArray[np.float64]) -> float:
-    return float(sizes.sum(axis=0).max())
 
 
 # -- ball arithmetic ------------------------------------------------------------------------------
@@ -252,49 +248,12 @@ def _upper(x: Any) -> float:
     return nearest if Fraction(nearest) >= exactly else math.nextafter(nearest, math.inf)
 
 
-# -- the true inverse -----------------------------------------------------------------------------
-
-
-def rationals(a: Any) -> Any:
-    """A matrix of exact numbers, or a FloatArray, as a matrix of python-flint's rationals."""
-    if isinstance(a, FloatArray):
-        base = a.format.base
-        pairs = zip(a._m.ravel(), a._e.ravel(), strict=True)
-        entries = [(m * base**e, 1) if e >= 0 else (m, base**-e) for m, e in pairs]
-    else:
-        entries = [(x.numerator, x.denominator) for x in exact(a).ravel()]
-    rows, columns = a.shape
-    return flint.fmpq_mat(rows, columns, [flint.fmpq(p, q) for p, q in entries])
-
-
-def true_inverse(a: Any) -> Any:
-    """The inverse, exact, as a matrix of python-flint's rationals.
-
-    Parameters
-    ----------
-    a : (n, n), a FloatArray, or exact numbers.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError : `a` is singular.
-    """
-    try:
-        return rationals(a).inv()
-    except ZeroDivisionError:
-        raise np.linalg.LinAlgError(
-            "got a singular matrix; needed one with an inverse, in whatever precision; change an entry"
-        ) from None
+# -- the true error -------------------------------------------------------------------------------
 
 
 def true_error(x: Any, inverse: Any) -> Fraction:
     """The column sum norm of X minus the true inverse, exact."""
-    return column_sum(rationals(x) - inverse)
-
-
-def column_sum(matrix: Any) -> Fraction:
-    """The column sum norm of a matrix of python-flint's rationals."""
-    largest = max(sum((abs(entry) for entry in column), flint.fmpq(0)) for column in matrix.transpose().tolist())
-    return Fraction(int(largest.p), int(largest.q))
+    return column_sum_norm(rationals(x) - inverse)
 
 
 # -- how many digits are enough? ------------------------------------------------------------------
@@ -370,7 +329,7 @@ def smallest_precision(
 def _relative(bound: float, x: FloatArray) -> float:
     """From ‖X - A⁻¹‖ to a bound of it over ‖A⁻¹‖, which is at least ‖X‖ - bound."""
     with _working(128):
-        norm = flint.arb(flint.fmpq(*column_sum(rationals(x)).as_integer_ratio())) - flint.arb(bound)
+        norm = flint.arb(flint.fmpq(*column_sum_norm(rationals(x)).as_integer_ratio())) - flint.arb(bound)
         if not norm > 0:
             raise ValueError("got a bound above the norm of the inverse; needed a smaller one; use more digits")
         return _upper(flint.arb(bound) / norm)

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact, inverse_of
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.inversion import procedure
 from gpbnb.inversion.procedure import NORMS
 

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.inversion import bounds, procedure, theory
 
 # -- one inverse beside its bounds ----------------------------------------------------------------
@@ -94,7 +95,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
     ------
     numpy.linalg.LinAlgError : the matrix is singular, or is so in the format.
     """
-    inverse = bounds.true_inverse(a)
+    inverse = true_inverse(a)
     wanted = ALL_BOUNDS if names is None else tuple(names)
     computing = _Computing(a, pivot)
     evaluated = {}
@@ -105,7 +106,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
             if name not in MAY_BE_ABSENT:
                 raise
     error = bounds.true_error(computing.x, inverse)
-    condition = float(bounds.column_sum(bounds.rationals(a))) * float(bounds.column_sum(inverse))
+    condition = float(column_sum_norm(rationals(a))) * float(column_sum_norm(inverse))
     return Trial(family, a, computing.x, pivot, condition, error, evaluated)
 
 

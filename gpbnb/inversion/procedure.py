@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import exact
+from gpbnb.arithmetic.bounds import column_sum
+from gpbnb.arithmetic.rational import exact
 from gpbnb.inversion import theory
 from gpbnb.inversion.theory import Norm, Perturbation, Reduction
 
@@ -141,7 +142,7 @@ def _replaced(a: FloatArray, corner: tuple[int, int], block: FloatArray) -> Floa
 
 #: Norms by name.
 NORMS: dict[str, Norm] = {
-    "column sum": theory.column_sum,
+    "column sum": column_sum,
     "row sum": lambda a: abs(a).sum(axis=1).max(),
     "largest entry": lambda a: abs(a).max(),
     "Frobenius": lambda a: np.linalg.norm(np.asarray(a, dtype=np.float64)),

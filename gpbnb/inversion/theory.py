@@ -24,14 +24,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact, gamma
+from gpbnb.arithmetic.bounds import column_sum, gamma
+from gpbnb.arithmetic.rational import exact
 
 Norm = Callable[[NDArray[Any]], Any]
-
-
-def column_sum(a: NDArray[Any]) -> Any:
-    """Largest column sum of sizes, (22), in the arithmetic of the entries."""
-    return abs(a).sum(axis=0).max()
 
 
 class Reduction(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import theory, year
+from gpbnb.kalman import report_bounds, year, year_cases
 
 
 def decimal_digits(fmt: FloatFormat) -> float:
@@ -17,9 +17,9 @@ def decimal_digits(fmt: FloatFormat) -> float:
 
 
 def largest(run: year.Year) -> float:
-    """The largest error of drift angles (mas) and of their rates (mas/yr), at the end of a year or a step kept before.
+    """Largest error of the drift angles (mas) and their rates (mas/yr) at any checkpoint of a year.
 
-    Not at the end alone: there a run may be near the truth by luck.
+    The end alone would not do: a run may be near the truth there by luck.
     """
     return float(max(np.abs(run.drift).max(), np.abs(run.rate).max()))
 
@@ -27,58 +27,58 @@ def largest(run: year.Year) -> float:
 class Answers(NamedTuple):
     """Decimal digits that a year asks for, by the two terms of (125) and by emulation."""
 
-    #: in mas and mas/yr, for what was observed.
-    goal: float
+    #: in mas and mas/yr, for the observed errors.
+    tolerance: float
     #: the emulated years of the usual model.
     runs: tuple[year.Year, ...]
     #: of the closing example.
     printed: tuple[int, int]
     #: what its formula gives.
     formula: tuple[int, int]
-    #: the formula with all its faults mended.
-    mended: tuple[int, int]
-    #: the fewest with which an emulated year stayed within the goal, of the formats that were run.
+    #: the formula with all its faults corrected.
+    corrected: tuple[int, int]
+    #: the fewest with which an emulated year stayed within the tolerance, of the formats that were run.
     observed: dict[Rounding, float]
 
 
-def find(goal: float = 1.0) -> Answers:
+def find_answers(tolerance: float = 1.0) -> Answers:
     """Collect the answers to the closing example of hung1984, ch. II, section 12.
 
     Parameters
     ----------
-    goal : largest error of drift angles and rates in the year; mas and mas/yr, above 0.
+    tolerance : largest error of drift angles and rates in the year; mas and mas/yr, above 0.
 
     Raises
     ------
-    ValueError : no emulated year meets the goal, with one of the roundings.
+    ValueError : no emulated year meets the tolerance, with one of the roundings.
     """
-    runs = tuple(run for run in year.load() if run.case.model == year.MODELS[0])
+    runs = tuple(run for run in year.load() if run.case.model == year_cases.MODELS[0])
     observed = {}
     for rounding in Rounding:
-        enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, goal)) is not None]
+        enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, tolerance)) is not None]
         if not enough:
             raise ValueError(
-                f"got a goal of {goal}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
+                f"got a tolerance of {tolerance}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
             )
         observed[rounding] = min(enough)
-    mended = theory.coefficients(*theory.EXAMPLE, **theory.MENDINGS["and errors carried on"])
+    corrected = report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.CORRECTIONS["and errors carried on"])
     return Answers(
-        goal,
+        tolerance,
         runs,
-        (int(theory.PRINTED["first digits"]), int(theory.PRINTED["second digits"])),
-        _both(theory.coefficients(*theory.EXAMPLE)),
-        _both(mended),
+        (int(report_bounds.PRINTED["first digits"]), int(report_bounds.PRINTED["second digits"])),
+        _both(report_bounds.coefficients(*report_bounds.EXAMPLE)),
+        _both(corrected),
         observed,
     )
 
 
-def _good(run: year.Year, rounding: Rounding, goal: float) -> FloatFormat | None:
-    return run.case.fmt if run.case.rounding is rounding and largest(run) <= goal else None
+def _good(run: year.Year, rounding: Rounding, tolerance: float) -> FloatFormat | None:
+    return run.case.fmt if run.case.rounding is rounding and largest(run) <= tolerance else None
 
 
 def _best(runs: tuple[year.Year, ...]) -> float:
     return max(min(largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
 
 
-def _both(counts: theory.Coefficients) -> tuple[int, int]:
-    return theory.required_precision(counts.first), theory.required_precision(counts.second)
+def _both(counts: report_bounds.Coefficients) -> tuple[int, int]:
+    return report_bounds.precision_for_coefficient(counts.first), report_bounds.precision_for_coefficient(counts.second)

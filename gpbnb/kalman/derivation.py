@@ -168,8 +168,8 @@ def general() -> Derivation:
     )
 
 
-def mended() -> Derivation:
-    r"""The coefficients of (125) with its faults mended one after another.
+def corrected() -> Derivation:
+    r"""The coefficients of (125) with its faults corrected one after another.
 
     Each term :math:`T_i` of (118) has an error of its own, at most :math:`a_i\beta`; then
     :math:`T_0 = x_k - \sum T_i` gives :math:`a_0\|x_k\| + \sum(a_0 + a_i)\|T_i\|`, with plus.

@@ -1,6 +1,6 @@
 """Many filters at once: models x formats x forms x seeds, on any executor; ``python -m gpbnb.kalman.ensembles``.
 
-Each trial is told by a few numbers, so that it may run anywhere, and gives the same there. What the command found is
+Each trial is given by a few numbers, so that it may run anywhere, and gives the same there. What the command found is
 kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
 """
 
@@ -25,8 +25,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import theory
-from gpbnb.kalman.experiment import Bounded, Form, bounded
+from gpbnb.kalman import report_bounds
+from gpbnb.kalman.bounded_run import BoundedHistory, emulate_with_bound
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year import machine
 
@@ -136,7 +137,9 @@ def trial(task: Task) -> Outcome:
     rng = np.random.default_rng([task.seed, KINDS.index(task.kind)])
     model, size = random_model(rng, task.kind)
     z = _short(size * rng.standard_normal((task.steps, model.m)))
-    found = bounded(model, np.abs(z) if task.kind == "one sign" else z, task.fmt, task.form, range(1, task.steps + 1))
+    found = emulate_with_bound(
+        model, np.abs(z) if task.kind == "one sign" else z, task.fmt, task.form, range(1, task.steps + 1)
+    )
     ratios = found.ratios()
     finite = np.isfinite(found.state).all(axis=1)
     largest = ratios.max(axis=0, initial=0.0) if len(ratios) else np.zeros(3)
@@ -148,7 +151,7 @@ def trial(task: Task) -> Outcome:
     return Outcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
 
 
-def printed_ratios(found: Bounded, task: Task) -> tuple[float, float, float]:
+def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
     """Largest error over (105) and (108), of all entries and steps, and over (125), of all steps."""
     history, beta = found.history, float(task.fmt.unit_roundoff)
     c = len(history.steps)
@@ -157,12 +160,14 @@ def printed_ratios(found: Bounded, task: Task) -> tuple[float, float, float]:
     true, n, m = history.reference, history.model.n, history.model.m
     x, K, P = (each[:c].astype(np.float64) for each in (true.x, true.K, true.P))
     with np.errstate(divide="ignore", invalid="ignore"):
-        covariance = np.abs(history.covariance) / (theory.covariance_count(n, m) * beta * np.abs(P))
-        gain = np.abs(history.gain) / (theory.gain_count(n, m) * beta * np.abs(K))
+        covariance = np.abs(history.covariance) / (report_bounds.covariance_count(n, m) * beta * np.abs(P))
+        gain = np.abs(history.gain) / (report_bounds.gain_count(n, m) * beta * np.abs(K))
         return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, task, x, K))
 
 
-def _printed_state(found: Bounded, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]) -> NDArray[np.float64]:
+def _printed_state(
+    found: BoundedHistory, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(125) as printed, after each step, with the least B of (122)."""
     model, beta = found.history.model, float(task.fmt.unit_roundoff)
     given = model.to_float()
@@ -174,7 +179,7 @@ def _printed_state(found: Bounded, task: Task, x: NDArray[np.float64], K: NDArra
         F = max(F, float(np.abs(loop).sum(axis=0).max()))
         # u = K z = x - F x of the step before, (111)
         u = max(u, float(np.abs(x[k] - before + K[k] @ (h @ before)).max()))
-        first, second = theory.coefficients(k + 1, model.n, model.m)
+        first, second = report_bounds.coefficients(k + 1, model.n, model.m)
         bounds[k] = beta * (first * np.abs(x[k]).max() + second * u * max(1.0, F**k))
     return bounds
 

@@ -23,10 +23,11 @@ from gpbnb.display.style import (
     loglog,
 )
 from gpbnb.display.tables import arithmetic
-from gpbnb.kalman import theory
+from gpbnb.kalman import report_bounds
 from gpbnb.kalman.answers import Answers, decimal_digits, largest
+from gpbnb.kalman.bounded_run import BoundedHistory
 from gpbnb.kalman.ensembles import Summary
-from gpbnb.kalman.experiment import Bounded, Form
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.year import Year
 
 _QUANTITIES = {
@@ -36,16 +37,16 @@ _QUANTITIES = {
     "covariance": "error / covariance, norms (no unit)",
 }
 _DIGITS = np.linspace(3.5, 23, 50)
-_MARKERS = {Form.REPORT: "o", Form.SECOND: "P", Form.USUAL: "^", Form.JOSEPH: "s", Form.UD: "D"}
+_MARKERS = {Form.HUNG: "o", Form.HUNG_SECOND_GAIN: "P", Form.INNOVATION: "^", Form.JOSEPH: "s", Form.UD: "D"}
 
 
-def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = None) -> list[Artist]:
+def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None = None) -> list[Artist]:
     """Error of one quantity against the step, a curve a run.
 
     Parameters
     ----------
     quantity : "drift" or "rate", of both the largest; "gain" or "covariance", norms.
-    goal : drawn as a line, in the unit of the quantity.
+    tolerance : drawn as a line, in the unit of the quantity.
 
     Raises
     ------
@@ -64,8 +65,8 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, goal: float | None = No
         artists += ax.plot(
             run.steps[seen], values[seen], marker=_MARKERS[run.case.form], color=colour, lw=0.8, label=_name(run)
         )
-    if goal is not None:
-        artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
+    if tolerance is not None:
+        artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
     loglog(ax)
     label(ax, "step $k$", _QUANTITIES[quantity])
     return artists
@@ -90,28 +91,27 @@ def _name(run: Year) -> str:
     fmt = run.case.fmt
     if fmt is None:
         return "reference"
-    return arithmetic(fmt) + ("" if run.case.form is Form.REPORT else f", {run.case.form}")
+    return arithmetic(fmt) + ("" if run.case.form is Form.HUNG else f", {run.case.form}")
 
 
 def year_end(
     runs: Sequence[Year],
     ax: Axes,
-    goal: float,
-    counts: Sequence[tuple[str, theory.Coefficients]],
+    tolerance: float,
+    counts: Sequence[tuple[str, report_bounds.Coefficients]],
     answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
     """Largest error of drift or rate in a year against the digits, beside (125) and the answers to how many.
 
     Parameters
     ----------
-    goal : in mas and mas/yr.
+    tolerance : in mas and mas/yr.
     counts : name and coefficients of bounds like (125), which are drawn for a norm of the state and a B of 1, as in the
         report's example.
-    answers : name and numbers of digits, open markers on the goal; the last is drawn upright, through it.
+    answers : name and numbers of digits, open markers on the tolerance; the last is drawn upright, through it.
     """
     artists: list[Artist] = []
-    looks = [(form, rounding) for rounding in Rounding for form in Form]
-    for form, rounding in looks:
+    for form, rounding in [(form, rounding) for rounding in Rounding for form in Form]:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
         if points := _points(group):
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
@@ -119,12 +119,14 @@ def year_end(
             artists += ax.plot(*zip(*sorted(points), strict=True), _MARKERS[form], color=colour, label=name, alpha=0.7)
     for (name, each), style in zip(counts, ("-", "--", "-."), strict=False):
         artists += ax.plot(_DIGITS, _allowed(each), color=BOUND, ls=style, label=name)
-    artists.append(ax.axhline(goal, color=REFERENCE, ls=":", label="goal"))
+    artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
     for (name, places), marker in zip(answers[:-1], "os^", strict=False):
         colour = BOUND if marker == "o" else STRICT
-        artists += ax.plot(list(places), [goal] * len(places), marker, mfc="none", mec=colour, ms=9, label=name)
+        artists += ax.plot(list(places), [tolerance] * len(places), marker, mfc="none", mec=colour, ms=9, label=name)
     for name, places in answers[-1:]:
-        artists += ax.plot(list(places), [goal] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name)
+        artists += ax.plot(
+            list(places), [tolerance] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name
+        )
     ax.set_yscale("log")
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
@@ -134,16 +136,19 @@ def year_end(
 def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
     """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
     lines = [
-        ("(125), printed formula", theory.coefficients(*theory.EXAMPLE)),
-        ("(125), all faults mended", theory.coefficients(*theory.EXAMPLE, **theory.MENDINGS["and errors carried on"])),
+        ("(125), printed formula", report_bounds.coefficients(*report_bounds.EXAMPLE)),
+        (
+            "(125), all faults corrected",
+            report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.CORRECTIONS["and errors carried on"]),
+        ),
     ]
     marked: list[tuple[str, Sequence[float]]] = [
         ("printed answers", found.printed),
         ("formula", found.formula),
-        ("all faults mended", found.mended),
+        ("all faults corrected", found.corrected),
         ("observed", [found.observed[Rounding.NEAREST]]),
     ]
-    return year_end(found.runs, ax, found.goal, lines, marked)
+    return year_end(found.runs, ax, found.tolerance, lines, marked)
 
 
 def headline(found: Answers, ax: Axes) -> list[Artist]:
@@ -157,17 +162,17 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style in (
         ("(125) as printed", {}, "-"),
-        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"], "--"),
+        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"], "--"),
     ):
-        height = _allowed(theory.coefficients(*theory.EXAMPLE, **faults))
+        height = _allowed(report_bounds.coefficients(*report_bounds.EXAMPLE, **faults))
         artists += ax.plot(_DIGITS, height, color=BOUND, ls=style)
         artists.append(_beside(ax, word, (_DIGITS[12], height[12]), (6, 6), BOUND))
-    artists.append(ax.axhline(found.goal, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.goal), (0, -14), REFERENCE))
-    artists += ax.plot(found.printed, [found.goal] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
-    artists += [_beside(ax, f"{place} printed", (place, found.goal), (6, 13), BOUND) for place in found.printed]
+    artists.append(ax.axhline(found.tolerance, color=REFERENCE, ls=":"))
+    artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
+    artists += ax.plot(found.printed, [found.tolerance] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
+    artists += [_beside(ax, f"{place} printed", (place, found.tolerance), (6, 13), BOUND) for place in found.printed]
     needed = found.observed[Rounding.NEAREST]
-    artists.append(ax.vlines(needed, 1e-11, found.goal, color=OBSERVED))
+    artists.append(ax.vlines(needed, 1e-11, found.tolerance, color=OBSERVED))
     artists.append(_beside(ax, f"{needed:g} digits were enough", (needed, 1e-5), (-6, 0), OBSERVED, ha="right"))
     ax.set_yscale("log")
     ax.set_ylim(1e-11, 1e20)
@@ -183,7 +188,7 @@ def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
     return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
 
 
-def _allowed(each: theory.Coefficients) -> NDArray[np.float64]:
+def _allowed(each: report_bounds.Coefficients) -> NDArray[np.float64]:
     """What (125) allows with :data:`_DIGITS` decimal digits, for a norm of the state and a B of 1."""
     return 0.5 * 10.0 ** (1 - _DIGITS) * (each.first + each.second)
 
@@ -194,7 +199,7 @@ def _beside(
     return ax.annotate(text, at, away, textcoords="offset points", color=colour, ha=ha)
 
 
-def contraction(found: Bounded, state: int, ax: Axes, name: str) -> list[Artist]:
+def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[Artist]:
     """Error of one state (points) and its contraction bound (line) against the step."""
     steps, error = found.history.steps, np.abs(found.history.state[:, state])
     seen = error > 0

@@ -1,4 +1,4 @@
-"""What a Kalman filter is told: a linear model, checked once; and a model of Gravity Probe B."""
+"""What a Kalman filter is given: a linear model, checked once."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.measurement import measurement_rows
+from gpbnb.arithmetic.rational import exact
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,92 +159,3 @@ def _check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None
             f"got {letter} with a least eigenvalue near {values[0]:.3g}; needed a positive {needed} matrix: "
             f"no variance may be {'zero or ' if strictly else ''}negative, in any direction{cure}"
         )
-
-
-# -- Gravity Probe B ----------------------------------------------------------------------------------
-
-#: The states of :func:`gravity_probe_b`, and their units.
-STATES = (
-    ("drift φ2", "mas"),
-    ("drift φ3", "mas"),
-    ("drift rate 2", "mas/yr"),
-    ("drift rate 3", "mas/yr"),
-    ("pointing α2", "mas"),
-    ("pointing α3", "mas"),
-    ("misalignment β2", "mas"),
-    ("misalignment γ2", "mas"),
-    ("readout bias", "mas"),
-    ("readout scale", "10⁻³"),
-)
-
-_COLUMNS = ("phi2", "phi3", "phi2_rate", "phi3_rate", "alpha2", "alpha3", "beta2", "gamma2", "bias_z", "scale")
-
-#: Steps of 10 s in 365 days; hung1984, ch. II, section 12, example.
-YEAR = 3_153_600
-
-
-def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearModel:
-    r"""A filter for one gyroscope of Gravity Probe B, n = 10, m = 2, a step each 10 s.
-
-    To first order in the angles, (1) and (2) of hung1982, ch. IV, give what the gyro's readout and the telescope show
-    along the z axis of the rolling spacecraft,
-
-    .. math:: z_r = \beta_2 + \gamma_2 + (\varphi_2 + \alpha_2)\cos\omega t + (\varphi_3 + \alpha_3)\sin\omega t,
-        \qquad z_t = \beta_2 + \alpha_2\cos\omega t + \alpha_3\sin\omega t,
-
-    with :math:`\varphi = \theta - \alpha`, (7). To z_r the model adds a bias and, for the readout's scale factor, the
-    known aberration of starlight by the orbit, 5.2 arcseconds in 97.5 minutes, which calibrated it in flight. What the
-    reports do not print, all noise and time constants, is our choice. Directions are tabulated to six decimals.
-
-    Parameters
-    ----------
-    roll : period in seconds, "600" (as in the reports) or "77.5" (as flown); or another multiple of half a second.
-    process_noise : whether drift, misalignments and scale wander; without, gains fall for ever.
-
-    References
-    ----------
-    hung1982, ch. IV, eqs. (1)-(7); hung1984, ch. II, section 12, example.
-    """
-    half_seconds = Fraction(roll) * 2
-    if half_seconds.denominator != 1 or half_seconds <= 20:
-        raise ValueError(f"got roll = {roll!r}; needed a period in seconds above 10, a multiple of 0.5, as in '77.5'")
-    # In half seconds, a step is 20 and an orbit 11700.
-    turn, orbit = int(half_seconds), 11_700
-    cycle = math.lcm(turn // math.gcd(turn, 20), orbit // 20)
-    times = [20 * (k + 1) for k in range(cycle)]
-    C, S = (np.array([wave(t, turn) for t in times], dtype=object) for wave in (_cosine, _sine))
-    size = Fraction("5.2")
-    known = np.array([[0, size * _cosine(t, orbit), size * _sine(t, orbit)] for t in times], dtype=object)
-    gyro = measurement_rows(C, S, _COLUMNS, derolled=False, nominal_theta=known)[:, 1]
-    telescope = measurement_rows(C, S, _COLUMNS, signal="telescope", derolled=False)[:, 1]
-    H = np.stack([gyro, telescope], axis=1)
-    Phi = _diagonal("1 1 1 1 0.9 0.9 1 1 0.999 1")
-    Phi[0, 2] = Phi[1, 3] = Fraction(1, YEAR)
-    wander = "1e-8 1e-8 1e-8 1e-8 76 76 1e-6 1e-6 0.01 1e-10"
-    still = "0 0 0 0 76 76 0 0 0.01 0"
-    return LinearModel(
-        Phi=Phi,
-        H=H,
-        Q=_diagonal(wander if process_noise else still),
-        R=_diagonal("2500 25"),
-        x0=np.array([Fraction(0)] * 10, dtype=object),
-        P0=_diagonal("1e4 1e4 1e8 1e8 400 400 1e4 1e4 5 100"),
-        name=f"GP-B, roll {roll} s" + ("" if process_noise else ", without process noise"),
-    )
-
-
-def _diagonal(entries: str) -> NDArray[Any]:
-    values = [Fraction(entry) for entry in entries.split()]
-    matrix = np.full((len(values), len(values)), Fraction(0), dtype=object)
-    for i, value in enumerate(values):
-        matrix[i, i] = value
-    return matrix
-
-
-def _cosine(part: int, whole: int) -> Fraction:
-    # The last digits of a machine's cosine are its own: six decimals are the same on all.
-    return Fraction(round(1_000_000 * math.cos(2 * math.pi * (part % whole) / whole)), 1_000_000)
-
-
-def _sine(part: int, whole: int) -> Fraction:
-    return Fraction(round(1_000_000 * math.sin(2 * math.pi * (part % whole) / whole)), 1_000_000)

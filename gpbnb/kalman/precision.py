@@ -14,23 +14,27 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
-from gpbnb.kalman.experiment import Followed, Form, Kept, Run, Simulation, compare_runs, log_spaced, reference
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.emulation import compare_runs
+from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import Simulation
 
 Basis = Literal["emulation", "bound"]
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """The smallest precision that meets a goal, and what the answer rests on.
+    """The smallest precision that meets a tolerance, and what the answer rests on.
 
     Parameters
     ----------
-    fmt : None if no format with compiled loops meets the goal.
+    fmt : None if no format with compiled loops meets the tolerance.
     basis : "emulation", what happened with these measurements; or "bound", what could at most have happened.
     steps : of the filter.
-    tried : precision, and largest error over goal of all states and steps looked at; infinite where the run stopped, a
-        variance was lost, or nothing can be said.
+    tried : precision, and largest error over tolerance of all states and checkpoints; infinite where the run stopped, a
+        variance was lost, or no bound exists.
     why : of the largest precision tried that has no number for an error, why not; empty if all have one. Shown where it
         kept the answer from being a smaller one.
     """
@@ -44,42 +48,41 @@ class Requirement:
     def __str__(self) -> str:
         if self.fmt is None:
             most, why = self.tried[-1][0], f"; {self.why}" if self.why else ""
-            return f"no precision up to {most} digits meets the goal ({self.basis}, {self.steps} steps){why}"
+            return f"no precision up to {most} digits meets the tolerance ({self.basis}, {self.steps} steps){why}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
         return (
             f"{self.fmt.precision} digits of base {self.fmt.base}, {self.fmt.rounding.value}: "
-            f"{tried[self.fmt.precision]:.2g} of the goal ({self.basis}, {self.steps} steps){why}"
+            f"{tried[self.fmt.precision]:.2g} of the tolerance ({self.basis}, {self.steps} steps){why}"
         )
 
 
 def required_precision(
     model: LinearModel,
     steps: int,
-    goal: float | Sequence[float],
+    tolerance: float | Sequence[float],
     base: int = 2,
     rounding: Rounding = Rounding.NEAREST,
-    form: Form = Form.USUAL,
+    form: Form = Form.INNOVATION,
     basis: Basis = "emulation",
     z: Any = None,
     seed: int = 0,
     progress: bool = False,
 ) -> Requirement:
-    """Find the smallest precision with which a filter stays within a goal.
+    """Find the smallest precision with which a filter stays within a tolerance.
 
-    Found by bisection, which takes for granted that a precision that misses the goal is not below one that counts. One
-    counts if the next meets the goal as well, so that no lucky one does. Whatever is taken for granted, the answer and
-    the next one were run and meet the goal, and unless the answer is 2 digits, the one before it was run and does not
-    count.
+    A precision qualifies only if the next higher one also meets the tolerance. The search is a bisection, which assumes
+    that no precision above a qualifying one misses the tolerance. Whether or not that assumption holds, the answer and
+    the next higher precision were run and meet the tolerance; the next lower one, if any, was run and does not qualify.
 
     Parameters
     ----------
-    goal : largest error of each state due to rounding, in its unit; one number, or (n,), infinite for a state that does
-        not matter.
+    tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
+        accuracy does not matter an infinite tolerance.
     base : 2, 10 or 16.
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
         the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
-        contraction bound of :mod:`gpbnb.kalman.theory`, which holds for the arithmetic of this run without doubt, and
+        contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
         asks for more digits.
     z : (steps, m), measurements; by default simulated by the model, from its first estimate.
     seed : of the simulation.
@@ -87,23 +90,25 @@ def required_precision(
 
     Raises
     ------
-    ValueError : a goal that is not positive; another basis; a base without compiled loops; not as many measurements as
-        steps.
+    ValueError : a tolerance that is not positive; another basis; a base without compiled loops; more or fewer
+        measurements than steps.
     """
-    goals = _checked(model, goal, base, form, basis)
+    tolerances = _checked(model, tolerance, base, form, basis)
     if not isinstance(steps, (int, np.integer)) or steps < 1:
         raise ValueError(f"got {steps!r} steps; needed a whole number, at least 1")
     if z is None:
         z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
-    measured, marks = _measured(model, z, steps), log_spaced(steps, 16)
-    true = reference(model, measured, marks) if basis == "emulation" else None
+    measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
+    true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
     most, tried, why = LARGEST_PRECISION[base], dict[int, float](), dict[int, str]()
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
 
         def meets(precision: int) -> bool:
             if precision not in tried:
                 fmt = FloatFormat(base, precision, rounding)
-                tried[precision], why[precision] = _over_goal(model, measured, fmt, form, marks, true, goals)
+                tried[precision], why[precision] = _error_over_tolerance(
+                    model, measured, fmt, form, checkpoint_steps, true, tolerances
+                )
                 bar.update()
             return tried[precision] <= 1
 
@@ -118,50 +123,55 @@ def required_precision(
 def survey(
     model: LinearModel,
     z: Any,
-    goal: float | Sequence[float],
+    tolerance: float | Sequence[float],
     precisions: Sequence[int],
     base: int = 2,
     rounding: Rounding = Rounding.NEAREST,
-    form: Form = Form.USUAL,
+    form: Form = Form.INNOVATION,
     basis: Basis = "emulation",
 ) -> tuple[tuple[int, float], ...]:
     """Run a filter in each of some precisions; arguments as of :func:`required_precision`.
 
     Returns
     -------
-    tried : precision, and largest error or bound over goal, as in :class:`Requirement`.
+    tried : precision, and largest error or bound over tolerance, as in :class:`Requirement`.
 
     Raises
     ------
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
-    goals, measured = _checked(model, goal, base, form, basis), _measured(model, z)
+    tolerances, measured = _checked(model, tolerance, base, form, basis), _measured(model, z)
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
     if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION[base]]:
         raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION[base]}")
-    marks = log_spaced(len(measured), 16)
-    true = reference(model, measured, marks) if basis == "emulation" else None
-    return tuple((fmt.precision, _over_goal(model, measured, fmt, form, marks, true, goals)[0]) for fmt in formats)
+    checkpoint_steps = log_spaced(len(measured), 16)
+    true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
+    return tuple(
+        (fmt.precision, _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)[0])
+        for fmt in formats
+    )
 
 
-def _checked(model: LinearModel, goal: Any, base: int, form: Form, basis: str) -> NDArray[np.float64]:
-    """The goal of each state, if all that was asked makes sense."""
+def _checked(model: LinearModel, tolerance: Any, base: int, form: Form, basis: str) -> NDArray[np.float64]:
+    """The tolerance of each state, if all that was asked makes sense."""
     needed = f"needed an error above 0 for each of the {model.n} states, one finite"
     try:
-        goals = np.asarray(goal, dtype=np.float64)
+        tolerances = np.asarray(tolerance, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ValueError(f"got goal {goal!r}; {needed}") from None
-    if goals.shape not in ((), (model.n,)):
-        raise ValueError(f"got goal {goal} of shape {goals.shape}; {needed}: one number, or {model.n} in a row")
-    if not (goals > 0).all() or not np.isfinite(goals).any():
-        raise ValueError(f"got goal {goal}; {needed}")
+        raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
+    if tolerances.shape not in ((), (model.n,)):
+        raise ValueError(
+            f"got tolerance {tolerance} of shape {tolerances.shape}; {needed}: one number, or {model.n} in a row"
+        )
+    if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
+        raise ValueError(f"got tolerance {tolerance}; {needed}")
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "bound"')
     if base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     if not isinstance(form, Form):
         raise ValueError(f"got form {form!r}; needed one of {', '.join(f'Form.{each.name}' for each in Form)}")
-    return np.broadcast_to(goals, (model.n,))
+    return np.broadcast_to(tolerances, (model.n,))
 
 
 def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[Any]:
@@ -181,30 +191,30 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
     return measured
 
 
-def _over_goal(
+def _error_over_tolerance(
     model: LinearModel,
     z: NDArray[Any],
     fmt: FloatFormat,
     form: Form,
-    marks: Sequence[int],
-    true: Kept | None,
-    goals: NDArray[np.float64],
+    checkpoint_steps: Sequence[int],
+    true: Checkpoints | None,
+    tolerances: NDArray[np.float64],
 ) -> tuple[float, str]:
-    """Largest error over goal against `true`, or without it, largest bound over goal; or infinity, and why."""
-    asked, measured = np.isfinite(goals), fmt.array(z)
+    """Largest error, or without `true` largest bound, over tolerance; infinity and the reason if there is none."""
+    asked, measured = np.isfinite(tolerances), fmt.array(z)
     try:
-        run = (Followed if true is None else Run)(model, fmt, form, marks)
+        run = (BoundedRun if true is None else Run)(model, fmt, form, checkpoint_steps)
     except ValueError as error:  # a covariance is not definite in so few digits
         return math.inf, str(error)
     run.take(measured)
     if run.stopped is not None:
         return math.inf, f"the run stopped at step {run.stopped}, by a division by zero or a number out of range"
-    if isinstance(run, Followed):
+    if isinstance(run, BoundedRun):
         errors = run.bounds[0]
     elif true is not None:
         errors = compare_runs(run, true).state
         if run.indefinite is not None:
             lost = f"a computed variance was not positive at step {run.indefinite}"
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
-    ratio = float((np.abs(errors[:, asked]) / goals[asked]).max())
+    ratio = float((np.abs(errors[:, asked]) / tolerances[asked]).max())
     return ratio, "the bound says nothing" if math.isinf(ratio) else ""

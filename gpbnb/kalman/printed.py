@@ -1,4 +1,4 @@
-"""What (125) allows a run: the quantities of hung1984, ch. II, (122), taken from a filter on its way."""
+"""What (125) allows a run: the quantities of hung1984, ch. II, (122), taken from a run."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import theory
-from gpbnb.kalman.experiment import Kept
+from gpbnb.kalman import report_bounds
+from gpbnb.kalman.filter_run import Checkpoints
 from gpbnb.kalman.model import LinearModel
 
 
@@ -32,15 +32,15 @@ class Terms:
     columns: NDArray[np.float64]
     rows: NDArray[np.float64]
 
-    def kindest(self, fmt: FloatFormat, k: int, **faults: bool) -> float:
+    def smallest_bound(self, fmt: FloatFormat, k: int, **faults: bool) -> float:
         """Bound (125) at step k with the least B that any filter with these inputs could have.
 
         Parameters
         ----------
         fmt : gives β. k : 1 or more; beyond the last of the steps, x and u of the last are taken.
-        faults : to mend, as for :func:`gpbnb.kalman.theory.coefficients`.
+        faults : to correct, as for :func:`gpbnb.kalman.report_bounds.coefficients`.
         """
-        first, second = theory.coefficients(k, self.n, self.m, **faults)
+        first, second = report_bounds.coefficients(k, self.n, self.m, **faults)
         last = min(k, len(self.x)) - 1
         return float(fmt.unit_roundoff) * (first * float(self.x[last]) + second * float(self.u[last]))
 
@@ -49,7 +49,7 @@ class Terms:
         return (len(self.columns) - 1) * float(np.log10(self.columns[-1]))
 
 
-def terms(model: LinearModel, true: Kept) -> Terms:
+def terms(model: LinearModel, true: Checkpoints) -> Terms:
     """Take the quantities of (122) from a run.
 
     Parameters
@@ -61,9 +61,7 @@ def terms(model: LinearModel, true: Kept) -> Terms:
     ValueError : steps left out, or none.
     """
     if not true.steps or true.steps != tuple(range(1, len(true.steps) + 1)):
-        raise ValueError(
-            f"got the steps {true.steps[:4]} …; needed 1, 2, 3, …; take marks = range(1, {len(true.steps) + 1})"
-        )
+        raise ValueError(f"got the steps {true.steps[:4]} …; needed 1, 2, 3, …; take range(1, {len(true.steps) + 1})")
     given, c = model.to_float(), len(true.steps)
     x, K = true.x.astype(np.float64), true.K.astype(np.float64)
     at = np.arange(c)

@@ -1,6 +1,6 @@
 """The smallest filters that break (105), (108) and (125): one step, in exact arithmetic on rounded Fractions.
 
-This is slow and obvious, shares nothing with the compiled filter of :mod:`gpbnb.kalman.experiment`, and is its oracle.
+This is slow and obvious, shares nothing with the compiled filter of :mod:`gpbnb.kalman.filter_run`, and is its oracle.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact, max_norm
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import theory
+from gpbnb.arithmetic.rational import exact, max_norm
+from gpbnb.kalman import exact_step, report_bounds
 
 
 class Case(NamedTuple):
-    """A filter and its first measurement, exact: the arguments of :func:`gpbnb.kalman.theory.exact_step`."""
+    """A filter and its first measurement, exact: the arguments of :func:`gpbnb.kalman.exact_step.exact_step`."""
 
     Phi: NDArray[Any]
     H: NDArray[Any]
@@ -114,21 +114,21 @@ def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -
     for _ in range(steps):
         x, K, P = rounded_step(fmt, rounded, second)
         rounded = rounded._replace(x=x, P=P)
-        true = theory.exact_step(*exactly)
+        true = exact_step.exact_step(*exactly)
         exactly = exactly._replace(x=true.x, P=true.P)
         transitions.append(true.transition)
         inputs.append(true.gain @ case.z)
     beta, (n, m) = fmt.unit_roundoff, true.gain.shape
-    B = theory.printed_input_bound(transitions, inputs)
-    bound = theory.state_bound(max_norm(true.x), B, beta, theory.coefficients(steps, n, m))
+    B = report_bounds.printed_input_bound(transitions, inputs)
+    bound = report_bounds.state_bound(max_norm(true.x), B, beta, report_bounds.coefficients(steps, n, m))
     return Ratios(
-        _worst(P - true.P, theory.printed_covariance_bound(true.P, m, beta)),
-        _worst(K - true.gain, theory.printed_gain_bound(true.gain, beta)),
+        _worst(P - true.P, report_bounds.printed_covariance_bound(true.P, m, beta)),
+        _worst(K - true.gain, report_bounds.printed_gain_bound(true.gain, beta)),
         _worst(exact([max_norm(x - true.x)]), exact([bound])),
     )
 
 
-def mildest(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
+def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
     """The largest R up to 1 in :func:`scalar` that breaks each bound, of all R of the format above b**-t.
 
     Returns

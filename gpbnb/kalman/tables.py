@@ -10,9 +10,10 @@ import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.display.tables import Table, arithmetic, scientific, short
-from gpbnb.kalman import smallest, theory, year
+from gpbnb.kalman import contraction, report_bounds, smallest, year
 from gpbnb.kalman.ensembles import Summary
-from gpbnb.kalman.model import STATES, LinearModel
+from gpbnb.kalman.gravity_probe_b import STATES
+from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
 
@@ -20,32 +21,32 @@ DOUBLE = FloatFormat(2, 53)
 
 
 def example(k: int, n: int, m: int) -> Table:
-    """The closing example for (125), printed and mended: coefficients, β, digits, and what IEEE double makes of it."""
+    """The closing example for (125), printed and corrected: coefficients, β, digits, and the error in IEEE double."""
     body = []
-    for name, faults in theory.MENDINGS.items():
-        for term, coefficient in zip(("first", "second"), theory.coefficients(k, n, m, **faults), strict=True):
+    for name, faults in report_bounds.CORRECTIONS.items():
+        for term, coefficient in zip(("first", "second"), report_bounds.coefficients(k, n, m, **faults), strict=True):
             body.append(
                 (
                     name,
                     term,
                     scientific(coefficient, 5),
                     scientific(Fraction(1, coefficient), 4),
-                    str(theory.required_precision(coefficient)),
+                    str(report_bounds.precision_for_coefficient(coefficient)),
                     scientific(coefficient * DOUBLE.unit_roundoff, 2),
                 )
             )
     header = ("(125)", "term", "coefficient", "$\\beta$, one over it", "digits", "times $\\beta$ of IEEE double")
-    return Table(f"the closing example, {len(theory.MENDINGS)} ways", header, tuple(body))
+    return Table(f"the closing example, {len(report_bounds.CORRECTIONS)} ways", header, tuple(body))
 
 
-def slips(k: int, n: int, m: int) -> Table:
+def misprints(k: int, n: int, m: int) -> Table:
     """Each printed number of the closing example, what the printed formula gives, and what gives the printed number."""
-    first, second = theory.coefficients(k, n, m)
-    printed = theory.PRINTED
-    wrong = theory.one_figure_slips(k, n, m, printed["first coefficient"])
+    first, second = report_bounds.coefficients(k, n, m)
+    printed = report_bounds.PRINTED
+    wrong = report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"])
     loops = sorted({a * n + b * m + c for a, b, c in wrong})
     ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in wrong)
-    products = [loop for loop in loops if prints_as(theory.read_as_product(k, n, m, loop), printed[_SECOND])]
+    products = [loop for loop in loops if prints_as(report_bounds.read_as_product(k, n, m, loop), printed[_SECOND])]
     values: list[tuple[str, str, str]] = [
         ("first coefficient", scientific(first, 5), f"{', '.join(map(str, loops))} times $k$, as by {ways}"),
         (
@@ -64,11 +65,11 @@ def slips(k: int, n: int, m: int) -> Table:
             (f"{name} beta", scientific(Fraction(1, coefficient), 4), _yes(follows, "one over the printed coefficient"))
         )
         exact_digits = 1 - math.log10(2 * float(beta))
-        needed = theory.required_precision(1 / beta)
+        needed = report_bounds.precision_for_coefficient(1 / beta)
         values.append(
             (
                 f"{name} digits",
-                str(theory.required_precision(coefficient)),
+                str(report_bounds.precision_for_coefficient(coefficient)),
                 f"the printed β is that of {exact_digits:.2f} digits; it needs {needed}",
             )
         )
@@ -79,23 +80,23 @@ def slips(k: int, n: int, m: int) -> Table:
 _SECOND = "second coefficient"
 
 
-def goals(k: int, n: int, m: int, goal: Fraction, size: Fraction) -> Table:
-    """Digits that each coefficient asks for an error of all of `size`, as in the example, and for one of `goal`.
+def tolerances(k: int, n: int, m: int, tolerance: Fraction, size: Fraction) -> Table:
+    """Digits that each coefficient asks for an error of all of `size`, as in the example, and for one of `tolerance`.
 
     Parameters
     ----------
-    k, n, m : of the example. goal, size : the error that is wanted and what it is an error of, in the same units.
+    k, n, m : of the example. tolerance, size : the error that is wanted and what it is an error of, in the same units.
     """
     body = []
-    for name, coefficient in zip(("first", "second"), theory.coefficients(k, n, m), strict=True):
-        for granted in (Fraction(1), Fraction(goal) / Fraction(size)):
+    for name, coefficient in zip(("first", "second"), report_bounds.coefficients(k, n, m), strict=True):
+        for granted in (Fraction(1), Fraction(tolerance) / Fraction(size)):
             body.append(
                 (
                     f"{name} term",
                     scientific(granted, 2),
                     scientific(granted * Fraction(size), 2),
-                    str(theory.required_precision(coefficient, granted)),
-                    str(theory.required_precision(coefficient, granted, base=2)),
+                    str(report_bounds.precision_for_coefficient(coefficient, granted)),
+                    str(report_bounds.precision_for_coefficient(coefficient, granted, base=2)),
                 )
             )
     header = ("dominates", "error granted, relative", "in mas", "decimal digits", "bits")
@@ -120,17 +121,17 @@ def order() -> Table:
     """In which order the four equations can be computed."""
     body = []
     for name, second in (("first", False), ("second", True)):
-        found = theory.order(second)
+        found = report_bounds.order(second)
         body.append((name, " → ".join(found) if found else "none: (99) waits for (101), and (101) for (99)"))
     return Table("the order of (98)-(101)", ("form of (99)", "order"), tuple(body))
 
 
-def mildest(fmts: Sequence[FloatFormat]) -> Table:
+def largest_violating_noise(fmts: Sequence[FloatFormat]) -> Table:
     """How large R may be, beside a variance of 1, for the scalar filter still to break each bound."""
     body = []
     for fmt in fmts:
         for name, second in (("first", False), ("second", True)):
-            found = smallest.mildest(fmt, second)
+            found = smallest.largest_violating_noise(fmt, second)
             cells = (f"{float(found[each]):.3g}" if each in found else "none" for each in smallest.Ratios._fields)
             body.append((arithmetic(fmt), name, *cells))
     header = ("arithmetic", "form of (99)", "$R$ for (105)", "$R$ for (108)", "$R$ for (125)")
@@ -138,13 +139,13 @@ def mildest(fmts: Sequence[FloatFormat]) -> Table:
 
 
 def states(model: LinearModel) -> Table:
-    """What :func:`gpbnb.kalman.model.gravity_probe_b` takes for its states: what is kept, known and added."""
+    """States of :func:`gpbnb.kalman.gravity_probe_b.gravity_probe_b`: transition, first deviation, process noise."""
     given = model.to_float()
     body = tuple(
         (name, unit, f"{given['Phi'][0, i, i]:g}", _root(given["P0"][i, i]), _root(given["Q"][0, i, i]))
         for i, (name, unit) in enumerate(STATES)
     )
-    header = ("state", "unit", "kept in a step", "first standard deviation", "wander in a step")
+    header = ("state", "unit", "transition per step", "first standard deviation", "random walk per step")
     return Table(f"{len(body)} states", header, body)
 
 
@@ -177,7 +178,7 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
 
 
 def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms) -> Table:
-    """Bound over error of the drift rate at the end of a year: (125) at its kindest, and the companion bound.
+    """Bound over error of the drift rate at the end of a year: the smallest that (125) can be, and the companion bound.
 
     Parameters
     ----------
@@ -191,10 +192,15 @@ def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms
             raise ValueError(f"got {run.case.name} with a bound to step {reference.steps[-1]}; needed one to step {k}")
         at = int(np.abs(run.rate[-1]).argmax())
         error = abs(float(run.rate[-1, at]))
-        companion = float(theory.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
-        cells = [terms.kindest(fmt, k, **faults) / error for faults in theory.MENDINGS.values()]
+        companion = float(contraction.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
+        cells = [terms.smallest_bound(fmt, k, **faults) / error for faults in report_bounds.CORRECTIONS.values()]
         body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.5f}"))
-    header = ("arithmetic", "rate, error (mas/yr)", *(f"(125), {name}" for name in theory.MENDINGS), "companion bound")
+    header = (
+        "arithmetic",
+        "rate, error (mas/yr)",
+        *(f"(125), {name}" for name in report_bounds.CORRECTIONS),
+        "companion bound",
+    )
     return Table(f"bound over error, {len(body)} years", header, tuple(body))
 
 
@@ -228,7 +234,7 @@ def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
         ratio = f"{dict(answer.tried)[answer.fmt.precision]:.2g}" if answer.fmt else ""
         smallest_format = arithmetic(answer.fmt) if answer.fmt else "none"
         body.append((name, answer.basis, str(answer.steps), smallest_format, ratio))
-    header = ("filter", "rests on", "steps", "smallest precision", "error or bound / goal")
+    header = ("filter", "rests on", "steps", "smallest precision", "error or bound / tolerance")
     return Table(f"{len(body)} answers", header, tuple(body))
 
 

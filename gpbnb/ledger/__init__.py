@@ -1,53 +1,56 @@
-"""Everything printed in the three documents, and what became of it.
+"""Every printed statement of the three documents and the verdict computed for it.
 
-``python -m gpbnb.ledger`` writes it out. In a notebook::
+``python -m gpbnb.ledger`` writes the ledger. In a notebook::
 
     from gpbnb import ledger
 
     rows = ledger.rows(document="hung1984", chapter="II", sections=range(1, 10))
-    ledger.table(rows)
     ledger.summary_table(rows)
+    ledger.error_table(rows)
 """
 
-from gpbnb.ledger.checking import TOPICS, Row, counts, examine, rows, summary
+from gpbnb.ledger.checking import Row, counts, examine, rows, summary
+from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.html import CHAPTERS, Html
 from gpbnb.ledger.page import (
-    CHAPTERS,
-    Html,
-    brief,
+    PAGES,
+    claim_table,
     count_table,
-    links,
-    of_ids,
-    of_kind,
-    of_topic,
-    searchable,
-    told,
+    error_table,
+    ledger_page,
+    note_table,
+    root_table,
+    select_topic,
     topics,
 )
 from gpbnb.ledger.render import summary_table, table
-from gpbnb.ledger.statements import Entry, load_inventory, quote, select
+from gpbnb.ledger.roots import by_root, load_roots
+from gpbnb.ledger.statements import Statement, load_statements, quote, select
 
 __all__ = [
     "CHAPTERS",
+    "PAGES",
     "TOPICS",
-    "Entry",
     "Html",
     "Row",
-    "brief",
+    "Statement",
+    "by_root",
+    "claim_table",
     "count_table",
     "counts",
+    "error_table",
     "examine",
-    "links",
-    "load_inventory",
-    "of_ids",
-    "of_kind",
-    "of_topic",
+    "ledger_page",
+    "load_roots",
+    "load_statements",
+    "note_table",
     "quote",
+    "root_table",
     "rows",
-    "searchable",
     "select",
+    "select_topic",
     "summary",
     "summary_table",
     "table",
-    "told",
     "topics",
 ]

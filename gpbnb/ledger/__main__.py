@@ -9,9 +9,10 @@ import traceback
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, examine, load_checks
+from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, examine, owners
+from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.render import FORMATS, describe
-from gpbnb.ledger.statements import Entry, load_inventory, select
+from gpbnb.ledger.statements import Statement, load_statements, select
 
 COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # 2 is argparse's, for misuse
 _EPILOG = (
@@ -39,13 +40,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--output", type=Path, metavar="FILE", help="a file, replaced as a whole; default: stdout")
     arguments = parser.parse_args(argv)
     try:
-        inventory = load_inventory()
+        inventory = load_statements()
         chosen = select(inventory, arguments.document, arguments.chapter, arguments.section)
         _check_output(arguments.output)
-        checks = load_checks(inventory)
-    except (ImportError, OSError, ValueError) as error:
+        owners(inventory, TOPICS)
+    except (OSError, ValueError) as error:
         parser.error(str(error))
-    rows = examine(chosen, checks, _progress)
+    rows = examine(chosen, TOPICS, _progress)
     content = FORMATS[arguments.format](rows).encode()
     try:
         if arguments.output is not None:
@@ -64,12 +65,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     return BROKEN if FAILED in outcomes else INCOMPLETE if MISSING in outcomes else COMPLETE
 
 
-def _progress(entries: Sequence[Entry]) -> Iterable[Entry]:
+def _progress(entries: Sequence[Statement]) -> Iterable[Statement]:
     if not sys.stderr.isatty():
         return entries
     from tqdm import tqdm  # type: ignore[import-untyped]
 
-    bar: Iterable[Entry] = tqdm(entries, desc="checks", unit="entry", leave=False, file=sys.stderr)
+    bar: Iterable[Statement] = tqdm(entries, desc="checks", unit="entry", leave=False, file=sys.stderr)
     return bar
 
 
@@ -78,7 +79,7 @@ def _report(rows: Sequence[Row]) -> None:
         if row.error is not None:
             frame = traceback.extract_tb(row.error.__traceback__)[-1]
             cause = "".join(traceback.format_exception_only(row.error)).strip()
-            print(f"the check of {row.entry.id} failed: {cause} ({frame.filename}:{frame.lineno})", file=sys.stderr)
+            print(f"the check of {row.statement.id} failed: {cause} ({frame.filename}:{frame.lineno})", file=sys.stderr)
     outcomes = counts(rows)
     print(f"{len(rows)} entries: {describe(outcomes)}", file=sys.stderr)
     print(f"{outcomes.get(MISSING, 0)} lack their check", file=sys.stderr)

@@ -1,25 +1,15 @@
-"""Bring the entries of the inventory and the checks of the topics together."""
+"""Run the checks of the printed statements and collect their findings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from typing import NamedTuple
 
-from gpbnb.ledger.finding import Check, Checks, Finding, Verdict
-from gpbnb.ledger.statements import Entry, load_inventory, select
-
-TOPICS = (
-    "gpbnb.ledger.checks.rounding",
-    "gpbnb.ledger.checks.inversion",
-    "gpbnb.ledger.checks.kalman",
-    "gpbnb.ledger.checks.rolling",
-    "gpbnb.ledger.checks.integration",
-    "gpbnb.ledger.checks.budget",
-    "gpbnb.ledger.checks.geometry",
-)
-"""The modules that hold checks, each as ``CHECKS``; imported when checks are run."""
+from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.finding import Finding, Verdict
+from gpbnb.ledger.registry import Check, Checks, takes_statement
+from gpbnb.ledger.statements import Statement, load_statements, select
 
 MISSING = "missing"
 FAILED = "failed"
@@ -29,7 +19,7 @@ FAILED = "failed"
 class Row:
     """An entry and what its check found: nothing where there is no check, or where the check raised `error`."""
 
-    entry: Entry
+    statement: Statement
     finding: Finding | None
     error: Exception | None = None
 
@@ -49,85 +39,79 @@ class Place(NamedTuple):
     section: str
 
 
-def load_checks(entries: Iterable[Entry], topics: Sequence[str] | None = None) -> dict[str, Checks]:
-    """Import the topics and find who checks what.
+def owners(statements: Iterable[Statement], topics: Mapping[str, Checks] = TOPICS) -> dict[str, str]:
+    """Find the topic whose checks judge each statement.
 
     Parameters
     ----------
-    entries : the whole inventory.
-    topics : names of modules; `TOPICS` by default.
+    statements : all statements.
+    topics : the checks of each topic.
 
     Returns
     -------
-    checks : id of an entry → the registry that has its check.
+    owners : statement id → name of the topic.
 
     Raises
     ------
-    ImportError : a topic cannot be imported or has no ``CHECKS``.
-    ValueError : a check belongs to no entry, or two topics check the same one.
+    ValueError : a check belongs to no statement, or two topics check the same one.
     """
-    known = {entry.id for entry in entries}
-    found: dict[str, Checks] = {}
-    owner: dict[str, str] = {}
-    for topic in TOPICS if topics is None else topics:
-        try:
-            checks = import_module(topic).CHECKS
-        except Exception as error:
-            raise ImportError(
-                f"the checks of topic {topic!r} cannot be loaded ({type(error).__name__}: {error}); "
-                f"`import {topic}` must work and define CHECKS"
-            ) from error
+    known = {statement.id for statement in statements}
+    found: dict[str, str] = {}
+    for topic, checks in topics.items():
         for key in checks:
             if key not in known:
-                raise ValueError(f"{topic} checks {key!r}, which the inventory lacks; correct the id or add the entry")
-            if key in owner:
-                raise ValueError(f"{key!r} is checked by {owner[key]} and by {topic}; an entry has one check: drop one")
-            owner[key] = topic
-            found[key] = checks
+                raise ValueError(f"{topic} checks {key!r}, which is not in statements.csv; correct the id or add it")
+            if key in found:
+                raise ValueError(
+                    f"{key!r} is checked by {found[key]} and by {topic}; a statement has one check: drop one"
+                )
+            found[key] = topic
     return found
 
 
 def examine(
-    entries: Iterable[Entry],
-    checks: dict[str, Checks],
-    progress: Callable[[Sequence[Entry]], Iterable[Entry]] = iter,
+    statements: Iterable[Statement],
+    topics: Mapping[str, Checks] = TOPICS,
+    progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter,
 ) -> tuple[Row, ...]:
-    """Run the checks of `entries`; one that raises leaves its error in the row and the others undisturbed.
+    """Run the checks of `statements`; a check that raises leaves its error in the row and does not disturb the others.
 
     Parameters
     ----------
-    entries : which to check.
-    checks : from `load_checks`.
-    progress : passes the entries on, one by one, and may show how far they are.
+    statements : which to check.
+    topics : the checks of each topic.
+    progress : passes the statements on one by one, and may show how many are done.
 
     Returns
     -------
-    rows : in the order of `entries`. A function that checks several of them is called once.
+    rows : in the order of `statements`. A check that takes no statement and judges several is called once.
     """
     results: dict[Check, Finding | Exception] = {}
     rows: list[Row] = []
-    for entry in progress(tuple(entries)):
-        if entry.id not in checks:
-            rows.append(Row(entry, None))
+    for statement in progress(tuple(statements)):
+        checks = next((checks for checks in topics.values() if statement.id in checks), None)
+        if checks is None:
+            rows.append(Row(statement, None))
             continue
-        registry = checks[entry.id]
-        check = registry[entry.id]
-        if check not in results:
+        check = checks[statement.id]
+        result = results.get(check)
+        if result is None:
             try:
-                results[check] = registry.run(entry.id)
+                result = checks.run(statement)
             except Exception as error:
-                results[check] = error
-        result = results[check]
-        rows.append(Row(entry, result) if isinstance(result, Finding) else Row(entry, None, result))
+                result = error
+            if not takes_statement(check):
+                results[check] = result
+        rows.append(Row(statement, result) if isinstance(result, Finding) else Row(statement, None, result))
     return tuple(rows)
 
 
 def rows(
-    entries: Iterable[Entry] | None = None,
+    entries: Iterable[Statement] | None = None,
     document: str | None = None,
     chapter: str | None = None,
     sections: str | Iterable[str | int] | None = None,
-    topics: Sequence[str] | None = None,
+    topics: Mapping[str, Checks] = TOPICS,
 ) -> tuple[Row, ...]:
     """Check a part of the ledger.
 
@@ -135,7 +119,7 @@ def rows(
     ----------
     entries : the whole inventory, that of the package by default.
     document, chapter, sections : the part, as in `select`; all by default. Only its checks are run.
-    topics : names of modules that hold checks; `TOPICS` by default.
+    topics : the checks of each topic.
 
     Returns
     -------
@@ -144,15 +128,16 @@ def rows(
     Raises
     ------
     ExceptionGroup : checks raised; each error carries a note with its id.
-    ImportError, ValueError : see `load_checks`; ValueError also for an empty selection.
+    ValueError : see `owners`; also for an empty selection.
     """
-    inventory = load_inventory() if entries is None else tuple(entries)
+    inventory = load_statements() if entries is None else tuple(entries)
     chosen = select(inventory, document, chapter, sections)
-    examined = examine(chosen, load_checks(inventory, topics))
+    owners(inventory, topics)
+    examined = examine(chosen, topics)
     errors: list[Exception] = []
     for row in examined:
         if row.error is not None:
-            row.error.add_note(f"in the check of {row.entry.id}")
+            row.error.add_note(f"in the check of {row.statement.id}")
             if row.error not in errors:
                 errors.append(row.error)
     if errors:
@@ -171,7 +156,7 @@ def summary(rows: Iterable[Row]) -> dict[Place, dict[str, int]]:
     """Count the outcomes section by section, in reading order."""
     sections: dict[Place, list[Row]] = {}
     for row in in_reading_order(rows):
-        place = Place(row.entry.document, row.entry.chapter, row.entry.section)
+        place = Place(row.statement.document, row.statement.chapter, row.statement.section)
         sections.setdefault(place, []).append(row)
     return {place: counts(inside) for place, inside in sections.items()}
 
@@ -179,11 +164,11 @@ def summary(rows: Iterable[Row]) -> dict[Place, dict[str, int]]:
 def in_reading_order(rows: Iterable[Row]) -> tuple[Row, ...]:
     """Sort by document and chapter as they come and by section number; rows of a section keep their order."""
     rows = tuple(rows)
-    documents = list(dict.fromkeys(row.entry.document for row in rows))
-    chapters = list(dict.fromkeys((row.entry.document, row.entry.chapter) for row in rows))
+    documents = list(dict.fromkeys(row.statement.document for row in rows))
+    chapters = list(dict.fromkeys((row.statement.document, row.statement.chapter) for row in rows))
 
     def key(row: Row) -> tuple[int, int, tuple[int, ...]]:
-        entry = row.entry
+        entry = row.statement
         numbers = entry.section.split(".")
         section = tuple(int(number) for number in numbers) if all(map(str.isdecimal, numbers)) else ()
         return documents.index(entry.document), chapters.index((entry.document, entry.chapter)), section

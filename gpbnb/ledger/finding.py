@@ -1,55 +1,59 @@
-"""What became of a printed statement, and how a topic's checks are collected.
+"""The result of checking one printed statement.
 
-A check recomputes one statement of a document and returns a :class:`Finding`. The verdict follows from whether
-recomputation and print agree, through :func:`compare`, :func:`answer` or :func:`unverifiable`; no check states it
-by hand.
+A check recomputes a statement and returns a :class:`Finding`. The verdict follows from whether the recomputation agrees
+with the printed statement, through :func:`compare`, :func:`answer`, :func:`unverifiable` or :func:`given`.
 """
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TypeVar
 
 
 class Verdict(Enum):
-    """What became of a printed statement.
+    """The judgement of a printed statement.
 
-    VERIFIED : right as printed, to first order where the document says so.
-    TYPO : a slip without consequence.
-    WRONG : an error with consequence.
-    INCONSISTENT : contradicts another place of the documents.
+    VERIFIED : correct as printed; to first order in the unit roundoff where the document says so.
+    MISPRINT : a slip on which nothing later depends.
+    WRONG : an error on which a later result or a conclusion depends.
+    INCONSISTENT : contradicts another place in the documents.
+    NOT_REPRODUCED : a number that no reading of the documents reproduces, and no derivation shows to be wrong.
     OCR : the scan is wrong, not the author.
-    UNVERIFIABLE : its data is not in the documents.
-    OPEN : left undone in the documents, and here.
-    ANSWERED : left undone there, done here; the note says where.
+    UNVERIFIABLE : the data or the picture it rests on is not in the documents; the note says what is missing.
+    GIVEN : a definition, given data or a heading: there is nothing to check.
+    OPEN : left undone in the documents and here.
+    ANSWERED : left undone in the documents and done here; the note says where.
     """
 
     VERIFIED = "verified"
-    TYPO = "typo"
+    MISPRINT = "misprint"
     WRONG = "wrong"
     INCONSISTENT = "inconsistent"
+    NOT_REPRODUCED = "not reproduced"
     OCR = "ocr"
     UNVERIFIABLE = "unverifiable"
+    GIVEN = "given"
     OPEN = "open"
     ANSWERED = "answered"
 
 
 _AGREES: dict[Verdict, tuple[bool | None, ...]] = {
     Verdict.VERIFIED: (True,),
-    Verdict.TYPO: (False,),
+    Verdict.MISPRINT: (False,),
     Verdict.WRONG: (False,),
     Verdict.INCONSISTENT: (False,),
+    Verdict.NOT_REPRODUCED: (False,),
     Verdict.OCR: (False,),
     Verdict.UNVERIFIABLE: (None,),
+    Verdict.GIVEN: (None,),
     Verdict.OPEN: (False, None),
     Verdict.ANSWERED: (True,),
 }
-_DIFFERS = (Verdict.TYPO, Verdict.WRONG, Verdict.INCONSISTENT, Verdict.OCR)
+DISAGREEMENTS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.NOT_REPRODUCED, Verdict.MISPRINT, Verdict.OCR)
+"""Verdicts on statements that do not agree with the recomputation, the most serious first."""
 _NEEDS_NOTE = {
     Verdict.UNVERIFIABLE: "which data is missing",
+    Verdict.GIVEN: "what it defines or gives",
     Verdict.ANSWERED: "where it is answered",
 }
 
@@ -63,7 +67,8 @@ class Finding:
     recomputed : what the project gets; prose with math between single dollar signs.
     agrees : whether print and recomputation agree; None where there is nothing to compare.
     verdict : what became of the statement; not free, it must fit `agrees`.
-    note : why, or where; same markup. Needed for `UNVERIFIABLE` and `ANSWERED`.
+    note : why, or where; same markup. Needed for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
+    root : id of the root error in ``roots.csv`` that makes the statement disagree; empty where it agrees.
 
     Raises
     ------
@@ -75,6 +80,7 @@ class Finding:
     agrees: bool | None
     verdict: Verdict
     note: str = ""
+    root: str = ""
 
     def __post_init__(self) -> None:
         for name, text in (("recomputed", self.recomputed), ("note", self.note)):
@@ -94,6 +100,8 @@ class Finding:
                 f"verdict {self.verdict.value!r} came with agrees={self.agrees}; it needs {needed}: "
                 "let compare(), answer() or unverifiable() choose the verdict"
             )
+        if self.root and self.verdict not in DISAGREEMENTS:
+            raise ValueError(f"verdict {self.verdict.value!r} came with the root error {self.root!r}; it has none")
         if self.agrees is not None and not self.recomputed.strip():
             raise ValueError(f"agrees={self.agrees} came with a blank recomputed; say what was computed")
         if self.verdict in _NEEDS_NOTE and not self.note.strip():
@@ -108,6 +116,7 @@ def compare(
     otherwise: Verdict = Verdict.WRONG,
     note: str = "",
     otherwise_note: str | None = None,
+    root: str = "",
 ) -> Finding:
     """Judge a printed statement by comparison with what was recomputed.
 
@@ -115,9 +124,10 @@ def compare(
     ----------
     agrees : outcome of the comparison.
     recomputed : what was computed.
-    otherwise : the verdict where `agrees` is False: TYPO, WRONG, INCONSISTENT or OCR.
+    otherwise : the verdict where `agrees` is False, one of `DISAGREEMENTS`.
     note : goes with either outcome.
     otherwise_note : replaces `note` where `agrees` is False.
+    root : id of the root error, used where `agrees` is False.
 
     Returns
     -------
@@ -126,15 +136,15 @@ def compare(
     Raises
     ------
     TypeError : `agrees` is not a bool.
-    ValueError : `otherwise` is not one of the four.
+    ValueError : `otherwise` is not one of `DISAGREEMENTS`.
     """
-    if otherwise not in _DIFFERS:
+    if otherwise not in DISAGREEMENTS:
         came = otherwise.value if isinstance(otherwise, Verdict) else otherwise
-        raise ValueError(f"otherwise={came!r}; a disagreement is one of {', '.join(v.value for v in _DIFFERS)}")
+        raise ValueError(f"otherwise={came!r}; a disagreement is one of {', '.join(v.value for v in DISAGREEMENTS)}")
     _require_bool("agrees", agrees)
     if agrees:
         return Finding(recomputed, True, Verdict.VERIFIED, note)
-    return Finding(recomputed, False, otherwise, note if otherwise_note is None else otherwise_note)
+    return Finding(recomputed, False, otherwise, note if otherwise_note is None else otherwise_note, root)
 
 
 def answer(holds: bool, recomputed: str, note: str) -> Finding:
@@ -175,105 +185,20 @@ def unverifiable(recomputed: str, note: str) -> Finding:
     return Finding(recomputed, None, Verdict.UNVERIFIABLE, note)
 
 
+def given(note: str) -> Finding:
+    """Record that a statement is a definition, given data or a heading, so that there is nothing to check.
+
+    Parameters
+    ----------
+    note : what it defines or gives.
+
+    Raises
+    ------
+    ValueError : `note` is blank.
+    """
+    return Finding("", None, Verdict.GIVEN, note)
+
+
 def _require_bool(name: str, value: object) -> None:
     if not isinstance(value, bool):
         raise TypeError(f"{name}={value!r} is a {type(value).__name__}; a bool is needed: use bool(...)")
-
-
-def both(place: str) -> tuple[str, str]:
-    """Ids of an entry that both reports have, in ch. II of hung1984 and in ch. III of hung1982."""
-    return f"hung1984.II.{place}", f"hung1982.III.{place}"
-
-
-Check = Callable[[], Finding]
-_C = TypeVar("_C", bound=Check)
-
-
-class Checks(Mapping[str, Check]):
-    """The checks of one topic, by the ids of their ledger entries.
-
-    Examples
-    --------
-    >>> CHECKS = Checks()
-    >>> @CHECKS.add("hung1984.II.eq14", "hung1982.III.eq14")
-    ... def chopping_unit() -> Finding:
-    ...     ratio = 10**-3 / (10**-3 / 2)
-    ...     return compare(ratio == 2, f"{ratio:g}")
-    >>> CHECKS.run("hung1984.II.eq14").verdict
-    <Verdict.VERIFIED: 'verified'>
-    """
-
-    def __init__(self) -> None:
-        self._checks: dict[str, Check] = {}
-
-    def add(self, *ids: str) -> Callable[[_C], _C]:
-        """Register the decorated function as the check of each of `ids`.
-
-        Raises
-        ------
-        TypeError : an id is not a str, there is none (``@CHECKS.add`` without parentheses gives this too), or the
-            function takes arguments.
-        ValueError : an id is blank or has its check already.
-        """
-        if not ids:
-            raise TypeError('add() came without an id; write @CHECKS.add("document.chapter.item")')
-        for key in ids:
-            if not isinstance(key, str):
-                raise TypeError(f'{key!r} is not an id; write @CHECKS.add("document.chapter.item")')
-            if not key.strip():
-                raise ValueError("an id is blank; give the id of a ledger entry")
-
-        def register(check: _C) -> _C:
-            if inspect.signature(check).parameters:
-                raise TypeError(f"{_name(check)} takes arguments; a check is called without any")
-            new: dict[str, Check] = {}
-            for key in ids:
-                other = new.get(key) or self._checks.get(key)
-                if other is not None:
-                    raise ValueError(
-                        f"{key!r} is checked by {_name(other)} and by {_name(check)}; an entry has one check: drop one"
-                    )
-                new[key] = check
-            self._checks.update(new)
-            return check
-
-        return register
-
-    def run(self, key: str) -> Finding:
-        """Run the check of the entry `key`.
-
-        Raises
-        ------
-        KeyError : there is no check of that id.
-        TypeError : the check returned something else than a Finding.
-        """
-        check = self[key]
-        finding = check()
-        if not isinstance(finding, Finding):
-            raise TypeError(
-                f"the check of {key!r}, {_name(check)}, returned {finding!r}; a Finding is needed: "
-                "return compare(...), answer(...) or unverifiable(...)"
-            )
-        return finding
-
-    def __getitem__(self, key: str) -> Check:
-        try:
-            return self._checks[key]
-        except KeyError:
-            raise KeyError(f"no check of {key!r} here; list(checks) gives the {len(self)} ids that have one") from None
-
-    def __contains__(self, key: object) -> bool:
-        return key in self._checks
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._checks)
-
-    def __len__(self) -> int:
-        return len(self._checks)
-
-    def __repr__(self) -> str:
-        return f"Checks({len(self)} ids)"
-
-
-def _name(check: Callable[..., object]) -> str:
-    return f"{check.__module__}.{check.__qualname__}"

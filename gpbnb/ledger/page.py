@@ -1,4 +1,4 @@
-"""The ledger as HTML for the book: plain tables, which the page's script makes searchable, and links to their rows."""
+"""The evidence pages of the book: the ledger page by page, short tables of errors, root errors, and counts."""
 
 from __future__ import annotations
 
@@ -6,121 +6,111 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from importlib import import_module
-from itertools import groupby
 
-from gpbnb.display.tables import POWER, Table, one_line
-from gpbnb.ledger.checking import TOPICS, Row, counts, examine, in_reading_order, load_checks
-from gpbnb.ledger.finding import Verdict
-from gpbnb.ledger.render import OUTCOMES, describe, section_name
-from gpbnb.ledger.statements import Entry, load_inventory
-
-CHAPTERS = {
-    "rounding": "Rounding bounds",
-    "inversion": "Matrix inversion",
-    "kalman": "Kalman bound",
-    "rolling": "Roll and deroll",
-    "integration": "Digital integration error",
-    "budget": "Error budget",
-    "geometry": "Measurement geometry",
-}
-"""Titles of the chapters, by the topic whose checks they show; the page of a topic has its name."""
-
-LEDGER_PAGE = "errata.html"
-_DIFFERS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.TYPO, Verdict.OCR)
-EMPHASIS = re.compile(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])")
-"""What stands between stars in a note."""
-_PAGE_OF = {title: topic for topic, title in CHAPTERS.items()}
+from gpbnb.display.tables import Table
+from gpbnb.ledger.checking import Row, counts, in_reading_order
+from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict
+from gpbnb.ledger.html import CHAPTERS, Html, badge, chapter_link, typeset
+from gpbnb.ledger.render import describe, outcome_name, section_name
+from gpbnb.ledger.roots import by_root, load_roots
+from gpbnb.ledger.statements import Statement
 
 
 @dataclass(frozen=True)
-class Html:
-    """HTML that notebooks show; its short form is plain text.
+class LedgerPage:
+    """A page of the book with a part of the ledger.
 
     Parameters
     ----------
-    title : the short form.
-    html : the content.
+    name : of the page.
+    title : of the page.
+    document : short name of the document.
+    sections : regular expression of the chapter and section, as in ``II.11.2``, of the statements on the page.
     """
 
+    name: str
     title: str
-    html: str
+    document: str
+    sections: str
 
-    def _repr_html_(self) -> str:
-        return self.html
+    def holds(self, statement: Statement) -> bool:
+        """Whether a statement stands on this page."""
+        place = section_name(statement.chapter, statement.section)
+        return statement.document == self.document and re.fullmatch(self.sections, place) is not None
 
-    def __repr__(self) -> str:
-        return f"<{self.title}>"
+
+PAGES = (
+    LedgerPage(
+        "ledger-1984-1", "Report of 1984: rounding and inversion in general", "hung1984", r"I|II\.([1-9]|9\..*|10)"
+    ),
+    LedgerPage("ledger-1984-2", "Report of 1984: inversion by elimination", "hung1984", r"II\.11.*"),
+    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter, roll and deroll", "hung1984", r"II\.1[234]|III.*"),
+    LedgerPage("ledger-1982-1", "Report of 1982: budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"),
+    LedgerPage("ledger-1982-2", "Report of 1982: inversion, filter, geometry", "hung1982", r"III\.1[123].*|IV"),
+    LedgerPage("ledger-2016", "Note of 2016: digital integration", "savage2016", r".*"),
+)
+"""The pages of the complete ledger; each statement is on exactly one of them."""
+
+CLAIMS = {
+    "hung1984.II.eq8": "Unit roundoff of rounding",
+    "hung1984.II.eq18": "Rounding error of a sum",
+    "hung1984.II.eq26": "Rounding error of an inner product",
+    "hung1984.II.eq31": "Rounding error of a product of matrices",
+    "hung1984.II.s10.practicality-of-44": "The residual bound of an inverse is impractical",
+    "hung1984.II.eq96": "Error bound of an inverse by elimination",
+    "hung1984.II.s11-4.table-1-proposed-3-places": "Table 1: bounds of an inverse",
+    "hung1984.II.eq105": "Rounding error of one covariance update",
+    "hung1984.II.eq125": "Rounding error of the Kalman filter after k steps",
+    "hung1984.II.s12.example-9-digits": "Digits needed for a year of Gravity Probe B: 9",
+    "hung1984.II.s12.example-17-digits": "Digits needed for a year of Gravity Probe B: 17",
+    "hung1982.IV.eq8": "Deroll of the first drift",
+    "hung1982.IV.eq9": "Deroll of the second drift",
+    "savage2016.main.eq35": "Random walk of a trapezoidal integrator",
+    "savage2016.main.eq39": "The same for fast sampling",
+}
+"""The principal claims of the documents, by statement id."""
+
+_REPLICATION = {
+    Verdict.VERIFIED: "replicated",
+    Verdict.MISPRINT: "replicated after correcting a misprint",
+    Verdict.OCR: "replicated after correcting the scan",
+    Verdict.INCONSISTENT: "corrected",
+    Verdict.WRONG: "refuted",
+    Verdict.NOT_REPRODUCED: "not reproducible",
+    Verdict.UNVERIFIABLE: "not reproducible",
+}
 
 
 def topics() -> dict[str, str]:
-    """Name the topic that checks each entry, as in ``{"hung1984.II.eq20": "rounding"}``."""
-    return {key: topic.split(".")[-1] for topic in TOPICS for key in import_module(topic).CHECKS}
+    """Name the topic that checks each statement, as in ``{"hung1984.II.eq20": "rounding"}``."""
+    return {key: topic for topic, checks in TOPICS.items() for key in checks}
 
 
-def of_topic(rows: Iterable[Row], topic: str, *verdicts: str) -> tuple[Row, ...]:
-    """Pick the rows that a topic checks, and of these the ones with some verdicts.
-
-    Parameters
-    ----------
-    rows : where from.
-    topic : its name, as in ``rounding``.
-    verdicts : values of `Verdict`; all by default.
-
-    Raises
-    ------
-    ValueError : no such topic, or no such verdict.
-    """
-    owner = topics()
-    if topic not in owner.values():
-        raise ValueError(f"no topic {topic!r}; here are: {', '.join(dict.fromkeys(owner.values()))}")
-    for verdict in verdicts:
-        if verdict not in [known.value for known in Verdict]:
-            raise ValueError(f"no verdict {verdict!r}; here are: {', '.join(known.value for known in Verdict)}")
-    return tuple(row for row in rows if owner.get(row.entry.id) == topic and (not verdicts or row.outcome in verdicts))
+def address(statement: Statement) -> str:
+    """The link to a statement in the complete ledger."""
+    page = next(page for page in PAGES if page.holds(statement))
+    return f"{page.name}.html#{escape(statement.id)}"
 
 
-def of_kind(kind: str) -> tuple[Row, ...]:
-    """Run the checks of all entries of one kind, such as ``open``.
+def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[Row, ...]:
+    """Pick the rows that a topic checks, with some verdicts; with all verdicts by default.
 
     Raises
     ------
-    ExceptionGroup : checks raised.
-    ValueError : there is no entry of that kind.
+    ValueError : no such topic.
     """
-    inventory = load_inventory()
-    chosen = [entry for entry in inventory if entry.kind == kind]
-    if not chosen:
-        raise ValueError(f"no entry of kind {kind!r}; here are: {', '.join({e.kind: 0 for e in inventory})}")
-    return in_reading_order(_checked(chosen, inventory))
-
-
-def of_ids(*ids: str) -> tuple[Row, ...]:
-    """Run the checks of the entries with these ids, in this order.
-
-    Raises
-    ------
-    ExceptionGroup : checks raised.
-    KeyError : the inventory has no such id.
-    """
-    inventory = load_inventory()
-    by_id = {entry.id: entry for entry in inventory}
-    for key in ids:
-        if key not in by_id:
-            raise KeyError(f"no entry {key!r} in the inventory; correct the id")
-    return _checked([by_id[key] for key in ids], inventory)
-
-
-def _checked(chosen: Sequence[Entry], inventory: Sequence[Entry]) -> tuple[Row, ...]:
-    found = examine(chosen, load_checks(inventory))
-    errors = list(dict.fromkeys(row.error for row in found if row.error))
-    if errors:
-        raise ExceptionGroup(f"checks of {sum(row.error is not None for row in found)} entries failed", errors)
-    return found
+    if topic not in TOPICS:
+        raise ValueError(f"no topic {topic!r}; the topics are {', '.join(TOPICS)}")
+    return tuple(
+        row
+        for row in rows
+        if row.statement.id in TOPICS[topic] and (not verdicts or (row.finding and row.finding.verdict in verdicts))
+    )
 
 
 def count_table(rows: Iterable[Row], by: str) -> Table:
-    """Tabulate the counts of `rows`: a line a document, chapter or kind, a column an outcome, and the sums.
+    """Tabulate the counts of `rows`: a line per document, chapter of this book or kind, and a column per verdict.
 
     Parameters
     ----------
@@ -134,9 +124,9 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
     rows = in_reading_order(rows)
     owner = topics()
     groups: dict[str, Callable[[Row], str]] = {
-        "document": lambda row: row.entry.document,
-        "chapter": lambda row: _title(owner.get(row.entry.id, "-")),
-        "kind": lambda row: row.entry.kind,
+        "document": lambda row: row.statement.document,
+        "chapter": lambda row: CHAPTERS.get(owner.get(row.statement.id, ""), "-"),
+        "kind": lambda row: row.statement.kind,
     }
     if by not in groups:
         raise ValueError(f"by={by!r}; take one of {', '.join(groups)}")
@@ -149,129 +139,154 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
         for name, some in inside.items()
     ]
     body.append(("all", *map(str, total.values()), str(len(rows))))
-    header = (by.capitalize(), *map(_label, total), "entries")
-    return Table(f"Counts of {len(rows)} entries by {by}", header, tuple(body))
+    header = (by.capitalize(), *map(outcome_name, total), "statements")
+    return Table(f"Counts of {len(rows)} statements by {by}", header, tuple(body))
 
 
-def told(rows: Iterable[Row], *ids: str) -> tuple[Row, ...]:
-    """Pick errors by their ids, in the order given; a text about errors breaks when one is none any more.
+def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
+    """Lay out one page of the complete ledger: a form with filters, and a row per statement.
 
-    Raises
-    ------
-    KeyError : an id is not among `rows`.
-    ValueError : print and recomputation of one of them do not differ.
+    The form is hidden until the page's script, ``ledger.js``, shows and serves it.
     """
-    by_id = {row.entry.id: row for row in rows}
-    picked = []
-    for key in ids:
-        if key not in by_id:
-            raise KeyError(f"no row {key!r} among the {len(by_id)} given; correct the id")
-        row = by_id[key]
-        if row.finding is None or row.finding.verdict not in _DIFFERS:
-            raise ValueError(f"{key} is {row.outcome}, no error; change the text that names it as one")
-        picked.append(row)
-    return tuple(picked)
-
-
-def searchable(rows: Iterable[Row]) -> Html:
-    """Lay out the ledger: a table a chapter of a document, each row under its entry's id.
-
-    The form above the tables is hidden until the page's script, ``ledger.js``, shows and serves it.
-    """
-    rows = in_reading_order(rows)
+    rows = in_reading_order(row for row in rows if page.holds(row.statement))
     owner = topics()
-    tables = [
-        _part(document, chapter, tuple(inside), owner)
-        for (document, chapter), inside in groupby(rows, lambda row: (row.entry.document, row.entry.chapter))
+    lines = [_entry(row, owner) for row in rows]
+    caption = f"<caption>{escape(page.document)}: {len(rows)} statements</caption>\n"
+    table = _table(("Statement", "Verdict", "Evidence"), lines, caption)
+    html = f'<div class="ledger">\n{_form(rows, owner)}\n{table}</div>'
+    return Html(f"Ledger of {len(rows)} statements: {describe(counts(rows)) or 'none'}", html)
+
+
+def error_table(rows: Iterable[Row]) -> Html:
+    """Tabulate the statements that disagree, the most serious first: place, verdict, what is wrong."""
+    found = [
+        (row, row.finding) for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS
     ]
-    html = f'<div class="ledger">\n{_form(rows, owner)}\n{"".join(tables)}</div>'
-    return Html(f"Searchable ledger of {len(rows)} entries: {describe(counts(rows)) or 'none'}", html)
+    found.sort(key=lambda pair: DISAGREEMENTS.index(pair[1].verdict))
+    lines = [
+        f'<tr><th scope="row">{_link(row)}</th><td>{badge(row.outcome)}</td>'
+        f"<td><p>{typeset(finding.note or finding.recomputed)}</p>{_root(finding)}</td></tr>"
+        for row, finding in found
+    ]
+    return Html(f"{len(found)} statements that disagree", _wrapped(("Statement", "Verdict", "What is wrong"), lines))
 
 
-def links(rows: Iterable[Row]) -> Html:
-    """List `rows` as links to their places in the complete ledger."""
-    rows = in_reading_order(rows)
-    parts = []
-    for (document, chapter), inside in groupby(rows, lambda row: (row.entry.document, row.entry.chapter)):
-        every = ", ".join(f'<a href="{_address(row.entry)}">{_text(row.entry.item)}</a>' for row in inside)
-        parts.append(f"<li>{escape(_document(document, chapter))}: {every}</li>")
-    return Html(
-        f"Links to {len(rows)} entries: {describe(counts(rows)) or 'none'}",
-        f'<ul class="ledger-links">\n{chr(10).join(parts)}\n</ul>',
-    )
-
-
-def brief(rows: Iterable[Row], left_undone: bool = False) -> Html:
-    """Tabulate some rows, in their order, with links to their places in the complete ledger.
+def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
+    """Tabulate some rows in reading order: place, verdict, printed text, recomputation and note.
 
     Parameters
     ----------
     rows : which.
-    left_undone : whether to call the columns as for what the documents leave undone.
+    left_undone : label the texts as what the documents leave undone and what is answered here.
     """
-    rows = tuple(rows)
+    rows = in_reading_order(rows)
+    owner = topics()
+    lines = [
+        f'<tr><th scope="row">{_link(row)}</th><td>{badge(row.outcome)}</td>{_evidence(row, owner)}</tr>'
+        for row in rows
+    ]
+    classes = "ledger-undone" if left_undone else ""
+    return Html(f"{len(rows)} statements", _wrapped(("Statement", "Verdict", "Evidence"), lines, classes))
+
+
+def root_table(rows: Iterable[Row]) -> Html:
+    """Tabulate the root errors, those that spoil most statements first: the mistake, the reason, and the statements."""
+    roots = load_roots()
+    found = sorted(by_root(rows).items(), key=lambda item: -len(item[1]))
+    lines = []
+    for key, spoiled in found:
+        places = ", ".join(map(_link, in_reading_order(spoiled)))
+        lines.append(
+            f'<tr id="root-{escape(key)}"><th scope="row">{typeset(roots[key].title)}</th><td>{len(spoiled)}</td>'
+            f'<td><p>{typeset(roots[key].explanation)}</p><p class="spoils">{places}</p></td></tr>'
+        )
+    return Html(
+        f"{len(found)} root errors", _wrapped(("Root error", "Statements", "Why, and where"), lines, "ledger-roots")
+    )
+
+
+def claim_table(rows: Iterable[Row]) -> Html:
+    """Tabulate the principal claims of the documents: replicated, corrected, refuted or not reproducible."""
+    by_id = {row.statement.id: row for row in rows}
     owner = topics()
     lines = []
-    for row in rows:
-        entry = row.entry
-        place = section_name(entry.chapter, entry.section)
-        item = f'<a href="{_address(entry)}">{_text(entry.item)}</a><br>{entry.document}, {escape(place)}'
-        lines.append(_line("<tr>", item, row, owner))
-    content = _table("ledger-table ledger-undone" if left_undone else "ledger-table", "", lines, left_undone)
-    return Html(f"{len(rows)} entries: {describe(counts(rows)) or 'none'}", f'<div class="ledger">\n{content}</div>')
-
-
-def _part(document: str, chapter: str, rows: Sequence[Row], owner: dict[str, str]) -> str:
-    lines = []
-    for row in rows:
-        entry = row.entry
-        start = (
-            f'<tr id="{escape(entry.id)}" data-kind="{entry.kind}" data-verdict="{escape(_outcome(row))}" '
-            f'data-chapter="{owner.get(entry.id, "")}">'
+    for key, claim in CLAIMS.items():
+        row = by_id[key]
+        outcome = _REPLICATION[row.finding.verdict] if row.finding else row.outcome
+        text = typeset(row.statement.printed)
+        lines.append(
+            f'<tr><th scope="row">{escape(claim)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
+            f"<td><p>{text}</p><p>{chapter_link(owner[key])}</p></td></tr>"
         )
-        section = section_name(entry.chapter, entry.section)
-        item = f'<a href="#{escape(entry.id)}">{_text(entry.item)}</a><br>{escape(section)}, {entry.kind}'
-        lines.append(_line(start, item, row, owner))
-    number = f"{len(rows)} {'entry' if len(rows) == 1 else 'entries'}"
-    caption = f"<caption>{escape(_document(document, chapter))}: {number}</caption>\n"
-    return _table(f'ledger-table" data-document="{document}" data-part="{escape(chapter)}', caption, lines)
+    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "As printed, and where it is examined"), lines))
 
 
-def _table(classes: str, caption: str, lines: Sequence[str], left_undone: bool = False) -> str:
-    content = "Left undone, and our answer" if left_undone else "Printed, recomputed, and note"
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("Item", "Verdict", content))
+def _link(row: Row) -> str:
+    statement = row.statement
+    place = section_name(statement.chapter, statement.section)
+    link = f'<a href="{address(statement)}">{typeset(statement.item)}</a>'
+    return f"{link} <small>{statement.document}, {escape(place)}</small>"
+
+
+def _entry(row: Row, owner: dict[str, str]) -> str:
+    statement = row.statement
+    section = section_name(statement.chapter, statement.section)
+    outcome = escape(outcome_name(row.outcome))
     return (
-        f'<table class="{classes}">\n{caption}<thead><tr>{head}</tr></thead>\n'
+        f'<tr id="{escape(statement.id)}" data-kind="{statement.kind}" data-verdict="{outcome}" '
+        f'data-chapter="{owner.get(statement.id, "")}"><th scope="row"><a href="#{escape(statement.id)}">'
+        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}</th>"
+        f"<td>{badge(outcome_name(row.outcome))}</td>"
+        f"{_evidence(row, owner)}</tr>"
+    )
+
+
+def _evidence(row: Row, owner: dict[str, str]) -> str:
+    found, note, root = "", "", ""
+    if row.finding:
+        found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
+    topic = owner.get(row.statement.id, "")
+    link = chapter_link(topic) if topic in CHAPTERS else ""
+    named = (("printed", typeset(row.statement.printed)), ("recomputed", found), ("note", note), ("see", link))
+    texts = "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
+    return f"<td>{texts}{root}</td>"
+
+
+def _root(finding: Finding) -> str:
+    if not finding.root:
+        return ""
+    title = typeset(load_roots()[finding.root].title)
+    return f'<p class="root"><a href="errata.html#root-{escape(finding.root)}">{title}</a></p>'
+
+
+def _wrapped(header: Sequence[str], lines: Sequence[str], classes: str = "") -> str:
+    return f'<div class="ledger">\n{_table(header, lines, classes=classes)}</div>'
+
+
+def _table(header: Sequence[str], lines: Sequence[str], caption: str = "", classes: str = "") -> str:
+    head = "".join(f'<th scope="col">{name}</th>' for name in header)
+    return (
+        f'<table class="{f"ledger-table {classes}".strip()}">\n{caption}<thead><tr>{head}</tr></thead>\n'
         f"<tbody>\n{chr(10).join(lines)}\n</tbody>\n</table>\n"
     )
 
 
-def _line(start: str, item: str, row: Row, owner: dict[str, str]) -> str:
-    """Write a row; what was printed, what was recomputed, and the note, with the chapter, share a wide cell."""
-    found, note = (_text(row.finding.recomputed), _text(row.finding.note)) if row.finding else ("", "")
-    topic = owner.get(row.entry.id, "")
-    link = _chapter_link(CHAPTERS[topic]) if topic in CHAPTERS else ""
-    if link not in note:
-        note = f"{note} [{link}]" if note else f"[{link}]"
-    named = (("printed", _text(row.entry.printed)), ("recomputed", found), ("note", note))
-    content = "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
-    return f'{start}<th scope="row">{item}</th><td>{escape(_outcome(row))}</td><td>{content}</td></tr>'
-
-
 def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
-    def options(values: Sequence[str], name: Callable[[str], str] = str) -> str:
-        there = {value: values.count(value) for value in values if value}
-        every = "".join(f'<option value="{escape(v)}">{escape(name(v))} ({n})</option>' for v, n in there.items())
+    def options(values: Iterable[str], name: Callable[[str], str] = str) -> str:
+        values = [value for value in values if value]
+        every = "".join(
+            f'<option value="{escape(v)}">{escape(name(v))} ({values.count(v)})</option>' for v in dict.fromkeys(values)
+        )
         return f'<option value="">all</option>{every}'
 
-    parts = [f"{row.entry.document} {row.entry.chapter}" for row in rows]
-    documents = options([row.entry.document for row in rows])
-    chapters = options(parts, lambda part: _document(*part.split(" ", 1)))
+    in_order = [outcome_name(outcome) for outcome in counts(rows) for row in rows if row.outcome == outcome]
     selects = {
-        "document": ("Document", documents + chapters.removeprefix('<option value="">all</option>')),
-        "verdict": ("Verdict", options([o for o in map(_label, counts(rows)) for row in rows if _outcome(row) == o])),
-        "kind": ("Kind", options(sorted(row.entry.kind for row in rows))),
-        "chapter": ("Chapter of this book", options([owner.get(row.entry.id, "") for row in rows], _title)),
+        "verdict": ("Verdict", options(in_order)),
+        "kind": ("Kind", options(sorted(row.statement.kind for row in rows))),
+        "chapter": (
+            "Chapter of this book",
+            options((owner.get(r.statement.id, "") for r in rows), lambda t: CHAPTERS[t]),
+        ),
     }
     labels = "".join(
         f'<label>{label} <select name="{name}" autocomplete="off">{choice}</select></label>\n'
@@ -283,47 +298,3 @@ def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
         f'{labels}<button type="button">Show all</button>\n'
         '<output role="status" aria-live="polite"></output>\n</form>'
     )
-
-
-def _document(document: str, chapter: str) -> str:
-    return document if chapter == "-" else f"{document}, ch. {chapter}"
-
-
-def _address(entry: Entry) -> str:
-    return f"{LEDGER_PAGE}#{escape(entry.id)}"
-
-
-def _title(topic: str) -> str:
-    return CHAPTERS.get(topic, topic)
-
-
-def _label(outcome: str) -> str:
-    return OUTCOMES.get(outcome, outcome)
-
-
-def _outcome(row: Row) -> str:
-    return _label(row.outcome)
-
-
-def _chapter_link(title: str) -> str:
-    return f'<a href="{_PAGE_OF[title]}.html">{title}</a>'
-
-
-def _text(text: str) -> str:
-    r"""Turn prose with math between dollar signs into HTML; a chapter's title between stars becomes a link."""
-    parts = one_line(text).split("$")
-    prose = [POWER.sub(_power, escape(part, quote=False)) for part in parts[::2]]
-    parts[::2] = [EMPHASIS.sub(_emphasis, part) for part in prose]
-    parts[1::2] = [
-        rf'<span class="math notranslate nohighlight">\({escape(math, quote=False)}\)</span>' for math in parts[1::2]
-    ]
-    return "".join(parts)
-
-
-def _power(match: re.Match[str]) -> str:
-    exponent = str(int(match[2])).replace("-", "−")
-    return f"{match[1]}&nbsp;×&nbsp;10<sup>{exponent}</sup>"
-
-
-def _emphasis(match: re.Match[str]) -> str:
-    return _chapter_link(match[1]) if match[1] in _PAGE_OF else f"<em>{match[1]}</em>"

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from gpbnb.display.tables import Table, one_line
 from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order, summary
-from gpbnb.ledger.statements import Entry
+from gpbnb.ledger.statements import Statement
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
 _AGREES = {True: "true", False: "false", None: ""}
@@ -37,8 +37,8 @@ def to_text(rows: Iterable[Row]) -> str:
     lines = []
     for row in rows:
         found = (row.finding.recomputed, row.finding.note) if row.finding else ()
-        cells = (row.entry.id, *filter(None, map(one_line, found)))
-        lines.append(f"{_outcome(row):<12}  {'  '.join(cells)}\n")
+        cells = (row.statement.id, *filter(None, map(one_line, found)))
+        lines.append(f"{outcome_name(row.outcome):<12}  {'  '.join(cells)}\n")
     return "".join(lines)
 
 
@@ -48,7 +48,7 @@ def to_markdown(rows: Iterable[Row]) -> str:
 
 
 def _record(row: Row) -> tuple[str, str, str, str, str, bool | None, str | None, str]:
-    entry, finding = row.entry, row.finding
+    entry, finding = row.statement, row.finding
     head = (entry.id, entry.document, entry.kind, entry.printed)
     if finding is None:
         return (*head, "", None, None, "")
@@ -60,9 +60,9 @@ def table(rows: Iterable[Row]) -> Table:
     rows = in_reading_order(rows)
     body = tuple(
         (
-            _place(row.entry),
-            _outcome(row),
-            row.entry.printed,
+            _place(row.statement),
+            outcome_name(row.outcome),
+            row.statement.printed,
             row.finding.recomputed if row.finding else "",
             row.finding.note if row.finding else "",
         )
@@ -85,7 +85,7 @@ def summary_table(rows: Iterable[Row]) -> Table:
         for place, inside in summary(rows).items()
     ]
     body.append(("all", "", *map(str, total.values()), str(len(rows))))
-    header = ("Document", "Section", *(OUTCOMES.get(outcome, outcome) for outcome in total), "entries")
+    header = ("Document", "Section", *(outcome_name(outcome) for outcome in total), "statements")
     return Table(f"{_title(rows)}; by section", header, tuple(body))
 
 
@@ -94,15 +94,16 @@ def describe(counted: dict[str, int]) -> str:
     return ", ".join(f"{number} {OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
 
 
-def _outcome(row: Row) -> str:
-    return OUTCOMES.get(row.outcome, row.outcome)
+def outcome_name(outcome: str) -> str:
+    """Write an outcome in words: a verdict, ``no check`` or ``check failed``."""
+    return OUTCOMES.get(outcome, outcome)
 
 
 def _title(rows: tuple[Row, ...]) -> str:
-    return f"Ledger of {len(rows)} entries: {describe(counts(rows)) or 'none'}"
+    return f"Ledger of {len(rows)} statements: {describe(counts(rows)) or 'none'}"
 
 
-def _place(entry: Entry) -> str:
+def _place(entry: Statement) -> str:
     return f"{entry.document}, {section_name(entry.chapter, entry.section)}: {entry.item}"
 
 

@@ -1,20 +1,30 @@
-"""What the documents print: the list of entries, as package data."""
+"""The printed statements of the three documents, read from ``statements.csv``."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+import re
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
+from fractions import Fraction
+from functools import cache, cached_property
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from typing import Any, TypeVar
+
+import sympy as sp
+
+from gpbnb.ledger.formula import Link, Number, Part, Relation, Words, read
+
+_L = TypeVar("_L", Number, Words)
 
 DOCUMENTS = ("hung1984", "hung1982", "savage2016")
 KINDS = ("equation", "number", "example", "claim", "figure", "table", "open")
 
 
 @dataclass(frozen=True)
-class Entry:
+class Statement:
     """One printed statement.
 
     Parameters
@@ -24,7 +34,8 @@ class Entry:
     chapter, section : as numbered there; ``-`` where the document has none.
     item : what it is called there, as in ``eq (20)``.
     kind : one of `KINDS`.
-    printed : what is printed; prose with math between single dollar signs.
+    text : the printed text, with math between single dollar signs; ``{{1}}`` stands for the first part of the form.
+    form : the machine-readable form, see :mod:`gpbnb.ledger.formula`; empty where there is none.
     """
 
     id: str
@@ -33,13 +44,69 @@ class Entry:
     section: str
     item: str
     kind: str
-    printed: str
+    text: str
+    form: str = ""
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts of the machine-readable form."""
+        return read(self.form)
+
+    @cached_property
+    def printed(self) -> str:
+        """The printed text with its formulas typeset from the machine-readable form."""
+        return _PLACE.sub(lambda place: self.parts[int(place[1]) - 1].markdown(), self.text)
+
+    def relation(self, number: int = 1) -> Relation:
+        """The relation with this number among the relations of the form, counted from 1.
+
+        Raises
+        ------
+        LookupError : the form has no such relation.
+        """
+        relations = [part for part in self.parts if isinstance(part, Relation)]
+        if not 1 <= number <= len(relations):
+            raise LookupError(f"{self.id} has {len(relations)} relations; got number {number}")
+        return relations[number - 1]
+
+    def links(
+        self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
+    ) -> tuple[Link, ...]:
+        """Evaluate all comparisons of all relations; parameters as for :meth:`gpbnb.ledger.formula.Relation.links`."""
+        relations = [part for part in self.parts if isinstance(part, Relation)]
+        return tuple(link for relation in relations for link in relation.links(names, number))
+
+    def number(self, label: str) -> Number:
+        """The printed number with this label.
+
+        Raises
+        ------
+        LookupError : the form has no such number.
+        """
+        return self._labelled(Number, label)
+
+    def says(self, label: str) -> str:
+        """The phrase that the document prints for this label.
+
+        Raises
+        ------
+        LookupError : the form has no such phrase.
+        """
+        return self._labelled(Words, label).printed
+
+    def _labelled(self, sort: type[_L], label: str) -> _L:
+        for part in self.parts:
+            if isinstance(part, sort) and part.label == label:
+                return part
+        labels = ", ".join(part.label for part in self.parts if isinstance(part, sort)) or "none"
+        raise LookupError(f"{self.id} has no {sort.__name__.lower()} {label!r}; it has: {labels}")
 
 
-HEADER = tuple(field.name for field in fields(Entry))
+_PLACE = re.compile(r"\{\{(\d+)\}\}")
+HEADER = tuple(field.name for field in fields(Statement))
 
 
-def load_inventory(source: Traversable | None = None) -> tuple[Entry, ...]:
+def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
     """Read and validate the inventory.
 
     Parameters
@@ -61,7 +128,7 @@ def load_inventory(source: Traversable | None = None) -> tuple[Entry, ...]:
     except UnicodeDecodeError as error:
         raise ValueError(f"{source.name} is not UTF-8 ({error}); save it as UTF-8") from error
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
-    entries: list[Entry] = []
+    entries: list[Statement] = []
     seen: dict[str, int] = {}
     try:
         header = next(reader, [])
@@ -80,25 +147,34 @@ def load_inventory(source: Traversable | None = None) -> tuple[Entry, ...]:
     return tuple(entries)
 
 
-def quote(key: str) -> str:
-    """What the entry `key` of the package's inventory prints.
+@cache
+def _by_id() -> dict[str, Statement]:
+    return {each.id: each for each in load_statements()}
+
+
+def statement(key: str) -> Statement:
+    """The statement with the id `key`.
 
     Raises
     ------
-    KeyError : the inventory has no such id.
+    KeyError : there is no statement with this id.
     """
-    for entry in load_inventory():
-        if entry.id == key:
-            return entry.printed
-    raise KeyError(f"no entry {key!r} in the inventory; correct the id")
+    if key not in _by_id():
+        raise KeyError(f"no statement {key!r} in statements.csv; correct the id")
+    return _by_id()[key]
 
 
-def _entry(record: list[str]) -> Entry:
+def quote(key: str) -> str:
+    """The printed text of the statement `key`; KeyError as for :func:`statement`."""
+    return statement(key).printed
+
+
+def _entry(record: list[str]) -> Statement:
     if len(record) != len(HEADER):
         raise ValueError(f"{len(record)} fields; {len(HEADER)} are needed: quote a field that holds a comma")
-    entry = Entry(*record)
+    entry = Statement(*record)
     for name, value in zip(HEADER, record, strict=True):
-        if not value or value != value.strip():
+        if (not value and name != "form") or value != value.strip():
             raise ValueError(f"{name}={value!r} is blank or has blanks at an end; fill it in, '-' where there is none")
     if entry.document not in DOCUMENTS:
         raise ValueError(f"unknown document {entry.document!r}; take one of {', '.join(DOCUMENTS)}")
@@ -106,17 +182,21 @@ def _entry(record: list[str]) -> Entry:
         raise ValueError(f"unknown kind {entry.kind!r}; take one of {', '.join(KINDS)}")
     if not entry.id.startswith(f"{entry.document}."):
         raise ValueError(f"id {entry.id!r} does not begin with its document; write '{entry.document}.…'")
-    if entry.printed.count("$") % 2 or "$$" in entry.printed:
-        raise ValueError(f"printed={entry.printed!r} has an unpaired or doubled dollar sign; write math as $...$")
+    if entry.text.count("$") % 2 or "$$" in entry.text:
+        raise ValueError(f"text={entry.text!r} has an unpaired or doubled dollar sign; write math as $...$")
+    for place in _PLACE.findall(entry.text):
+        if not 1 <= int(place) <= len(entry.parts):
+            raise ValueError(f"text has the place {{{{{place}}}}}, but the form has {len(entry.parts)} parts")
+    _ = entry.parts, entry.printed
     return entry
 
 
 def select(
-    entries: Iterable[Entry],
+    entries: Iterable[Statement],
     document: str | None = None,
     chapter: str | None = None,
     sections: str | Iterable[str | int] | None = None,
-) -> tuple[Entry, ...]:
+) -> tuple[Statement, ...]:
     """Pick the entries of a document, a chapter, some sections.
 
     Parameters
@@ -143,7 +223,7 @@ def select(
     return found
 
 
-def _keep(entries: tuple[Entry, ...], field: str, value: str) -> tuple[Entry, ...]:
+def _keep(entries: tuple[Statement, ...], field: str, value: str) -> tuple[Statement, ...]:
     kept = tuple(
         entry
         for entry in entries

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import column_sum_norm, integers
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, integers
 from gpbnb.rounding import theory
 
 Bounds = Mapping[str, Callable[[], Fraction]]

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.arithmetic.bounds import column_sum_norm
 from gpbnb.arithmetic.formats import Rounding
+from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
 from gpbnb.display.tables import digits
 from gpbnb.rounding import theory

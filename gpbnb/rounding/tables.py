@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import exact
+from gpbnb.arithmetic.rational import exact
 from gpbnb.display.tables import Table, digits
 from gpbnb.rounding.experiment import Trial
 from gpbnb.rounding.experiment import tally as count

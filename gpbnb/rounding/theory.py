@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, gamma, gamma_probabilistic, integers
+from gpbnb.arithmetic.bounds import gamma, gamma_probabilistic
+from gpbnb.arithmetic.rational import column_sum_norm, exact, integers
 
 # -- sums: errors in the units of the terms -------------------------------------------------------
 

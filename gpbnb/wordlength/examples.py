@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.experiment import Simulation
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import Simulation
 
 #: The states of :func:`tilt`, and their units.
 TILT_STATES = (("tilt", "°"), ("rate", "°/s"), ("gyro bias", "°/s"))
@@ -28,7 +28,7 @@ STANDARD = {
 ACCELERATORS = {"bfloat16": FloatFormat(2, 8), "TF32": FloatFormat(2, 11)}
 
 #: Least and largest powers of two of their normal numbers; IEEE 754-2019, table 3.5, for the standard ones.
-NORMAL = {
+NORMAL_RANGE = {
     "binary16": (-14, 15),
     "binary32": (-126, 127),
     "binary64": (-1022, 1023),
@@ -37,7 +37,7 @@ NORMAL = {
 }
 
 
-def tilt(wander: str = "1e-10") -> LinearModel:
+def tilt(bias_walk: str = "1e-10") -> LinearModel:
     """A tilt filter of a balancing robot or a camera, 100 steps a second: n = 3, m = 2.
 
     It merges a gyroscope, which shows rate plus bias with 0.05 °/s rms, and an accelerometer, which shows the tilt with
@@ -45,12 +45,12 @@ def tilt(wander: str = "1e-10") -> LinearModel:
 
     Parameters
     ----------
-    wander : variance by which the bias moves in a step, (°/s)².
+    bias_walk : variance by which the bias moves in a step, (°/s)².
     """
     return LinearModel(
         Phi=exact([["1", "0.01", "0"], ["0", "0.98", "0"], ["0", "0", "1"]]),
         H=exact([["0", "1", "1"], ["1", "0", "0"]]),
-        Q=exact([["0", "0", "0"], ["0", "4", "0"], ["0", "0", wander]]),
+        Q=exact([["0", "0", "0"], ["0", "4", "0"], ["0", "0", bias_walk]]),
         R=exact([["0.0025", "0"], ["0", "4"]]),
         x0=exact(["0", "0", "0"]),
         P0=exact([["100", "0", "0"], ["0", "400", "0"], ["0", "0", "1"]]),
@@ -75,8 +75,8 @@ def altimeter(more: str = "0") -> LinearModel:
     """
     step, push = Fraction(1, 50), exact(["1/5000", "1/50", "0"])
     Q = np.multiply.outer(push, push) * Fraction("0.35") ** 2
-    for i, wander in enumerate(("0", "0", "1e-8")):
-        Q[i, i] += Fraction(wander) + Fraction(more)
+    for i, random_walk in enumerate(("0", "0", "1e-8")):
+        Q[i, i] += Fraction(random_walk) + Fraction(more)
     return LinearModel(
         Phi=exact([["1", step, -step * step / 2], ["0", "1", -step], ["0", "0", "1"]]),
         H=exact([["1", "0", "0"]]),
@@ -106,7 +106,7 @@ def tracker(origin: str = "0") -> LinearModel:
     )
 
 
-def precise() -> LinearModel:
+def precise_tracker() -> LinearModel:
     """A tracker whose sensor is far better than what is known at first: variances of 1e-12 and 1e4; n = 2, m = 1."""
     return LinearModel(
         Phi=exact([["1", "0.1"], ["0", "1"]]),

@@ -19,7 +19,7 @@ KINDS = {
     "bound": ("|", BOUND, BOUND),
     "theory": ("D", STRICT, STRICT),
     "printed": ("o", BOUND, "none"),
-    "mended": ("s", STRICT, "none"),
+    "corrected": ("s", STRICT, "none"),
 }
 Curve = Sequence[tuple[int, float]]
 
@@ -42,7 +42,7 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
 
 
 def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
-    """Error (points) and bound (lines) over the goal against the bits, a colour a form; infinities are left out."""
+    """Error (points) and bound (lines) over the tolerance against the bits, one colour per form, finite values only."""
     artists: list[Artist] = []
     for (name, curve), (marker, colour) in zip(emulated.items(), looks(len(emulated), "os^Dv"), strict=True):
         points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]
@@ -50,11 +50,11 @@ def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes
         lines = [(t, ratio) for t, ratio in bounded.get(name, ()) if ratio < math.inf]
         if lines:
             artists += ax.plot(*zip(*lines, strict=True), "-", color=colour, label=f"{name}, bound")
-    artists.append(ax.axhline(1, color=REFERENCE, ls="--", label="goal"))
+    artists.append(ax.axhline(1, color=REFERENCE, ls="--", label="tolerance"))
     ax.set_yscale("log")
     artists += standards(ax)
     legend(ax, fontsize=8.5)
-    label(ax, "bits", "error or bound, over the goal")
+    label(ax, "bits", "error or bound, over the tolerance")
     return artists
 
 
@@ -68,7 +68,7 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
     ax.set_xscale("log")
     artists += standards(ax, upright=False)
     legend(ax, fontsize=8.5)
-    label(ax, "steps $k$", "bits for the goal")
+    label(ax, "steps $k$", "bits for the tolerance")
     return artists
 
 

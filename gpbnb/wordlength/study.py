@@ -13,33 +13,38 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion.bounds import column_sum, rationals, smallest_precision, true_inverse
-from gpbnb.kalman.experiment import Followed, Form, Run, compare_runs, log_spaced, reference
+from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+from gpbnb.inversion.bounds import smallest_precision
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.contraction import companion_bound
+from gpbnb.kalman.emulation import compare_runs
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision
-from gpbnb.kalman.theory import coefficients, companion_bound
-from gpbnb.kalman.theory import required_precision as digits_of_125
+from gpbnb.kalman.report_bounds import coefficients, precision_for_coefficient
 from gpbnb.kalman.year import Year
 
 
-def printed_precision(k: int, n: int, m: int, goal: Fraction, size: Fraction, base: int = 2, **faults: bool) -> int:
-    r"""Digits that (125) asks for when :math:`\|x_k\| = B` = size, for an error of `goal`.
+def printed_precision(
+    k: int, n: int, m: int, tolerance: Fraction, size: Fraction, base: int = 2, **faults: bool
+) -> int:
+    r"""Digits that (125) asks for when :math:`\|x_k\| = B` = size, for an error of `tolerance`.
 
     Parameters
     ----------
-    goal, size : in one unit. faults : of :func:`gpbnb.kalman.theory.coefficients`, which mend (125).
+    tolerance, size : in one unit. faults : of :func:`gpbnb.kalman.report_bounds.coefficients`, which correct (125).
 
     References
     ----------
     hung1984, ch. II, eq. (125) and the example of section 12.
     """
-    return digits_of_125(sum(coefficients(k, n, m, **faults)), goal / size, base)
+    return precision_for_coefficient(sum(coefficients(k, n, m, **faults)), tolerance / size, base)
 
 
-def growth(
-    model: LinearModel, z: NDArray[Any], goal: float | Sequence[float], steps: Sequence[int], **options: Any
+def required_precision_by_steps(
+    model: LinearModel, z: NDArray[Any], tolerance: float | Sequence[float], steps: Sequence[int], **options: Any
 ) -> tuple[Requirement, ...]:
     """What :func:`gpbnb.kalman.precision.required_precision` answers for the first few steps, and for more of them.
 
@@ -53,7 +58,7 @@ def growth(
     """
     if not all(1 <= k <= len(z) for k in steps):
         raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
-    return tuple(required_precision(_first(model, k), k, goal, z=z[:k], **options) for k in steps)
+    return tuple(required_precision(_first(model, k), k, tolerance, z=z[:k], **options) for k in steps)
 
 
 def _first(model: LinearModel, steps: int) -> LinearModel:
@@ -62,8 +67,8 @@ def _first(model: LinearModel, steps: int) -> LinearModel:
     return replace(model, **cut)
 
 
-def years_needed(runs: Sequence[Year], goal: float) -> tuple[tuple[int, int], ...]:
-    """Steps, and the fewest digits of the runs with which drift (mas) and rate (mas/yr) stay within `goal` until then.
+def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int, int], ...]:
+    """For each step, the fewest digits of the runs that keep drift (mas) and rate (mas/yr) within `tolerance` so far.
 
     Raises
     ------
@@ -76,12 +81,12 @@ def years_needed(runs: Sequence[Year], goal: float) -> tuple[tuple[int, int], ..
     for run in runs:
         errors = np.maximum.accumulate(np.abs(np.hstack([run.drift, run.rate])).max(axis=1))
         for step, error in zip(run.steps.tolist(), errors.tolist(), strict=True):
-            if error <= goal:
+            if error <= tolerance:
                 found[step] = min(found.get(step, run.case.precision), run.case.precision)
     return tuple(sorted(found.items()))
 
 
-class Span(NamedTuple):
+class BinaryRange(NamedTuple):
     """Powers of two between which the magnitudes of numbers lie, zeros aside."""
 
     name: str
@@ -89,38 +94,45 @@ class Span(NamedTuple):
     largest: int
 
 
-def spans(model: LinearModel, z: NDArray[Any]) -> tuple[Span, ...]:
+def binary_ranges(model: LinearModel, z: NDArray[Any]) -> tuple[BinaryRange, ...]:
     """Of a filter's model, and its estimates, gains and covariances after sixteen steps a decade."""
-    kept = reference(model, z, log_spaced(len(z), 16))
-    told = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
-    numbers = {"model": told, "estimate": kept.x, "gain": kept.K, "covariance": kept.P}
+    checkpoints = reference(model, z, log_spaced(len(z), 16))
+    given = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
+    numbers = {"model": given, "estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
     result = []
     for name, values in numbers.items():
         powers = [math.frexp(abs(float(value)))[1] - 1 for value in values.ravel() if value]
-        result.append(Span(name, min(powers), max(powers)))
+        result.append(BinaryRange(name, min(powers), max(powers)))
     return tuple(result)
 
 
-class Deafness(NamedTuple):
-    """What few digits do to one state: its last variance over the true one; the share of the last steps in which its
-    estimate did not move at all; and the largest error of the first state.
+class UpdateStagnation(NamedTuple):
+    """Effect of few digits on one state, whose updates may round to nothing.
+
+    Parameters
+    ----------
+    variance : its last computed variance over the true one.
+    unchanged : share of the last steps in which its estimate did not change at all.
+    error : the largest error of the first state, in its unit.
     """
 
     fmt: FloatFormat
     variance: float
-    still: float
+    unchanged: float
     error: float
 
 
-def deafness(
+def update_stagnation(
     model: LinearModel,
     z: NDArray[Any],
     state: int,
     formats: Sequence[FloatFormat],
-    form: Form = Form.USUAL,
+    form: Form = Form.INNOVATION,
     last: int = 200,
-) -> tuple[Deafness, ...]:
-    """Watch a state that hardly moves, in some formats; errors as of :func:`gpbnb.kalman.precision.survey`.
+) -> tuple[UpdateStagnation, ...]:
+    """Measure how far updates of a slow state stagnate in some formats.
+
+    Errors are those of :func:`gpbnb.kalman.precision.survey`.
 
     Parameters
     ----------
@@ -133,19 +145,19 @@ def deafness(
     _check_state(model, state)
     if not 0 < last < len(z):
         raise ValueError(f"got {last} steps to watch of {len(z)}; needed at least 1, and one less than all")
-    marks = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
-    true, found = reference(model, z, marks), []
+    checkpoint_steps = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
+    true, found = reference(model, z, checkpoint_steps), []
     for fmt in formats:
-        run = Run(model, fmt, form, marks)
+        run = Run(model, fmt, form, checkpoint_steps)
         run.take(fmt.array(z))
-        history, kept = compare_runs(run, true), run.kept()
-        variance = float(kept.P[-1, state, state] / true.P[len(kept.P) - 1, state, state])
-        still = sum(a == b for a, b in pairwise(kept.x[-last - 1 :, state])) / last
-        found.append(Deafness(fmt, variance, still, float(np.abs(history.state[:, 0]).max())))
+        history, checkpoints = compare_runs(run, true), run.checkpoints()
+        variance = float(checkpoints.P[-1, state, state] / true.P[len(checkpoints.P) - 1, state, state])
+        unchanged = sum(a == b for a, b in pairwise(checkpoints.x[-last - 1 :, state])) / last
+        found.append(UpdateStagnation(fmt, variance, unchanged, float(np.abs(history.state[:, 0]).max())))
     return tuple(found)
 
 
-def hidden_bits(model: LinearModel, z: NDArray[Any], state: int) -> float:
+def bits_hiding_process_noise(model: LinearModel, z: NDArray[Any], state: int) -> float:
     r""":math:`\log_2 P_{ii}/Q_{ii}` after the last step: with fewer bits than about that, adding Q changes nothing.
 
     Infinite where the state has no process noise.
@@ -155,8 +167,8 @@ def hidden_bits(model: LinearModel, z: NDArray[Any], state: int) -> float:
     ValueError : no such state.
     """
     _check_state(model, state)
-    kept, noise = reference(model, z, (len(z),)), float(model.Q[0, state, state])
-    return math.log2(float(kept.P[-1, state, state]) / noise) if noise else math.inf
+    checkpoints, noise = reference(model, z, (len(z),)), float(model.Q[0, state, state])
+    return math.log2(float(checkpoints.P[-1, state, state]) / noise) if noise else math.inf
 
 
 def _check_state(model: LinearModel, state: int) -> None:
@@ -165,12 +177,12 @@ def _check_state(model: LinearModel, state: int) -> None:
 
 
 def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
-    """The largest entry of the estimates after the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks."""
+    """The largest entry of the estimates after the steps of :func:`gpbnb.kalman.filter_run.log_spaced`."""
     return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
 
 
-def companion(
-    model: LinearModel, z: NDArray[Any], fmt: FloatFormat, form: Form = Form.USUAL
+def companion_run(
+    model: LinearModel, z: NDArray[Any], fmt: FloatFormat, form: Form = Form.INNOVATION
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Bound a run by its distance from the same filter in double-double and the contraction bound of that one.
 
@@ -178,14 +190,15 @@ def companion(
 
     Returns
     -------
-    error, bound : (n,), the largest of each state at the steps that :func:`gpbnb.kalman.experiment.log_spaced` marks.
+    error, bound : (n,), the largest of each state at the steps of :func:`gpbnb.kalman.filter_run.log_spaced`.
     """
-    stored, measured, marks = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
-    run, beside = Run(stored, fmt, form, marks), Followed(stored, None, Form.USUAL, marks)
+    stored, measured, checkpoint_steps = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
+    run = Run(stored, fmt, form, checkpoint_steps)
+    companion = BoundedRun(stored, None, Form.INNOVATION, checkpoint_steps)
     run.take(measured)
-    beside.take(measured.to_fractions())
-    history = compare_runs(run, beside.kept())
-    bound = companion_bound(history.state, beside.bounds[0][: len(history.steps)])
+    companion.take(measured.to_fractions())
+    history = compare_runs(run, companion.checkpoints())
+    bound = companion_bound(history.state, companion.bounds[0][: len(history.steps)])
     return np.abs(history.state).max(axis=0), bound.max(axis=0)
 
 
@@ -208,8 +221,8 @@ def native(
     x : (steps, n), the estimate after each step; not finite where the range did not suffice.
     """
     with np.errstate(all="ignore"):
-        told = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
-        return innovation(told, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
+        given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
+        return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
 
 
 def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]]) -> NDArray[np.float64]:
@@ -217,27 +230,27 @@ def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[An
 
     The errors of storing model and measurements are among them; infinite or NaN where the range did not suffice.
     """
-    marks = log_spaced(len(z), 16)
-    true = reference(model, z, marks).x.astype(np.float64)
-    return np.asarray(np.abs(native(model, z, dtype)[np.array(marks) - 1] - true).max(axis=0))
+    checkpoint_steps = log_spaced(len(z), 16)
+    true = reference(model, z, checkpoint_steps).x.astype(np.float64)
+    return np.asarray(np.abs(native(model, z, dtype)[np.array(checkpoint_steps) - 1] - true).max(axis=0))
 
 
-def innovation(told: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
+def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
     """The form by the innovation, in whatever numbers the arrays hold; see :func:`native`.
 
     Parameters
     ----------
-    told : Phi, H, Q, R with a leading axis, x0 and P0, as of :meth:`gpbnb.kalman.model.LinearModel.to_float`.
+    given : Phi, H, Q, R with a leading axis, x0 and P0, as of :meth:`gpbnb.kalman.model.LinearModel.to_float`.
     z : (steps, m).
 
     Returns
     -------
     x : (steps, n), the estimate after each step.
     """
-    x, P, estimates = told["x0"][:, np.newaxis], told["P0"], np.empty((len(z), len(told["x0"])), z.dtype)
+    x, P, estimates = given["x0"][:, np.newaxis], given["P0"], np.empty((len(z), len(given["x0"])), z.dtype)
     identity = np.eye(len(P), dtype=P.dtype)
     for k, measured in enumerate(tqdm(z, desc="native", unit="step", disable=not progress)):
-        Phi, H, Q, R = (told[letter][k % len(told[letter])] for letter in ("Phi", "H", "Q", "R"))
+        Phi, H, Q, R = (given[letter][k % len(given[letter])] for letter in ("Phi", "H", "Q", "R"))
         predicted = _times(_times(Phi, P), Phi.T) + Q
         PHt = _times(predicted, H.T)
         K = _times(PHt, _inverse(_times(H, PHt) + R))
@@ -272,7 +285,7 @@ def _inverse(a: NDArray[Any]) -> NDArray[Any]:
     return result
 
 
-class Inverse(NamedTuple):
+class InversePrecision(NamedTuple):
     """Bits that the inverse of a matrix needs, and what its condition lets one expect."""
 
     name: str
@@ -282,8 +295,10 @@ class Inverse(NamedTuple):
     proved: int
 
 
-def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = Rounding.NEAREST) -> Inverse:
-    r"""Bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` goal, and proved.
+def inverse_precision(
+    name: str, matrix: NDArray[Any], tolerance: float, rounding: Rounding = Rounding.NEAREST
+) -> InversePrecision:
+    r"""Bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and proved.
 
     D scales by powers of two to a diagonal near 1, as a choice of units would; elimination rounds the same with and
     without. What is proved is of :func:`gpbnb.inversion.bounds.smallest_precision`.
@@ -291,27 +306,27 @@ def inverse(name: str, matrix: NDArray[Any], goal: float, rounding: Rounding = R
     Parameters
     ----------
     matrix : (n, n), exact, symmetric positive definite.
-    goal : largest error of the inverse, relative to it in norm; above 0.
+    tolerance : largest error of the inverse, relative to it in norm; above 0.
 
     Raises
     ------
-    ValueError : a matrix that is not symmetric, or without a positive diagonal; a goal that is not above 0.
+    ValueError : a matrix that is not symmetric, or without a positive diagonal; a tolerance that is not above 0.
     """
     matrix = exact(matrix)
     square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
     if not square or np.any(matrix != matrix.T) or not (matrix.diagonal() > 0).all():
         raise ValueError(f"{name}: got shape {matrix.shape}; needed a symmetric matrix with a positive diagonal")
-    if not 0 < goal < math.inf:
-        raise ValueError(f"{name}: got goal {goal}; needed a relative error above 0")
+    if not 0 < tolerance < math.inf:
+        raise ValueError(f"{name}: got tolerance {tolerance}; needed a relative error above 0")
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
-    conditions = [column_sum(rationals(a)) * column_sum(true_inverse(a)) for a in (matrix, scaled)]
-    expected = digits_of_125(conditions[1], Fraction(goal), 2, rounding)
-    proved = smallest_precision(matrix, goal, 2, rounding).fmt.precision
-    return Inverse(name, float(conditions[0]), float(conditions[1]), expected, proved)
+    conditions = [column_sum_norm(rationals(a)) * column_sum_norm(true_inverse(a)) for a in (matrix, scaled)]
+    expected = precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
+    proved = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
+    return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, proved)
 
 
-def in_units(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
+def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
     """The same filter with states in other units.
 
     Parameters

@@ -8,8 +8,8 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.tables import Table, arithmetic, digits, short
 from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.kalman.precision import Requirement
-from gpbnb.wordlength.examples import ACCELERATORS, NORMAL, STANDARD
-from gpbnb.wordlength.study import Deafness, Inverse, Span
+from gpbnb.wordlength.examples import ACCELERATORS, NORMAL_RANGE, STANDARD
+from gpbnb.wordlength.study import BinaryRange, InversePrecision, UpdateStagnation
 
 
 def bits(answer: Requirement) -> str:
@@ -31,22 +31,22 @@ def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
     return Table(f"{len(body)} lines of answers", ("bits by", *questions.pop()), body)
 
 
-def deaf(found: Sequence[Deafness], goal: float) -> Table:
-    """What few digits do to a state that hardly moves."""
+def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
+    """Effect of few digits on a state that hardly changes."""
     body = tuple(
-        (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.still:.0f} %", short(each.error / goal))
+        (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.unchanged:.0f} %", short(each.error / tolerance))
         for each in found
     )
-    header = ("arithmetic", "variance, computed / true", "steps without a move", "error / goal")
+    header = ("arithmetic", "variance, computed / true", "steps without a change", "error / tolerance")
     return Table(f"{len(body)} formats", header, body)
 
 
-def spans(found: Sequence[Span]) -> Table:
+def binary_ranges(found: Sequence[BinaryRange]) -> Table:
     """Powers of two of a filter's numbers, and which standard formats hold them as normal numbers."""
     body = []
     for each in found:
-        held = [name for name, (low, high) in NORMAL.items() if low <= each.least and each.largest <= high]
-        body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(held) or "none"))
+        suitable = [name for name, (low, high) in NORMAL_RANGE.items() if low <= each.least and each.largest <= high]
+        body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(suitable) or "none"))
     return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "held by"), tuple(body))
 
 
@@ -54,9 +54,9 @@ def processors() -> Table:
     """Formats of processors: what they are here, and the range that they have and the emulation has not."""
     body = []
     for name, fmt in (STANDARD | ACCELERATORS).items():
-        low, high = NORMAL[name]
-        told = f"FloatFormat({fmt.base}, {fmt.precision})"
-        body.append((name, told, short(float(fmt.unit_roundoff)), f"$2^{{{low}}}$", f"$2^{{{high + 1}}}$"))
+        low, high = NORMAL_RANGE[name]
+        call = f"FloatFormat({fmt.base}, {fmt.precision})"
+        body.append((name, call, short(float(fmt.unit_roundoff)), f"$2^{{{low}}}$", f"$2^{{{high + 1}}}$"))
     header = ("format", "here", "unit roundoff", "normal from", "and below")
     return Table(f"{len(body)} formats of processors", header, tuple(body))
 
@@ -73,7 +73,7 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
     return Table(f"{len(body)} durations", header, tuple(body))
 
 
-def inverses(found: Sequence[Inverse]) -> Table:
+def inverse_precisions(found: Sequence[InversePrecision]) -> Table:
     """Bits that inverses need, by the rule of thumb and proved."""
     body = tuple(
         (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found

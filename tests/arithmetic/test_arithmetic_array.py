@@ -433,8 +433,8 @@ class TestArithmetic:
             assert isinstance(y, FloatArray)
             assert y.format == x.format
             assert np.array_equal(x, y)
-            assert not y._m.flags.writeable
-            assert not y._e.flags.writeable
+            assert not y.to_pairs()[0].flags.writeable
+            assert not y.to_pairs()[1].flags.writeable
 
     def test_input_is_not_shared(self) -> None:
         values = np.array([1, 2], dtype=object)
@@ -448,8 +448,8 @@ class TestArithmetic:
 
     def test_nothing_writes_into_an_array_or_its_views(self) -> None:
         for x in (self.X, self.X[0], self.X.T, self.X.reshape(-1), np.broadcast_to(self.X[0], (2, 3)), self.X + 1):
-            assert not x._m.flags.writeable
-            assert not x._e.flags.writeable
+            assert not x.to_pairs()[0].flags.writeable
+            assert not x.to_pairs()[1].flags.writeable
             with pytest.raises(TypeError, match="does not change"):
                 x[0] = 1
             with pytest.raises(TypeError, match="does not change"):

@@ -57,7 +57,7 @@ def test_the_same_digits_and_the_same_errors(fmt: FloatFormat, pivot: bool) -> N
             (linalg.solve, (a, b)),
             (linalg.solve, (a, b[:, 0])),
         ):
-            expected = outcome(function, *(x._exactly() for x in arguments), pivot)
+            expected = outcome(function, *(x.on_exact_backend() for x in arguments), pivot)
             assert outcome(function, *arguments, pivot) == expected
             failed += isinstance(expected, str)
             solved += not isinstance(expected, str)
@@ -88,9 +88,11 @@ def test_beyond_the_range_of_float64_the_exact_loop_goes_on(size: str, pivot: bo
     a = fmt.array([[size, "1"], ["1", size]])
     assert isinstance(a.backend, Compiled)
     for function in (linalg.lu, linalg.inv):
-        assert outcome(function, a, pivot) == outcome(function, a._exactly(), pivot)
+        assert outcome(function, a, pivot) == outcome(function, a.on_exact_backend(), pivot)
     b = fmt.array(["1e-200", size])
-    assert outcome(linalg.solve, a, b, pivot) == outcome(linalg.solve, a._exactly(), b._exactly(), pivot)
+    assert outcome(linalg.solve, a, b, pivot) == outcome(
+        linalg.solve, a.on_exact_backend(), b.on_exact_backend(), pivot
+    )
 
 
 def test_operands_stay() -> None:

@@ -15,7 +15,8 @@ import sympy
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding, exact_ratio, prints_as
+from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 

@@ -14,7 +14,7 @@ from gpbnb.calculators import derivation, forms
 from gpbnb.calculators.derivation import named, step
 from gpbnb.calculators.javascript import Definition, symbol
 from gpbnb.integration import derivation as integration
-from gpbnb.kalman import theory as kalman
+from gpbnb.kalman import report_bounds
 from gpbnb.rolling import derivation as rolling
 from gpbnb.rolling import theory
 from gpbnb.rounding import derivation as rounding
@@ -120,7 +120,11 @@ def test_what_is_left_of_a_signal_is_the_cosine_of_11():
 @pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (40, 4, 3)])
 def test_forgotten_inputs_are_bounded_term_by_term(k, n, m):
     """The sum of (a_0 + a_i) f^(k-i), each a_i counted step by step, is not above the coefficient of the last line."""
-    c, d, more = kalman.transition_count(n, m), kalman.input_count(n, m), kalman.covariance_count(n, m)
+    c, d, more = (
+        report_bounds.transition_count(n, m),
+        report_bounds.input_count(n, m),
+        report_bounds.covariance_count(n, m),
+    )
     loops = [c + j * more for j in range(k)]
     counts = [sum(loops[i:]) + d + (i - 1) * more for i in range(1, k + 1)]
     for f in (0.0, 0.3, 0.97, 1.0):
@@ -140,11 +144,11 @@ def test_a_loop_that_does_not_forget_takes_nothing_off():
 
 
 def test_mended_coefficients_have_the_names_of_the_chapter():
-    assert [name for name, *_ in derivation.MENDED] == list(kalman.MENDINGS)
+    assert [name for name, *_ in derivation.MENDED] == list(report_bounds.CORRECTIONS)
     numbers = {"k": 7, "n": 5, "m": 3}
-    for (_, first, second), faults in zip(derivation.MENDED, kalman.MENDINGS.values(), strict=True):
+    for (_, first, second), faults in zip(derivation.MENDED, report_bounds.CORRECTIONS.values(), strict=True):
         found = tuple(int(each.subs({s: numbers[s.name] for s in each.free_symbols})) for each in (first, second))
-        assert found == tuple(kalman.coefficients(*numbers.values(), **faults))
+        assert found == tuple(report_bounds.coefficients(*numbers.values(), **faults))
 
 
 @pytest.mark.parametrize(("base", "precision"), [(2, 1), (2, 3), (3, 2), (10, 1), (10, 2)])

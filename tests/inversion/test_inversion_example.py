@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.bounds import inverse_of
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import inverse_of
 from gpbnb.inversion import example, procedure
 from gpbnb.inversion.example import PLACES, PRINTED, Wordlength
 from gpbnb.inversion.procedure import Reading

@@ -9,8 +9,9 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, gamma, row_sum_norm
+from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, exact, row_sum_norm
 from gpbnb.inversion import theory
 from gpbnb.inversion.theory import Perturbation, Reduction
 

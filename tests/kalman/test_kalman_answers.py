@@ -10,16 +10,16 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
-from gpbnb.kalman import answers, figures, theory, year
+from gpbnb.kalman import answers, figures, report_bounds, year, year_cases
 
 
 def test_the_answers_are_those_of_the_example_and_of_the_years():
-    found = answers.find()
-    first, second = theory.coefficients(*theory.EXAMPLE)
+    found = answers.find_answers()
+    first, second = report_bounds.coefficients(*report_bounds.EXAMPLE)
     for digits, coefficient in zip(found.formula, (first, second), strict=True):
         assert coefficient * 0.5 * 10.0 ** (1 - digits) <= 1 < coefficient * 0.5 * 10.0 ** (2 - digits)
     assert found.printed == (9, 17)
-    assert all(mended > formula for mended, formula in zip(found.mended, found.formula, strict=True))
+    assert all(corrected > formula for corrected, formula in zip(found.corrected, found.formula, strict=True))
     for rounding, digits in found.observed.items():
         met = [run for run in found.runs if run.case.rounding is rounding and answers.largest(run) <= 1]
         assert digits == min(answers.decimal_digits(run.case.fmt) for run in met)
@@ -30,8 +30,8 @@ def test_the_answers_are_those_of_the_example_and_of_the_years():
 
 
 def test_what_counts_is_the_year_and_not_its_end_alone():
-    """Nine decimal digits end within the goal, and were beyond it before."""
-    (nine,) = (run for run in answers.find().runs if (run.case.base, run.case.precision) == (10, 9))
+    """Nine decimal digits end within the tolerance, and were beyond it before."""
+    (nine,) = (run for run in answers.find_answers().runs if (run.case.base, run.case.precision) == (10, 9))
     assert max(np.abs(nine.drift[-1]).max(), np.abs(nine.rate[-1]).max()) < 1 < answers.largest(nine)
     assert answers.largest(nine) == np.abs(np.hstack([nine.drift, nine.rate])).max()
 
@@ -56,60 +56,60 @@ def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
     assert answers.largest(replace(run, **zeros)) == 5.0
 
 
-def test_a_looser_goal_asks_for_fewer_digits_and_an_impossible_one_is_refused():
-    assert answers.find(100.0).observed[Rounding.NEAREST] < answers.find().observed[Rounding.NEAREST]
-    runs = answers.find().runs
+def test_a_looser_tolerance_asks_for_fewer_digits_and_an_impossible_one_is_refused():
+    assert answers.find_answers(100.0).observed[Rounding.NEAREST] < answers.find_answers().observed[Rounding.NEAREST]
+    runs = answers.find_answers().runs
     best = max(min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
     with pytest.raises(ValueError, match=f"needed one that some year meets: the best rounds to {best:.2g}"):
-        answers.find(1e-12)
+        answers.find_answers(1e-12)
 
 
 @pytest.mark.parametrize("rounding", Rounding)
-def test_the_goal_itself_is_met_and_what_is_just_below_is_not(rounding):
-    found = answers.find()
+def test_the_tolerance_itself_is_met_and_what_is_just_below_is_not(rounding):
+    found = answers.find_answers()
     digits = found.observed[rounding]
     enough = [run for run in found.runs if run.case.rounding is rounding]
     error = min(answers.largest(run) for run in enough if answers.decimal_digits(run.case.fmt) == digits)
     looser = max(error, min(answers.largest(run) for run in found.runs if run.case.rounding is not rounding))
-    assert answers.find(looser).observed[rounding] <= digits
+    assert answers.find_answers(looser).observed[rounding] <= digits
     assert error > 0
     assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, error) is not None
     assert answers._good(next(run for run in enough if answers.largest(run) == error), rounding, 0.999 * error) is None
 
 
 def test_only_the_usual_model_counts():
-    assert {run.case.model for run in answers.find().runs} == {year.MODELS[0]}
+    assert {run.case.model for run in answers.find_answers().runs} == {year_cases.MODELS[0]}
 
 
-def test_the_picture_shows_each_answer_on_the_goal():
+def test_the_picture_shows_each_answer_on_the_tolerance():
     _, axes = style.figure()
-    found = answers.find()
+    found = answers.find_answers()
     figures.digits_needed(found, axes[0])
     shown = {line.get_label(): line for line in axes[0].lines}
-    marked = {"printed answers": found.printed, "formula": found.formula, "all faults mended": found.mended}
+    marked = {"printed answers": found.printed, "formula": found.formula, "all faults corrected": found.corrected}
     for name, places in marked.items():
         assert list(shown[name].get_xdata()) == list(places)
-        assert set(shown[name].get_ydata()) == {found.goal}
+        assert set(shown[name].get_ydata()) == {found.tolerance}
     assert list(shown["observed"].get_xdata()) == [found.observed[Rounding.NEAREST]]
     axes[0].figure.canvas.draw()
 
 
 def test_the_headline_says_beside_each_mark_what_it_is():
     _, axes = style.figure()
-    ax, found = axes[0], answers.find()
+    ax, found = axes[0], answers.find_answers()
     figures.headline(found, ax)
     words = {text.get_text(): text.xy for text in ax.texts}
     for place in found.printed:
-        assert words[f"{place} printed"] == (place, found.goal)
+        assert words[f"{place} printed"] == (place, found.tolerance)
     assert words[f"{found.observed[Rounding.NEAREST]:g} digits were enough"][0] == found.observed[Rounding.NEAREST]
     drawn = {line.get_label(): line for line in ax.lines}
     shown = sum(len(drawn[f"emulated, {word}"].get_xdata()) for word in ("chopped", "rounded"))
     assert shown == sum(run.case.fmt is not None for run in found.runs)
     for name, faults in (
         ("(125) as printed", {}),
-        ("(125) with its faults mended", theory.MENDINGS["and errors carried on"]),
+        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"]),
     ):
-        each = theory.coefficients(*theory.EXAMPLE, **faults)
+        each = report_bounds.coefficients(*report_bounds.EXAMPLE, **faults)
         t, height = words[name]
         assert height == pytest.approx(0.5 * 10 ** (1 - t) * (each.first + each.second), rel=1e-12)
     ax.figure.canvas.draw()

@@ -6,14 +6,14 @@ import numpy as np
 import steps
 import sympy as sp
 
-from gpbnb.arithmetic.bounds import exact, inverse_of
-from gpbnb.kalman import derivation, theory
+from gpbnb.arithmetic.rational import exact, inverse_of
+from gpbnb.kalman import derivation, exact_step
 
 DERIVATIONS = steps.collected(
     derivation.report,
     derivation.propagated,
     derivation.general,
-    derivation.mended,
+    derivation.corrected,
     derivation.scalar_conditions,
     derivation.smallest,
     derivation.contraction,
@@ -66,7 +66,7 @@ def test_the_identities_hold_for_exact_filters():
             exact(rng.integers(-9, 10, m)),
         )
         E, e = exact(rng.integers(-9, 10, (n, n))) / 1000, exact(rng.integers(-9, 10, n)) / 100
-        true, run = theory.exact_step(Phi, H, Q, R, x, P, z), theory.exact_step(Phi, H, Q, R, x + e, P + E, z)
+        true, run = exact_step.exact_step(Phi, H, Q, R, x, P, z), exact_step.exact_step(Phi, H, Q, R, x + e, P + E, z)
         S = inverse_of(run.innovation_covariance)
         y = Phi.T @ H.T @ S @ run.innovation
         assert np.all(run.transition @ E @ true.transition.T == run.P - true.P)

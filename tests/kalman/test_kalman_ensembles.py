@@ -15,16 +15,16 @@ from distributed import Client, KilledWorker, LocalCluster
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles
+from gpbnb.kalman.bounded_run import emulate_with_bound
+from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
-from gpbnb.kalman.experiment import Form, bounded, emulate
+from gpbnb.kalman.forms import Form
 
 SINGLE = FloatFormat(2, 24)
 
 
 def some(count=8):
-    return tuple(
-        Task("stable", SINGLE, form, seed, 16) for seed in range(count // 2) for form in (Form.REPORT, Form.UD)
-    )
+    return tuple(Task("stable", SINGLE, form, seed, 16) for seed in range(count // 2) for form in (Form.HUNG, Form.UD))
 
 
 # -- trials ---------------------------------------------------------------------------------------
@@ -38,7 +38,7 @@ def test_a_trial_compares_every_step_with_the_bounds(kind):
     model, size = random_model(rng, kind)
     z = np.array([[float(f"{v:.6g}") for v in row] for row in size * rng.standard_normal((10, model.m))])
     z = np.abs(z) if kind == "one sign" else z
-    run = bounded(model, z, task.fmt, task.form, range(1, 11))
+    run = emulate_with_bound(model, z, task.fmt, task.form, range(1, 11))
     assert [found.state, found.gain, found.covariance] == run.ratios().max(axis=0).tolist()
     assert found.last == run.ratios()[-1, 0]
     assert found.bounded == np.isfinite(run.state).all(axis=1).mean()
@@ -150,7 +150,7 @@ def test_a_summary_counts():
             outcome(state=1.5, printed_gain=3.0),
             outcome(gain=np.nan, last=0.0, bounded=0.0),
             outcome(covariance=np.inf, last=0.02, indefinite=True, printed_covariance=1.01),
-            outcome(Form.USUAL, printed_state=7.0),
+            outcome(Form.INNOVATION, printed_state=7.0),
             outcome(),
         ]
     )

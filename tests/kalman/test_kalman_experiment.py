@@ -1,4 +1,4 @@
-"""gpbnb.kalman.experiment: every digit of the compiled filters against filters on Fractions, written anew here."""
+"""Filter runs, their errors and bounds: every digit against filters on Fractions, written anew here."""
 
 from __future__ import annotations
 
@@ -11,20 +11,14 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import smallest, theory
-from gpbnb.kalman.experiment import (
-    BLOCK,
-    Followed,
-    Form,
-    Run,
-    Simulation,
-    bounded,
-    compare_runs,
-    emulate,
-    log_spaced,
-    reference,
-)
-from gpbnb.kalman.model import LinearModel, gravity_probe_b
+from gpbnb.kalman import exact_step, smallest
+from gpbnb.kalman.bounded_run import BoundedRun, emulate_with_bound
+from gpbnb.kalman.emulation import compare_runs, emulate
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import gravity_probe_b
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import BLOCK, Simulation
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (
@@ -65,13 +59,13 @@ def measurements(steps=STEPS, m=2):
 class Slow:
     """Filters on lists of Fractions, each operation rounded by the oracle; exact if there is no format."""
 
-    def __init__(self, told, fmt):
-        self.told = told
+    def __init__(self, given, fmt):
+        self.given = given
         arithmetic = oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST) if fmt else None
         self.fl = arithmetic.fl if arithmetic else lambda x: x
         self.arithmetic = arithmetic
-        self.x = [[self.fl(v)] for v in told.x0]
-        self.P = self.held(told.P0)
+        self.x = [[self.fl(v)] for v in given.x0]
+        self.P = self.held(given.P0)
 
     def held(self, matrix):
         return [[self.fl(v) for v in row] for row in matrix]
@@ -104,7 +98,7 @@ class Slow:
 
     def step(self, k, z, form):
         Phi, H, Q, R = (
-            self.held(each[k % len(each)]) for each in (self.told.Phi, self.told.H, self.told.Q, self.told.R)
+            self.held(each[k % len(each)]) for each in (self.given.Phi, self.given.H, self.given.Q, self.given.R)
         )
         Pt, Ht = transposed(Phi), transposed(H)
         z = [[self.fl(v)] for v in z]
@@ -118,10 +112,10 @@ class Slow:
             self.P = self.plus(self.times(W, predicted, transposed(W)), noise)
         else:
             self.P = self.times(W, predicted)
-        if form is Form.SECOND:
+        if form is Form.HUNG_SECOND_GAIN:
             self.K = self.times(self.P, Ht, self.inverse(R))
             W = self.plus(identity, self.times(self.K, H), -1)
-        if form in (Form.REPORT, Form.SECOND):
+        if form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
             self.x = self.plus(self.times(W, Phi, self.x), self.times(self.K, z))
         else:
             ahead = self.times(Phi, self.x)
@@ -132,9 +126,9 @@ def transposed(matrix):
     return [list(column) for column in zip(*matrix, strict=True)]
 
 
-def run(fmt, form, told=None, z=None):
-    told, z = told or model(), measurements() if z is None else z
-    found = Run(told, fmt, form, range(1, len(z) + 1))
+def run(fmt, form, given=None, z=None):
+    given, z = given or model(), measurements() if z is None else z
+    found = Run(given, fmt, form, range(1, len(z) + 1))
     found.take(z)
     return found
 
@@ -142,28 +136,28 @@ def run(fmt, form, told=None, z=None):
 # -- every digit ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", [Form.REPORT, Form.SECOND, Form.USUAL, Form.JOSEPH])
+@pytest.mark.parametrize("form", [Form.HUNG, Form.HUNG_SECOND_GAIN, Form.INNOVATION, Form.JOSEPH])
 @pytest.mark.parametrize("fmt", FORMATS)
 def test_every_digit_is_that_of_a_filter_on_fractions(fmt, form):
-    told, z = model(), measurements()
-    kept = run(fmt, form).kept()
-    slow = Slow(told, fmt)
-    assert kept.steps == tuple(range(1, STEPS + 1))
+    given, z = model(), measurements()
+    checkpoints = run(fmt, form).checkpoints()
+    slow = Slow(given, fmt)
+    assert checkpoints.steps == tuple(range(1, STEPS + 1))
     for k in range(STEPS):
         slow.step(k, [Fraction(float(v)) for v in z[k]], form)
-        assert [[v] for v in kept.x[k]] == slow.x
-        assert kept.K[k].tolist() == slow.K
-        assert kept.P[k].tolist() == slow.P
+        assert [[v] for v in checkpoints.x[k]] == slow.x
+        assert checkpoints.K[k].tolist() == slow.K
+        assert checkpoints.P[k].tolist() == slow.P
 
 
 class SlowUD:
     """Thornton's and Bierman's recursions, from Bierman 1977, ch. V and VI, on Fractions; each operation rounded."""
 
-    def __init__(self, told, fmt):
-        self.told, self.fl = told, oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST).fl
-        self.n = told.n
-        self.U, self.D = self.factors(told.P0)
-        self.x = [self.fl(v) for v in told.x0]
+    def __init__(self, given, fmt):
+        self.given, self.fl = given, oracles.Arithmetic(fmt.base, fmt.precision, fmt.rounding is NEAREST).fl
+        self.n = given.n
+        self.U, self.D = self.factors(given.P0)
+        self.x = [self.fl(v) for v in given.x0]
 
     def held(self, matrix):
         return [[self.fl(v) for v in row] for row in matrix]
@@ -188,10 +182,10 @@ class SlowUD:
         return s
 
     def step(self, k, z):
-        fl, n, told = self.fl, self.n, self.told
-        Phi, H = self.held(told.Phi[k % len(told.Phi)]), self.held(told.H[k % len(told.H)])
-        UQ, DQ = self.factors(told.Q[k % len(told.Q)])
-        UR, DR = self.factors(told.R[k % len(told.R)])
+        fl, n, given = self.fl, self.n, self.given
+        Phi, H = self.held(given.Phi[k % len(given.Phi)]), self.held(given.H[k % len(given.H)])
+        UQ, DQ = self.factors(given.Q[k % len(given.Q)])
+        UR, DR = self.factors(given.R[k % len(given.R)])
         # Thornton: orthogonalise the rows of (Phi U, UQ), weighed by (D, DQ), the last one first.
         W = [[self.dot([fl(Phi[i][p] * self.U[p][j]) for p in range(n)]) for j in range(n)] + UQ[i] for i in range(n)]
         weights = self.D + DQ
@@ -248,39 +242,39 @@ def test_every_digit_of_the_factors_is_that_of_bierman_on_fractions(fmt):
 @pytest.mark.parametrize("fmt", [FloatFormat(10, 4), FloatFormat(2, 6, CHOP)])
 def test_the_smallest_filters_come_out_of_the_emulation_too(fmt, second):
     """The chapter's counterexamples were found in exact arithmetic, on rounded Fractions."""
-    form = Form.SECOND if second else Form.REPORT
+    form = Form.HUNG_SECOND_GAIN if second else Form.HUNG
     for case in (smallest.scalar(fmt), smallest.scalar(fmt, z=1), smallest.correlated()):
         if case.P.shape == (2, 2) and fmt.base == 2:
             continue  # its numbers are decimal
-        told = LinearModel(case.Phi, case.H, case.Q, case.R, case.x, case.P)
-        kept = run(fmt, form, told, np.array([case.z] * 3, dtype=object)).kept()
+        given = LinearModel(case.Phi, case.H, case.Q, case.R, case.x, case.P)
+        checkpoints = run(fmt, form, given, np.array([case.z] * 3, dtype=object)).checkpoints()
         for k in range(3):
             x, K, P = smallest.rounded_step(fmt, case, second)
             case = case._replace(x=x, P=P)
-            assert (kept.x[k] == x).all()
-            assert (kept.K[k] == K).all()
-            assert (kept.P[k] == P).all()
+            assert (checkpoints.x[k] == x).all()
+            assert (checkpoints.K[k] == K).all()
+            assert (checkpoints.P[k] == P).all()
 
 
 # -- the reference --------------------------------------------------------------------------------
 
 
-def exactly(told, z):
+def exactly(given, z):
     """Exact estimates, gains and covariances of each step."""
-    x, P, found = told.x0, told.P0, []
+    x, P, found = given.x0, given.P0, []
     for k in range(len(z)):
-        Phi, H, Q, R = (each[k % len(each)] for each in (told.Phi, told.H, told.Q, told.R))
-        step = theory.exact_step(Phi, H, Q, R, x, P, z[k])
+        Phi, H, Q, R = (each[k % len(each)] for each in (given.Phi, given.H, given.Q, given.R))
+        step = exact_step.exact_step(Phi, H, Q, R, x, P, z[k])
         x, P = step.x, step.P
         found.append(step)
     return found
 
 
 def test_the_reference_is_the_exact_filter_to_thirty_digits():
-    told, z = model(), measurements()
-    kept = reference(told, z, range(1, STEPS + 1))
-    for k, step in enumerate(exactly(told, z)):
-        for found, true in ((kept.x[k], step.x), (kept.K[k], step.gain), (kept.P[k], step.P)):
+    given, z = model(), measurements()
+    checkpoints = reference(given, z, range(1, STEPS + 1))
+    for k, step in enumerate(exactly(given, z)):
+        for found, true in ((checkpoints.x[k], step.x), (checkpoints.K[k], step.gain), (checkpoints.P[k], step.P)):
             # A hundred operations a step, each within 2**-102, on numbers that nothing here magnifies a hundredfold.
             assert np.abs(found - true).max() < Fraction(10**4 * (k + 1), 2**102) * np.abs(true).max()
 
@@ -288,14 +282,14 @@ def test_the_reference_is_the_exact_filter_to_thirty_digits():
 @pytest.mark.parametrize("form", list(Form))
 def test_all_forms_are_one_filter(form):
     """In double-double each is the exact filter; in many digits, each comes near."""
-    told, z = model(), measurements()
-    kept = reference(told, z, (STEPS,), form)
-    step = exactly(told, z)[-1]
-    for found, true in ((kept.x[0], step.x), (kept.P[0], step.P)):
+    given, z = model(), measurements()
+    checkpoints = reference(given, z, (STEPS,), form)
+    step = exactly(given, z)[-1]
+    for found, true in ((checkpoints.x[0], step.x), (checkpoints.P[0], step.P)):
         assert np.abs(found - true).max() < Fraction(1, 2**85)
-    if form is not Form.SECOND:  # whose own gain is P H' R^-1 as well, but by another rounding
-        assert np.abs(kept.K[0] - step.gain).max() < Fraction(1, 2**85)
-    history = emulate(told, z, FloatFormat(2, 53), form)
+    if form is not Form.HUNG_SECOND_GAIN:  # whose own gain is P H' R^-1 as well, but by another rounding
+        assert np.abs(checkpoints.K[0] - step.gain).max() < Fraction(1, 2**85)
+    history = emulate(given, z, FloatFormat(2, 53), form)
     assert 0 < history.state_norm.max() < 1e-14
     assert history.gain_norm.max() < 1e-14
     assert history.covariance_norm.max() < 1e-14
@@ -304,32 +298,36 @@ def test_all_forms_are_one_filter(form):
 
 
 def test_errors_fall_with_the_digits_in_every_form():
-    told, z = model(), measurements(40)
+    given, z = model(), measurements(40)
     for form in Form:
-        errors = [emulate(told, z, FloatFormat(2, t), form, (40,)).covariance_norm[0] for t in (12, 24, 36, 48)]
+        errors = [emulate(given, z, FloatFormat(2, t), form, (40,)).covariance_norm[0] for t in (12, 24, 36, 48)]
         for coarse, fine in pairwise(errors):
             assert 2**7 < coarse / fine < 2**17  # 2**12, and what chance may do
 
 
 def test_a_reference_of_the_model_as_given_adds_the_errors_of_storing_it():
-    told, z, fmt = model(), measurements(), FloatFormat(10, 4)
-    alone = emulate(told, z, fmt, Form.USUAL, (STEPS,))
+    given, z, fmt = model(), measurements(), FloatFormat(10, 4)
+    alone = emulate(given, z, fmt, Form.INNOVATION, (STEPS,))
     stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
-    both = emulate(told, z, fmt, Form.USUAL, (STEPS,), reference(told, z, (STEPS,)))
-    step = exactly(told.rounded(fmt), stored)[-1]
-    assert alone.state[0] == pytest.approx((run(fmt, Form.USUAL).kept().x[-1] - step.x).astype(float), rel=1e-12)
-    step = exactly(told, z)[-1]
-    assert both.state[0] == pytest.approx((run(fmt, Form.USUAL).kept().x[-1] - step.x).astype(float), rel=1e-12)
+    both = emulate(given, z, fmt, Form.INNOVATION, (STEPS,), reference(given, z, (STEPS,)))
+    step = exactly(given.rounded(fmt), stored)[-1]
+    assert alone.state[0] == pytest.approx(
+        (run(fmt, Form.INNOVATION).checkpoints().x[-1] - step.x).astype(float), rel=1e-12
+    )
+    step = exactly(given, z)[-1]
+    assert both.state[0] == pytest.approx(
+        (run(fmt, Form.INNOVATION).checkpoints().x[-1] - step.x).astype(float), rel=1e-12
+    )
 
 
 # -- runs -----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", [Form.REPORT, Form.UD])
+@pytest.mark.parametrize("form", [Form.HUNG, Form.UD])
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 8), None])
 def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
-    told, z = model(), measurements(20)
-    whole, parts = run(fmt, form, told, z), Run(told, fmt, form, range(1, 21))
+    given, z = model(), measurements(20)
+    whole, parts = run(fmt, form, given, z), Run(given, fmt, form, range(1, 21))
     for piece in (z[:1], z[1:1], z[1:8], z[8:]):
         parts.take(piece)
     assert parts.steps == whole.steps == 20
@@ -338,7 +336,7 @@ def test_a_run_in_pieces_is_the_run_in_one(fmt, form):
 
 
 def test_the_norms_of_a_history():
-    history = emulate(model(), measurements(), FloatFormat(10, 4), Form.REPORT, (2, 5))
+    history = emulate(model(), measurements(), FloatFormat(10, 4), Form.HUNG, (2, 5))
     assert history.steps.tolist() == [2, 5]
     for at in range(2):
         true = history.reference
@@ -361,7 +359,7 @@ def scalar(r, p=1, h=1, q=0):
 
 def test_a_variance_that_is_lost_is_a_result():
     fmt = FloatFormat(10, 4)
-    history = emulate(scalar("1e-6"), np.ones((5, 1)), fmt, Form.REPORT, range(1, 6))
+    history = emulate(scalar("1e-6"), np.ones((5, 1)), fmt, Form.HUNG, range(1, 6))
     # 1 + 1e-6 is 1 in four digits, the gain is 1, and nothing is left of 1 - 1.
     assert history.indefinite == 1
     assert history.stopped is None
@@ -372,10 +370,10 @@ def test_a_variance_that_is_lost_is_a_result():
 
 def test_a_covariance_that_is_indefinite_in_a_run_is_a_result():
     """Two states that are nearly one, measured precisely, in four digits."""
-    told = LinearModel(np.eye(2), [[1, "0.99"]], np.zeros((2, 2)), [["1e-5"]], [0, 0], [[1, "0.97"], ["0.97", 1]])
-    found = {form: emulate(told, np.ones((30, 1)), FloatFormat(10, 4), form, range(1, 31)) for form in Form}
-    assert found[Form.REPORT].indefinite == 5
-    assert found[Form.REPORT].least_eigenvalue.min() < -1
+    given = LinearModel(np.eye(2), [[1, "0.99"]], np.zeros((2, 2)), [["1e-5"]], [0, 0], [[1, "0.97"], ["0.97", 1]])
+    found = {form: emulate(given, np.ones((30, 1)), FloatFormat(10, 4), form, range(1, 31)) for form in Form}
+    assert found[Form.HUNG].indefinite == 5
+    assert found[Form.HUNG].least_eigenvalue.min() < -1
     # Joseph's keeps its variances, and loses the rest by less; the factors keep all.
     assert found[Form.JOSEPH].indefinite is None
     assert -1e-4 < found[Form.JOSEPH].least_eigenvalue.min() < 0
@@ -386,12 +384,12 @@ def test_a_covariance_that_is_indefinite_in_a_run_is_a_result():
 
 def test_a_division_by_zero_ends_a_run_and_is_a_result():
     """In the first step, P comes out as 0; R, whose size one digit does not tell from 0, must hold the rest."""
-    told = LinearModel([[1]], [[[1]], [[1]]], [[0]], [[[1]], [["1e-40"]]], [1], [[1]])
+    given = LinearModel([[1]], [[[1]], [[1]]], [[0]], [[[1]], [["1e-40"]]], [1], [[1]])
     # The second row: P = 0.5 after the first step; S = 0.5 + 1e-40 = 0.5 in a format; K = 1, P = 0.
-    history = emulate(told, np.ones((4, 1)), FloatFormat(2, 8), Form.REPORT, range(1, 5))
+    history = emulate(given, np.ones((4, 1)), FloatFormat(2, 8), Form.HUNG, range(1, 5))
     assert history.indefinite == 2
     # A negative variance can make S zero: P0 = 1, H'P H + R with one digit.
-    run = Run(scalar(1), FloatFormat(2, 8), Form.REPORT, range(1, 5))
+    run = Run(scalar(1), FloatFormat(2, 8), Form.HUNG, range(1, 5))
     run.P[...] = -1.0
     run.take(np.ones((3, 1)))
     assert run.stopped == 1
@@ -400,50 +398,50 @@ def test_a_division_by_zero_ends_a_run_and_is_a_result():
     run.take(np.ones((3, 1)))
     assert run.steps == 0
     assert np.array_equal(run.x, before)
-    assert run.kept().steps == ()
+    assert run.checkpoints().steps == ()
 
 
 @pytest.mark.parametrize("form", list(Form))
-def test_a_number_beyond_the_carrier_ends_a_run_and_is_a_result(form):
+def test_a_number_beyond_the_backend_ends_a_run_and_is_a_result(form):
     """A state that grows by 1e60 a step, and that nobody sees: its variance would be 1e360 after the third."""
-    told = LinearModel([["1e60", 0], [0, 1]], [[0, 1]], np.zeros((2, 2)), [[1]], [1, 1], np.eye(2))
-    found = run(FloatFormat(2, 24), form, told, np.ones((9, 1)))
+    given = LinearModel([["1e60", 0], [0, 1]], [[0, 1]], np.zeros((2, 2)), [[1]], [1, 1], np.eye(2))
+    found = run(FloatFormat(2, 24), form, given, np.ones((9, 1)))
     assert (found.steps, found.stopped) == (2, 3)
-    kept = found.kept()
-    history = compare_runs(found, reference(told, np.ones((2, 1)), (1, 2)))
+    checkpoints = found.checkpoints()
+    history = compare_runs(found, reference(given, np.ones((2, 1)), (1, 2)))
     assert history.stopped == 3
-    assert history.steps.tolist() == list(kept.steps) == [1, 2]
+    assert history.steps.tolist() == list(checkpoints.steps) == [1, 2]
     # Base 10 has exponents for it.
-    assert run(FloatFormat(10, 8), form, told, np.ones((9, 1))).steps == 9
+    assert run(FloatFormat(10, 8), form, given, np.ones((9, 1))).steps == 9
 
 
 def test_what_a_run_refuses():
-    told = model()
+    given = model()
     with pytest.raises(ValueError, match="needed a format with compiled loops"):
-        Run(told, FloatFormat(3, 5), Form.REPORT, (1,))
-    for marks in ((2, 1), (0, 1), (1, 1)):
+        Run(given, FloatFormat(3, 5), Form.HUNG, (1,))
+    for checkpoint_steps in ((2, 1), (0, 1), (1, 1)):
         with pytest.raises(ValueError, match="needed steps of 1 or more, each above the one before"):
-            Run(told, FloatFormat(2, 24), Form.REPORT, marks)
-    for kind in (Run, Followed):
+            Run(given, FloatFormat(2, 24), Form.HUNG, checkpoint_steps)
+    for kind in (Run, BoundedRun):
         for z in (np.ones((3, 3)), np.ones(2)):
             with pytest.raises(ValueError, match=r"needed \(steps, 2\)"):
-                kind(told, FloatFormat(2, 24), Form.REPORT, (1,)).take(z)
+                kind(given, FloatFormat(2, 24), Form.HUNG, (1,)).take(z)
     with pytest.raises(ValueError, match="finite"):
-        emulate(told, [[1.0, math.nan]], FloatFormat(2, 24))
+        emulate(given, [[1.0, math.nan]], FloatFormat(2, 24))
     with pytest.raises(OverflowError, match="beyond the range of the compiled loops"):
-        Run(scalar(Fraction(10**400)), FloatFormat(2, 24), Form.REPORT, (1,))
+        Run(scalar(Fraction(10**400)), FloatFormat(2, 24), Form.HUNG, (1,))
     # In two digits 1.04 * 1.07 > 1.05**2 becomes 1.0 * 1.1 < 1.1**2.
     close = LinearModel(np.eye(2), [[1, 0]], np.eye(2), [[1]], [0, 0], [["1.04", "1.05"], ["1.05", "1.07"]])
     with pytest.raises(ValueError, match="needed covariances that stay definite"):
         Run(close, FloatFormat(10, 2), Form.UD, (1,))
     assert Run(close, FloatFormat(10, 3), Form.UD, (1,)).steps == 0
     with pytest.raises(ValueError, match="needed the same"):
-        compare_runs(run(FloatFormat(2, 24), Form.REPORT), reference(told, measurements(), (2, 4)))
+        compare_runs(run(FloatFormat(2, 24), Form.HUNG), reference(given, measurements(), (2, 4)))
     with pytest.raises(ArithmeticError, match="the reference stopped at step 1"):
         reference(LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]]), np.ones((3, 1)), (1,))
 
 
-def test_marks():
+def test_checkpoint_steps():
     assert log_spaced(1) == (1,)
     assert log_spaced(1000, 3) == (1, 2, 5, 10, 22, 46, 100, 215, 464, 1000)
     assert log_spaced(20, 1) == (1, 10, 20)
@@ -483,10 +481,10 @@ def test_a_cycle_and_the_noise_go_on_from_block_to_block():
 
 def test_measurements_are_those_of_the_model():
     """The filter that knows the model finds its innovations white, with the covariance that it predicts."""
-    told = model()
-    z = Simulation(told, tuple(told.x0.astype(float)), seed=5, resolution=2.0**-20).measurements(4000)
-    x, P = told.x0.astype(float), told.P0.astype(float) * 0 + np.eye(3) * 1e-12
-    given, squares, lagged, last = told.to_float(), [], [], None
+    given = model()
+    z = Simulation(given, tuple(given.x0.astype(float)), seed=5, resolution=2.0**-20).measurements(4000)
+    x, P = given.x0.astype(float), given.P0.astype(float) * 0 + np.eye(3) * 1e-12
+    given, squares, lagged, last = given.to_float(), [], [], None
     for k in range(len(z)):
         Phi, H, Q, R = (given[name][k % len(given[name])] for name in ("Phi", "H", "Q", "R"))
         P = Phi @ P @ Phi.T + Q
@@ -518,18 +516,18 @@ def test_what_a_simulation_refuses():
 @pytest.mark.parametrize("fmt", FORMATS)
 def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
     """Against the exact filter, not the reference."""
-    told, z = model(), measurements()
-    found = bounded(told, z, fmt, form, range(1, STEPS + 1))
+    given, z = model(), measurements()
+    found = emulate_with_bound(given, z, fmt, form, range(1, STEPS + 1))
     ratios = found.ratios()
     assert ratios.max() <= 1
     stored = np.array([[fmt.round(float(v)) for v in row] for row in z], dtype=object)
-    kept = run(fmt, form).kept()
+    checkpoints = run(fmt, form).checkpoints()
     worst = 0.0
-    for k, step in enumerate(exactly(told.rounded(fmt), stored)):
-        P = (kept.P[k] + kept.P[k].T) / 2
+    for k, step in enumerate(exactly(given.rounded(fmt), stored)):
+        P = (checkpoints.P[k] + checkpoints.P[k].T) / 2
         for error, bound in (
-            (kept.x[k] - step.x, found.state[k]),
-            (kept.K[k] - step.gain, found.gain[k]),
+            (checkpoints.x[k] - step.x, found.state[k]),
+            (checkpoints.K[k] - step.gain, found.gain[k]),
             (P - step.P, found.covariance[k]),
         ):
             assert (np.abs(error).astype(float) <= bound * (1 + 1e-12)).all()
@@ -538,25 +536,28 @@ def test_no_error_exceeds_the_bound_beside_the_run(fmt, form):
         assert worst > 0.01
         assert np.isfinite(found.state).all()
     # The run itself is the one without a bound at its side.
-    assert np.array_equal(found.history.state, emulate(told, z, fmt, form, range(1, STEPS + 1)).state)
+    assert np.array_equal(found.history.state, emulate(given, z, fmt, form, range(1, STEPS + 1)).state)
 
 
 def test_the_bound_of_the_reference_holds():
     """Also where the stored model is no double-double number."""
-    told, z = model(), measurements(40)
-    run = Followed(told, None, Form.USUAL, range(1, 41))
+    given, z = model(), measurements(40)
+    run = BoundedRun(given, None, Form.INNOVATION, range(1, 41))
     run.take(z[:7])
     run.take(z[7:])
-    kept = run.kept()
-    for k, step in enumerate(exactly(told, z)):
-        for error, bound in ((kept.x[k] - step.x, run.bounds[0][k]), (kept.P[k] - step.P, run.bounds[2][k])):
+    checkpoints = run.checkpoints()
+    for k, step in enumerate(exactly(given, z)):
+        for error, bound in (
+            (checkpoints.x[k] - step.x, run.bounds[0][k]),
+            (checkpoints.P[k] - step.P, run.bounds[2][k]),
+        ):
             ratio = (np.abs(error).astype(float) / bound).max()
             assert ratio <= 1
             assert (bound < 1e-22).all()
 
 
 def test_ratios_tell_a_violation():
-    found = bounded(model(), measurements(), FloatFormat(2, 24), Form.REPORT, (1, 6))
+    found = emulate_with_bound(model(), measurements(), FloatFormat(2, 24), Form.HUNG, (1, 6))
     for name, column in (("state", 0), ("gain", 1), ("covariance", 2)):
         small = {each: getattr(found, each) * (1e-9 if each == name else 1) for each in ("state", "gain", "covariance")}
         ratios = type(found)(found.history, **small).ratios()
@@ -566,7 +567,7 @@ def test_ratios_tell_a_violation():
 
 
 def test_the_bound_ends_where_the_gain_is_not_known():
-    found = bounded(scalar("1e-6"), np.ones((3, 1)), FloatFormat(10, 4), Form.REPORT, (1, 2, 3))
+    found = emulate_with_bound(scalar("1e-6"), np.ones((3, 1)), FloatFormat(10, 4), Form.HUNG, (1, 2, 3))
     assert np.isfinite(found.state[:2]).all()
     assert np.isinf(found.state[2]).all()
     assert found.ratios().max() <= 1
@@ -575,10 +576,10 @@ def test_the_bound_ends_where_the_gain_is_not_known():
 def test_a_year_of_gravity_probe_b_begins_like_the_exact_filter():
     """Three steps of ten states, in every digit: the model of the book, not a small one."""
     fmt = FloatFormat(2, 24)
-    told = gravity_probe_b().rounded(FloatFormat(2, 14))
+    given = gravity_probe_b().rounded(FloatFormat(2, 14))
     z = np.array([[12.0, -7.0], [30.0, 4.0], [-5.0, 9.0]])
-    slow, kept = Slow(told, fmt), run(fmt, Form.REPORT, told, z).kept()
+    slow, checkpoints = Slow(given, fmt), run(fmt, Form.HUNG, given, z).checkpoints()
     for k in range(3):
-        slow.step(k, [Fraction(float(v)) for v in z[k]], Form.REPORT)
-        assert [[v] for v in kept.x[k]] == slow.x
-        assert kept.P[k].tolist() == slow.P
+        slow.step(k, [Fraction(float(v)) for v in z[k]], Form.HUNG)
+        assert [[v] for v in checkpoints.x[k]] == slow.x
+        assert checkpoints.P[k].tolist() == slow.P

@@ -8,13 +8,14 @@ from drawn import colour, legend_of
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
-from gpbnb.kalman import ensembles, figures, smallest, theory, year
+from gpbnb.kalman import ensembles, figures, report_bounds, smallest, year, year_cases
 from gpbnb.kalman.answers import decimal_digits
-from gpbnb.kalman.experiment import Form, bounded
+from gpbnb.kalman.bounded_run import emulate_with_bound
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
-USUAL = year.MODELS[0]
-TWENTY_FOUR = year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT)
+USUAL = year_cases.MODELS[0]
+TWENTY_FOUR = year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG)
 
 
 @pytest.fixture(scope="module")
@@ -34,12 +35,12 @@ def test_decimal_digits_invert_8(fmt, number):
 
 def test_years(ax, runs):
     chosen = [runs[TWENTY_FOUR], runs[TWENTY_FOUR._replace(form=Form.UD, rounding=Rounding.CHOP)]]
-    *curves, goal = figures.years(chosen, "rate", ax, goal=1.0)
+    *curves, tolerance = figures.years(chosen, "rate", ax, tolerance=1.0)
     for curve, run in zip(curves, chosen, strict=True):
         assert np.array_equal(curve.get_xdata(), run.steps)
         assert np.array_equal(curve.get_ydata(), np.maximum(*np.abs(run.rate).T))
     assert len({colour(curve) for curve in curves}) == 2
-    assert list(goal.get_ydata()) == [1, 1]
+    assert list(tolerance.get_ydata()) == [1, 1]
     assert [curve.get_label() for curve in curves] == ["24 bits", "24 bits, chopped, UD"]
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("step $k$", "error of the drift rate (mas/yr)")
@@ -74,10 +75,10 @@ def test_lines_and_levels(ax):
 
 def test_year_end(ax, runs):
     cases = [TWENTY_FOUR, TWENTY_FOUR._replace(precision=32), TWENTY_FOUR._replace(rounding=Rounding.CHOP)]
-    counts = [("printed", theory.coefficients(*theory.EXAMPLE))]
+    counts = [("printed", report_bounds.coefficients(*report_bounds.EXAMPLE))]
     answers = [("print", [9, 17]), ("formula", [10, 16]), ("seen", [10.3])]
     artists = figures.year_end([runs[case] for case in cases], ax, 1.0, counts, answers)
-    rounded, chopped, line, goal, *marks = artists
+    rounded, chopped, line, tolerance, *checkpoint_steps = artists
     ends = [max(np.abs(runs[case].drift[-1]).max(), np.abs(runs[case].rate[-1]).max()) for case in cases]
     assert np.allclose(rounded.get_xdata(), [decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)
     assert list(rounded.get_ydata()) == ends[:2]
@@ -85,12 +86,12 @@ def test_year_end(ax, runs):
     assert colour(rounded) == style.OBSERVED != colour(chopped)
     assert colour(line) == style.BOUND
     crossing = float(np.interp(0, -np.log10(line.get_ydata()), line.get_xdata()))
-    assert int(np.ceil(crossing)) == theory.required_precision(sum(counts[0][1]))
-    assert list(goal.get_ydata()) == [1, 1]
-    assert [list(mark.get_xdata()) for mark in marks] == [places for _, places in answers]
-    assert all(set(mark.get_ydata()) == {1} for mark in marks)
-    assert marks[0].get_markerfacecolor() == marks[1].get_markerfacecolor() == "none"
-    assert marks[2].get_marker() == "|"
+    assert int(np.ceil(crossing)) == report_bounds.precision_for_coefficient(sum(counts[0][1]))
+    assert list(tolerance.get_ydata()) == [1, 1]
+    assert [list(mark.get_xdata()) for mark in checkpoint_steps] == [places for _, places in answers]
+    assert all(set(mark.get_ydata()) == {1} for mark in checkpoint_steps)
+    assert checkpoint_steps[0].get_markerfacecolor() == checkpoint_steps[1].get_markerfacecolor() == "none"
+    assert checkpoint_steps[2].get_marker() == "|"
     assert legend_of(ax)[:3] == ["report, nearest", "report, chop", "printed"]
     assert legend_of(ax)[-3:] == ["print", "formula", "seen"]
 
@@ -98,7 +99,9 @@ def test_year_end(ax, runs):
 def test_contraction(ax):
     case = smallest.scalar(FloatFormat(2, 24), r="0.5", z="1")
     model = LinearModel(case.Phi, case.H, case.Q, case.R, case.x, case.P)
-    found = bounded(model, np.arange(1.0, 9.0).reshape(8, 1) / 3, FloatFormat(2, 24), marks=range(1, 9))
+    found = emulate_with_bound(
+        model, np.arange(1.0, 9.0).reshape(8, 1) / 3, FloatFormat(2, 24), checkpoint_steps=range(1, 9)
+    )
     points, line = figures.contraction(found, 0, ax, "x (m)")
     error = np.abs(found.history.state[:, 0])
     assert list(points.get_ydata()) == [e for e in error if e > 0]

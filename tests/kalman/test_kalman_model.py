@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.model import STATES, YEAR, LinearModel, factor, gravity_probe_b
+from gpbnb.kalman.gravity_probe_b import STATES, YEAR, gravity_probe_b
+from gpbnb.kalman.model import LinearModel, factor
 
 GOOD = {
     "Phi": [["0.9", "0.1"], [0, "0.8"]],

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.precision: the smallest precision that meets a goal is that, and says what it rests on."""
+"""gpbnb.kalman.precision: the smallest precision that meets a tolerance is that, and says what it rests on."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import precision
-from gpbnb.kalman.experiment import Form, Simulation, bounded, emulate, log_spaced, reference
+from gpbnb.kalman.bounded_run import emulate_with_bound
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.simulation import Simulation
 
 STEPS = 60
 MODEL = LinearModel(
@@ -28,14 +32,14 @@ def true():
 
 
 def error(fmt):
-    return np.abs(emulate(MODEL, Z, fmt, Form.USUAL, range(1, STEPS + 1), true()).state)
+    return np.abs(emulate(MODEL, Z, fmt, Form.INNOVATION, range(1, STEPS + 1), true()).state)
 
 
 @pytest.mark.parametrize("rounding", list(Rounding))
 @pytest.mark.parametrize("base", [2, 10, 16])
-def test_the_smallest_precision_meets_the_goal_and_one_less_does_not(base, rounding):
-    goal = 1e-4
-    found = required_precision(MODEL, STEPS, goal, base, rounding)
+def test_the_smallest_precision_meets_the_tolerance_and_one_less_does_not(base, rounding):
+    tolerance = 1e-4
+    found = required_precision(MODEL, STEPS, tolerance, base, rounding)
     assert found.fmt.base == base
     assert found.fmt.rounding is rounding
     t = found.fmt.precision
@@ -45,34 +49,34 @@ def test_the_smallest_precision_meets_the_goal_and_one_less_does_not(base, round
     assert ratios[t + 1] <= 1
     assert ratios[t - 1] > 1
     for digits in (t - 1, t, t + 1):  # here at every step, there at sixteen a decade
-        seen = error(FloatFormat(base, digits, rounding)).max() / goal
+        seen = error(FloatFormat(base, digits, rounding)).max() / tolerance
         assert ratios[digits] <= seen <= 3 * ratios[digits]
     assert (found.basis, found.steps) == ("emulation", STEPS)
     assert str(found).startswith(f"{t} digits of base {base}, {rounding.value}: ")
-    assert str(found).endswith("of the goal (emulation, 60 steps)")
+    assert str(found).endswith("of the tolerance (emulation, 60 steps)")
 
 
 def test_errors_of_storing_the_model_count():
     """With few digits, most of the error: the transition itself is off."""
     found = required_precision(MODEL, STEPS, 1e-3, 10, z=Z)
-    alone = np.abs(emulate(MODEL, Z, found.fmt, Form.USUAL).state).max()
+    alone = np.abs(emulate(MODEL, Z, found.fmt, Form.INNOVATION).state).max()
     assert dict(found.tried)[found.fmt.precision] * 1e-3 != alone
     assert error(found.fmt).max() <= 3e-3
 
 
 def errors_in(model, z, base, options):
     """Largest error of each state in so many digits; None where the run is lost."""
-    form, rounding = options.get("form", Form.USUAL), options.get("rounding", Rounding.NEAREST)
-    marks = log_spaced(len(z), 16)
-    true = reference(model, z, marks)
+    form, rounding = options.get("form", Form.INNOVATION), options.get("rounding", Rounding.NEAREST)
+    checkpoint_steps = log_spaced(len(z), 16)
+    true = reference(model, z, checkpoint_steps)
 
-    @cache  # for all goals
+    @cache  # for all tolerances
     def largest(digits):
         fmt = FloatFormat(base, digits, rounding)
         try:
             if options.get("basis") == "bound":
-                return bounded(model, z, fmt, form, marks).state.max(axis=0)
-            history = emulate(model, z, fmt, form, marks, true)
+                return emulate_with_bound(model, z, fmt, form, checkpoint_steps).state.max(axis=0)
+            history = emulate(model, z, fmt, form, checkpoint_steps, true)
         except ValueError:
             return None
         return None if history.indefinite or history.stopped else np.abs(history.state).max(axis=0)
@@ -80,12 +84,12 @@ def errors_in(model, z, base, options):
     return largest
 
 
-def upward(largest, goal, base):
-    """The slow way: every precision from 2 up, until two in succession meet the goal."""
+def upward(largest, tolerance, base):
+    """The slow way: every precision from 2 up, until two in succession meet the tolerance."""
     met = []
     for digits in range(2, {2: 53, 10: 18, 16: 13}[base] + 1):
         errors = largest(digits)
-        met.append(errors is not None and bool((errors <= goal).all()))
+        met.append(errors is not None and bool((errors <= tolerance).all()))
         if met[-2:] == [True, True]:
             return digits - 1, met
     return (digits if met[-1] else None), met
@@ -112,7 +116,7 @@ MODELS = {
         (2, {"rounding": Rounding.CHOP}),
         (2, {"form": Form.UD}),
         (2, {"basis": "bound"}),
-        (10, {"form": Form.REPORT}),
+        (10, {"form": Form.HUNG}),
         (16, {"form": Form.JOSEPH, "basis": "bound"}),
     ],
 )
@@ -121,16 +125,16 @@ def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
     if z is model:
         z = Simulation(model, tuple(model.x0.astype(float)), 0, resolution=2.0**-30).measurements(40)
     largest = errors_in(model, z, base, options)
-    for goal in (1e-1, 1e-4, 1e-7):
-        found = required_precision(model, len(z), goal, base, z=z, **options)
-        digits, met = upward(largest, goal, base)
+    for tolerance in (1e-1, 1e-4, 1e-7):
+        found = required_precision(model, len(z), tolerance, base, z=z, **options)
+        digits, met = upward(largest, tolerance, base)
         assert (found.fmt.precision if found.fmt else None) == digits
         assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
         assert len(found.tried) <= 8  # of up to 52
 
 
 def test_a_lucky_precision_does_not_count(monkeypatch):
-    """Below a threshold some meet the goal by luck, never two in succession: they are passed over."""
+    """Below a threshold some meet the tolerance by luck, never two in succession: they are passed over."""
     rng = np.random.default_rng(8)
     passed = 0
     for _ in range(200):
@@ -139,7 +143,7 @@ def test_a_lucky_precision_does_not_count(monkeypatch):
         lucky -= {t + 1 for t in lucky}
         monkeypatch.setattr(
             precision,
-            "_over_goal",
+            "_error_over_tolerance",
             lambda m, z, fmt, *rest, least=threshold, by_luck=lucky: (
                 (0.5 if fmt.precision in by_luck or fmt.precision >= least else 2.0, "")
             ),
@@ -155,17 +159,17 @@ def test_a_lucky_precision_does_not_count(monkeypatch):
 
 
 def test_the_bound_asks_for_more_digits_and_holds():
-    goal = 1e-4
-    by_bound = required_precision(MODEL, STEPS, goal, 2, basis="bound", z=Z)
-    by_emulation = required_precision(MODEL, STEPS, goal, 2, z=Z)
+    tolerance = 1e-4
+    by_bound = required_precision(MODEL, STEPS, tolerance, 2, basis="bound", z=Z)
+    by_emulation = required_precision(MODEL, STEPS, tolerance, 2, z=Z)
     assert by_emulation.fmt.precision < by_bound.fmt.precision <= by_emulation.fmt.precision + 12
-    found = bounded(MODEL, Z, by_bound.fmt, Form.USUAL)
-    assert found.state.max() <= goal
+    found = emulate_with_bound(MODEL, Z, by_bound.fmt, Form.INNOVATION)
+    assert found.state.max() <= tolerance
     assert np.abs(found.history.state).max() <= found.state.max()
     assert "(bound, 60 steps)" in str(by_bound)
 
 
-def test_a_goal_for_each_state():
+def test_a_tolerance_for_each_state():
     first = required_precision(MODEL, STEPS, (1e-6, math.inf), 2, z=Z).fmt
     second = required_precision(MODEL, STEPS, (math.inf, 1e-2), 2, z=Z).fmt
     assert second.precision < first.precision
@@ -195,13 +199,13 @@ def test_no_precision_may_be_enough():
     found = required_precision(MODEL, 3, 1e-30, 16, z=Z[:3])
     assert found.fmt is None
     assert found.tried[-1][0] == 13
-    assert str(found) == "no precision up to 13 digits meets the goal (emulation, 3 steps)"
+    assert str(found) == "no precision up to 13 digits meets the tolerance (emulation, 3 steps)"
 
 
-def test_a_run_that_loses_its_covariance_does_not_meet_a_goal():
+def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
     """One state, R far below P: with few digits a variance comes out as zero, whatever the error of the state."""
-    told = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
-    found = required_precision(told, 3, 10.0, 10, form=Form.REPORT)
+    given = LinearModel([[1]], [[1]], [[0]], [["1e-6"]], [1], [[1]])
+    found = required_precision(given, 3, 10.0, 10, form=Form.HUNG)
     t = found.fmt.precision
     assert t > 5
     assert all(math.isinf(ratio) for digits, ratio in found.tried if digits < t)
@@ -215,17 +219,17 @@ def test_its_own_measurements_are_seeded():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"goal": 0}, "got goal 0; needed an error above 0"),
-        ({"goal": (1.0, -1.0)}, "got goal"),
-        ({"goal": math.nan}, "got goal nan"),
-        ({"goal": (math.inf, math.inf)}, "one finite"),
+        ({"tolerance": 0}, "got tolerance 0; needed an error above 0"),
+        ({"tolerance": (1.0, -1.0)}, "got tolerance"),
+        ({"tolerance": math.nan}, "got tolerance nan"),
+        ({"tolerance": (math.inf, math.inf)}, "one finite"),
         ({"base": 3}, "got base 3; needed one with compiled loops"),
         ({"basis": "hope"}, 'got basis \'hope\'; needed "emulation" or "bound"'),
-        ({"goal": (1.0,)}, r"got goal \(1.0,\) of shape \(1,\); .*: one number, or 2 in a row"),
-        ({"goal": ((1.0, 1.0),)}, r"of shape \(1, 2\)"),
-        ({"goal": "small"}, "got goal 'small'; needed an error above 0 for each of the 2 states"),
-        ({"goal": None}, "got goal None"),
-        ({"form": "ud"}, "got form 'ud'; needed one of Form.REPORT, .*Form.UD"),
+        ({"tolerance": (1.0,)}, r"got tolerance \(1.0,\) of shape \(1,\); .*: one number, or 2 in a row"),
+        ({"tolerance": ((1.0, 1.0),)}, r"of shape \(1, 2\)"),
+        ({"tolerance": "small"}, "got tolerance 'small'; needed an error above 0 for each of the 2 states"),
+        ({"tolerance": None}, "got tolerance None"),
+        ({"form": "ud"}, "got form 'ud'; needed one of Form.HUNG, .*Form.UD"),
         ({"steps": 0}, "got 0 steps; needed a whole number, at least 1"),
         ({"steps": 2.5}, "got 2.5 steps; needed a whole number"),
         ({"z": np.where(np.arange(60) == 7, np.nan, 1.0)[:, None]}, "got nan for measurement 0 of step 8; .*H a cycle"),
@@ -236,13 +240,13 @@ def test_its_own_measurements_are_seeded():
 )
 def test_what_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
-        required_precision(**({"model": MODEL, "steps": STEPS, "goal": 1e-3} | arguments))
+        required_precision(**({"model": MODEL, "steps": STEPS, "tolerance": 1e-3} | arguments))
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"goal": -1.0}, "got goal -1.0"),
+        ({"tolerance": -1.0}, "got tolerance -1.0"),
         ({"basis": "hope"}, "got basis 'hope'"),
         ({"base": 3}, "got base 3"),
         ({"form": 2}, "got form 2"),
@@ -254,7 +258,7 @@ def test_what_is_refused(arguments, message):
 )
 def test_what_a_survey_refuses(arguments, message):
     with pytest.raises(ValueError, match=message):
-        precision.survey(**({"model": MODEL, "z": Z, "goal": 1e-3, "precisions": [10]} | arguments))
+        precision.survey(**({"model": MODEL, "z": Z, "tolerance": 1e-3, "precisions": [10]} | arguments))
 
 
 def test_an_answer_says_why_fewer_digits_were_refused():

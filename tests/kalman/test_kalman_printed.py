@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.bounds import column_sum_norm, max_norm, row_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import printed, theory
-from gpbnb.kalman.experiment import Kept, reference
+from gpbnb.arithmetic.rational import column_sum_norm, max_norm, row_sum_norm
+from gpbnb.kalman import exact_step, printed, report_bounds
+from gpbnb.kalman.filter_run import Checkpoints, reference
 from gpbnb.kalman.model import LinearModel
 
 TWO = LinearModel(
@@ -34,7 +34,7 @@ def found():
 def steps():
     x, P, result = TWO.x0, TWO.P0, []
     for k, z in enumerate(Z):
-        step = theory.exact_step(TWO.Phi[k % 2], TWO.H[0], TWO.Q[0], TWO.R[0], x, P, z)
+        step = exact_step.exact_step(TWO.Phi[k % 2], TWO.H[0], TWO.Q[0], TWO.R[0], x, P, z)
         x, P = step.x, step.P
         result.append((step, step.gain @ np.array([Fraction(each) for each in z])))
     return result
@@ -53,27 +53,31 @@ def test_the_terms_are_those_of_exact_steps(found, steps):
     assert (found.n, found.m) == (2, 1)
 
 
-@pytest.mark.parametrize("faults", theory.MENDINGS.values())
+@pytest.mark.parametrize("faults", report_bounds.CORRECTIONS.values())
 def test_the_kindest_bound(found, steps, faults):
     for k in (1, 3, 5):
         u = max(max_norm(u) for _, u in steps[:k])
-        counts = theory.coefficients(k, 2, 1, **faults)
-        expected = theory.state_bound(max_norm(steps[k - 1][0].x), u, FIVE.unit_roundoff, counts)
-        assert found.kindest(FIVE, k, **faults) == pytest.approx(float(expected), rel=1e-13)
+        counts = report_bounds.coefficients(k, 2, 1, **faults)
+        expected = report_bounds.state_bound(max_norm(steps[k - 1][0].x), u, FIVE.unit_roundoff, counts)
+        assert found.smallest_bound(FIVE, k, **faults) == pytest.approx(float(expected), rel=1e-13)
 
 
 def test_beyond_the_last_step_its_sizes_are_kept(found):
-    first, second = theory.coefficients(1000, 2, 1)
+    first, second = report_bounds.coefficients(1000, 2, 1)
     expected = float(FIVE.unit_roundoff) * (first * found.x[-1] + second * found.u[-1])
-    assert found.kindest(FIVE, 1000) == pytest.approx(expected, rel=1e-15)
+    assert found.smallest_bound(FIVE, 1000) == pytest.approx(expected, rel=1e-15)
 
 
 def test_the_powers(found):
     assert 10 ** found.powers() == pytest.approx(found.columns[-1] ** (len(Z) - 1), rel=1e-12)
 
 
-@pytest.mark.parametrize("marks", [(1, 3), (2, 3), ()])
-def test_steps_left_out_are_refused(marks):
-    true = reference(TWO, Z, marks) if marks else Kept((), *(np.empty((0, 1), dtype=object) for _ in range(3)))
+@pytest.mark.parametrize("checkpoint_steps", [(1, 3), (2, 3), ()])
+def test_steps_left_out_are_refused(checkpoint_steps):
+    true = (
+        reference(TWO, Z, checkpoint_steps)
+        if checkpoint_steps
+        else Checkpoints((), *(np.empty((0, 1), dtype=object) for _ in range(3)))
+    )
     with pytest.raises(ValueError, match=r"got the steps .*; needed 1, 2, 3"):
         printed.terms(TWO, true)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import ensembles, printed, smallest, tables, theory, year
-from gpbnb.kalman.experiment import Form
-from gpbnb.kalman.model import gravity_probe_b
+from gpbnb.kalman import ensembles, printed, report_bounds, smallest, tables, year, year_cases
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import gravity_probe_b
 from gpbnb.kalman.precision import Requirement
 
 
@@ -20,15 +20,15 @@ def cells(table):
 
 
 def test_the_example_by_every_formula():
-    rows = cells(tables.example(*theory.EXAMPLE))
-    assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(theory.MENDINGS)
+    rows = cells(tables.example(*report_bounds.EXAMPLE))
+    assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(report_bounds.CORRECTIONS)
     assert rows[0][1:] == ["first", r"$2.5860\times10^{8}$", r"$3.867\times10^{-9}$", "10", r"$2.9\times10^{-8}$"]
     assert rows[1][1:] == ["second", r"$4.0775\times10^{14}$", r"$2.452\times10^{-15}$", "16", r"$4.5\times10^{-2}$"]
     assert [row[4] for row in rows] == ["10", "16", "10", "16", "10", "16", "15", "22"]
 
 
-def test_the_slips():
-    rows = {row[0]: row[1:] for row in cells(tables.slips(*theory.EXAMPLE))}
+def test_the_misprints():
+    rows = {row[0]: row[1:] for row in cells(tables.misprints(*report_bounds.EXAMPLE))}
     assert list(rows) == [
         "first coefficient",
         "second coefficient",
@@ -44,13 +44,13 @@ def test_the_slips():
     assert rows["second digits"] == ["$17$", "16", "the printed β is that of 16.81 digits; it needs 17"]
 
 
-def test_slips_that_are_none_are_not_claimed():
-    rows = {row[0]: row[1:] for row in cells(tables.slips(1000, 3, 1))}
+def test_misprints_that_are_none_are_not_claimed():
+    rows = {row[0]: row[1:] for row in cells(tables.misprints(1000, 3, 1))}
     assert rows["second coefficient"][2] == "not found"
 
 
 def test_what_one_grants():
-    rows = cells(tables.goals(*theory.EXAMPLE, Fraction(1), Fraction(6606)))
+    rows = cells(tables.tolerances(*report_bounds.EXAMPLE, Fraction(1), Fraction(6606)))
     assert [row[3:] for row in rows] == [["10", "28"], ["13", "41"], ["16", "49"], ["20", "62"]]
     assert rows[1][1:3] == [r"$1.5\times10^{-4}$", "$1.0$"]
 
@@ -69,10 +69,10 @@ def test_the_order():
     ]
 
 
-def test_the_mildest_noise():
+def test_the_largest_violating_noise():
     fmt = FloatFormat(2, 5)
-    rows = cells(tables.mildest([fmt]))
-    first, second = (smallest.mildest(fmt, form) for form in (False, True))
+    rows = cells(tables.largest_violating_noise([fmt]))
+    first, second = (smallest.largest_violating_noise(fmt, form) for form in (False, True))
     assert [row[:2] for row in rows] == [["5 bits", "first"], ["5 bits", "second"]]
     assert rows[0][2] == f"{float(first['covariance']):.3g}"
     assert rows[0][3] == "none"
@@ -86,12 +86,12 @@ def test_the_states():
     assert len(rows) == 10
 
 
-USUAL = year.MODELS[0]
+USUAL = year_cases.MODELS[0]
 
 
 def run(**changes):
     values = {
-        "case": year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.REPORT),
+        "case": year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG),
         "steps": np.array([1, 3]),
         "drift": np.array([[9.0, 9.0], [-2.0, 1.0]]),
         "rate": np.array([[9.0, 9.0], [0.25, -0.5]]),
@@ -112,10 +112,10 @@ def test_year_ends():
     rows = cells(table)
     assert rows[0] == ["24 bits", "report", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5, a variance lost at step 2"
-    other = run(case=run().case._replace(model=year.MODELS[1]))
+    other = run(case=run().case._replace(model=year_cases.MODELS[1]))
     table = tables.year_ends([run(), other])
     assert table.header[0] == "model"
-    assert [row[0] for row in cells(table)] == list(year.MODELS[:2])
+    assert [row[0] for row in cells(table)] == list(year_cases.MODELS[:2])
     with pytest.raises(ValueError, match="got the reference"):
         tables.year_ends([run(case=run().case.reference)])
 
@@ -126,7 +126,7 @@ def test_slack():
     zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
     bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
     row = cells(tables.slack([run()], [bounds], terms))[0]
-    first, second = theory.coefficients(k, 10, 2)
+    first, second = report_bounds.coefficients(k, 10, 2)
     assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
     assert row[-1] == "1.25000"
     with pytest.raises(ValueError, match="needed one to step 3"):

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.theory: counts of the report, the closing example, and a bound that no trajectory exceeds."""
+"""gpbnb.kalman.report_bounds and contraction: counts, the closing example, a bound that no trajectory exceeds."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
-from gpbnb.kalman import derivation, smallest, theory
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman import contraction, derivation, exact_step, report_bounds, smallest
+from gpbnb.kalman.kernels import contraction as kernels_contraction
 
 UNIT = 2.0**-102
 
@@ -22,7 +23,7 @@ def floats(entries):
 # -- counts ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("faults", theory.MENDINGS.values())
+@pytest.mark.parametrize("faults", report_bounds.CORRECTIONS.values())
 @pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (4, 3, 5), (17, 10, 2), (3_153_600, 10, 2)])
 def test_coefficients_are_those_derived(faults, k, n, m):
     c, d = derivation.ONCE if faults.get("once") else derivation.TWICE
@@ -30,7 +31,7 @@ def test_coefficients_are_those_derived(faults, k, n, m):
     first = derivation.count_start(c, g)
     second = derivation.second_coefficient(c, d, g, 1 if faults.get("free_signs") else -1)
     values = {derivation.K: k, derivation.N: n, derivation.M: m}
-    assert theory.coefficients(k, n, m, **faults) == (first.subs(values), second.subs(values))
+    assert report_bounds.coefficients(k, n, m, **faults) == (first.subs(values), second.subs(values))
 
 
 @pytest.mark.parametrize(
@@ -45,42 +46,48 @@ def test_coefficients_are_sums_over_steps(faults):
     a0 = sum(c)
     a = [sum(c[i + 1 :]) + d[i] for i in range(k)]
     sign = 1 if faults.get("free_signs") else -1
-    assert theory.coefficients(k, n, m, **faults) == (a0, sum(a0 + sign * each for each in a))
+    assert report_bounds.coefficients(k, n, m, **faults) == (a0, sum(a0 + sign * each for each in a))
 
 
 def test_the_printed_cases():
     n, m = 4, 3
-    assert theory.coefficients(3, n, m) == (3 * (7 * n + 3 * m + 6), 30 * n + 9 * m + 21)
-    assert theory.coefficients(4, n, m).second == 4 * (3 * n + 1) + 6 * (7 * n + 3 * m + 6)
-    assert (theory.prediction_count(n), theory.covariance_count(n, m), theory.gain_count(n, m)) == (9, 17, 25)
-    assert (theory.transition_count(n, m), theory.input_count(n, m)) == (38, 29)
+    assert report_bounds.coefficients(3, n, m) == (3 * (7 * n + 3 * m + 6), 30 * n + 9 * m + 21)
+    assert report_bounds.coefficients(4, n, m).second == 4 * (3 * n + 1) + 6 * (7 * n + 3 * m + 6)
+    assert (
+        report_bounds.prediction_count(n),
+        report_bounds.covariance_count(n, m),
+        report_bounds.gain_count(n, m),
+    ) == (9, 17, 25)
+    assert (report_bounds.transition_count(n, m), report_bounds.input_count(n, m)) == (38, 29)
 
 
 @pytest.mark.parametrize("numbers", [(0, 1, 1), (1, 0, 1), (1, 1, 0)])
 def test_coefficients_refuse_nothing(numbers):
     with pytest.raises(ValueError, match="needed each at least 1"):
-        theory.coefficients(*numbers)
+        report_bounds.coefficients(*numbers)
 
 
 def test_printed_bounds_of_covariance_and_gain():
     beta = Fraction(1, 1000)
-    assert theory.printed_covariance_bound([[2, -1], [-1, 3]], 1, beta).tolist() == [
+    assert report_bounds.printed_covariance_bound([[2, -1], [-1, 3]], 1, beta).tolist() == [
         [Fraction(18, 1000), Fraction(9, 1000)],
         [Fraction(9, 1000), Fraction(27, 1000)],
     ]
-    assert theory.printed_gain_bound([[2], [-1]], beta).tolist() == [[Fraction(26, 1000)], [Fraction(13, 1000)]]
+    assert report_bounds.printed_gain_bound([[2], [-1]], beta).tolist() == [[Fraction(26, 1000)], [Fraction(13, 1000)]]
 
 
 def test_the_least_b():
     F = [exact([["1/2", 0], ["1/2", 2]]), exact([[0, 0], [0, 1]])]
     u = [exact([3, -5]), exact([0, 1])]
-    assert theory.printed_input_bound(F, u) == 5 * 2
-    assert theory.printed_input_bound([f / 4 for f in F], u) == 5
-    assert theory.state_bound(Fraction(3), Fraction(2), Fraction(1, 10), theory.Coefficients(5, 7)) == Fraction(29, 10)
+    assert report_bounds.printed_input_bound(F, u) == 5 * 2
+    assert report_bounds.printed_input_bound([f / 4 for f in F], u) == 5
+    assert report_bounds.state_bound(
+        Fraction(3), Fraction(2), Fraction(1, 10), report_bounds.Coefficients(5, 7)
+    ) == Fraction(29, 10)
     with pytest.raises(ValueError, match="got 2 transitions and 1 inputs"):
-        theory.printed_input_bound(F, u[:1])
+        report_bounds.printed_input_bound(F, u[:1])
     with pytest.raises(ValueError, match="at least one"):
-        theory.printed_input_bound([], [])
+        report_bounds.printed_input_bound([], [])
 
 
 # -- the closing example --------------------------------------------------------------------------
@@ -89,47 +96,47 @@ def test_the_least_b():
 @pytest.mark.parametrize(("base", "rounding"), [(2, Rounding.NEAREST), (10, Rounding.NEAREST), (10, Rounding.CHOP)])
 @pytest.mark.parametrize("coefficient", [1, 82, 999_999, 10**9, Fraction(1, 7)])
 def test_required_precision_is_enough_and_the_least(base, rounding, coefficient):
-    t = theory.required_precision(coefficient, Fraction(1, 3), base, rounding)
+    t = report_bounds.precision_for_coefficient(coefficient, Fraction(1, 3), base, rounding)
     assert coefficient * FloatFormat(base, t, rounding).unit_roundoff <= Fraction(1, 3)
     assert t == 1 or coefficient * FloatFormat(base, t - 1, rounding).unit_roundoff > Fraction(1, 3)
 
 
-@pytest.mark.parametrize(("coefficient", "goal"), [(0, 1), (1, 0), (-1, 1)])
-def test_required_precision_needs_positive_numbers(coefficient, goal):
+@pytest.mark.parametrize(("coefficient", "tolerance"), [(0, 1), (1, 0), (-1, 1)])
+def test_required_precision_needs_positive_numbers(coefficient, tolerance):
     with pytest.raises(ValueError, match="needed both positive"):
-        theory.required_precision(coefficient, goal)
+        report_bounds.precision_for_coefficient(coefficient, tolerance)
 
 
 def test_the_closing_example():
-    first, second = theory.coefficients(*theory.EXAMPLE)
+    first, second = report_bounds.coefficients(*report_bounds.EXAMPLE)
     assert (first, second) == (258_595_200, 407_752_879_824_000)
-    assert (theory.required_precision(first), theory.required_precision(second)) == (10, 16)
-    assert theory.required_precision(second, base=2) == 49  # IEEE double has 53
+    assert (report_bounds.precision_for_coefficient(first), report_bounds.precision_for_coefficient(second)) == (10, 16)
+    assert report_bounds.precision_for_coefficient(second, base=2) == 49  # IEEE double has 53
 
 
-def test_which_slip_leads_to_which_printed_number():
-    k, n, m = theory.EXAMPLE
-    printed = theory.PRINTED
-    assert not prints_as(theory.coefficients(k, n, m).first, printed["first coefficient"])
-    assert theory.one_figure_slips(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
-    assert prints_as(theory.read_as_product(k, n, m, 84), printed["second coefficient"])
-    assert not prints_as(theory.read_as_product(k, n, m), printed["second coefficient"])
+def test_which_misprint_leads_to_which_printed_number():
+    k, n, m = report_bounds.EXAMPLE
+    printed = report_bounds.PRINTED
+    assert not prints_as(report_bounds.coefficients(k, n, m).first, printed["first coefficient"])
+    assert report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
+    assert prints_as(report_bounds.read_as_product(k, n, m, 84), printed["second coefficient"])
+    assert not prints_as(report_bounds.read_as_product(k, n, m), printed["second coefficient"])
     for name in ("first", "second"):
         assert prints_as(1 / Fraction(printed[f"{name} coefficient"]), printed[f"{name} beta"])
 
 
 def test_the_order_of_the_equations():
-    found = theory.order(second=False)
-    for equation, needs in theory.dependencies(second=False).items():
+    found = report_bounds.order(second=False)
+    for equation, needs in report_bounds.dependencies(second=False).items():
         assert all(found.index(need) < found.index(equation) for need in needs)
-    assert theory.order(second=True) is None
+    assert report_bounds.order(second=True) is None
 
 
 # -- one exact step -------------------------------------------------------------------------------
 
 
 def test_a_step_worked_by_hand():
-    step = theory.exact_step([[2]], [[1]], [[1]], [[4]], [3], [["3/4"]], [10])
+    step = exact_step.exact_step([[2]], [[1]], [[1]], [[4]], [3], [["3/4"]], [10])
     assert step.predicted.tolist() == [[4]]  # 2 · 3/4 · 2 + 1
     assert step.gain.tolist() == [[Fraction(1, 2)]]
     assert (step.P.tolist(), step.x.tolist(), step.innovation.tolist()) == ([[2]], [8], [4])
@@ -137,8 +144,8 @@ def test_a_step_worked_by_hand():
 
 
 def test_a_step_is_singular():
-    with pytest.raises(ZeroDivisionError):
-        theory.exact_step([[1]], [[1]], [[0]], [[0]], [0], [[0]], [0])
+    with pytest.raises(np.linalg.LinAlgError, match="singular"):
+        exact_step.exact_step([[1]], [[1]], [[0]], [[0]], [0], [[0]], [0])
 
 
 # -- the contraction bound ------------------------------------------------------------------------
@@ -169,11 +176,11 @@ def trajectory(rng, n, m, size, steps=8, disturb="random"):
     plain = [floats(each) for each in given]
     x0 = x + exact(floats(x) * size * rng.uniform(-1, 1, n))
     dE = exact(np.diag(floats(P).diagonal() * size))
-    bound = theory.contraction_start(floats(P), np.abs(floats(x0 - x)), np.abs(floats(dE)))
+    bound = contraction.contraction_start(floats(P), np.abs(floats(x0 - x)), np.abs(floats(dE)))
     run, truth = (x0, P + dE), (x, P)
     for _ in range(steps):
         z = exact(rng.integers(-99, 100, m))
-        here, true = theory.exact_step(*given, *run, z), theory.exact_step(*given, *truth, z)
+        here, true = exact_step.exact_step(*given, *run, z), exact_step.exact_step(*given, *truth, z)
         spread = np.sqrt(floats(here.P).diagonal())
         if disturb == "random":
             q, T = rng.uniform(-1, 1, n) * spread, rng.uniform(-1, 1, (n, n)) * np.outer(spread, spread)
@@ -182,16 +189,16 @@ def trajectory(rng, n, m, size, steps=8, disturb="random"):
         x = shortened(here.x + exact(q * size))
         P = shortened(here.P + exact((T + T.T) * size / 2))
         K, S = floats(here.gain), floats(here.innovation_covariance)
-        d = theory.evaluation_errors(*plain, floats(run[0]), floats(run[1]), floats(z), K, S, UNIT)
+        d = contraction.evaluation_errors(*plain, floats(run[0]), floats(run[1]), floats(z), K, S, UNIT)
         dq, dT, dK, dv = d
-        bound = theory.contraction_step(
+        bound = contraction.contraction_step(
             bound, *plain, K, S, floats(here.innovation), floats(x - here.x), floats(P - here.P), dq, dT, dK, dv
         )
         used = shortened(here.gain * (1 + exact(size)))
         yield (
-            (floats(x - true.x), theory.state_error_bound(bound)),
-            (floats(P - true.P), theory.covariance_error_bound(bound)),
-            (floats(used - true.gain), theory.gain_error_bound(bound, K, floats(used), dK)),
+            (floats(x - true.x), contraction.state_error_bound(bound)),
+            (floats(P - true.P), contraction.covariance_error_bound(bound)),
+            (floats(used - true.gain), contraction.gain_error_bound(bound, K, floats(used), dK)),
         )
         run, truth = (x, P), (shortened(true.x), shortened((true.P + true.P.T) / 2))
 
@@ -224,7 +231,7 @@ def scalar_step(bound, q=0.0, T=0.0, d=0.0, P=1.0, R=1.0):
     one = np.ones((1, 1))
     S = one * (P + R)
     K = one * P / S if S[0, 0] else one
-    return theory.contraction_step(
+    return contraction.contraction_step(
         bound,
         one,
         one,
@@ -244,7 +251,7 @@ def scalar_step(bound, q=0.0, T=0.0, d=0.0, P=1.0, R=1.0):
 
 def test_the_recursion_of_one_state():
     # P = 1, R = 1: S = 2, K = A = 1/2, P after = 1/2, in units of the standard deviations sqrt(1) and sqrt(1/2).
-    start = theory.contraction_start(np.ones((1, 1)), np.full(1, 1e-6), np.full((1, 1), 1e-7))
+    start = contraction.contraction_start(np.ones((1, 1)), np.full(1, 1e-6), np.full((1, 1), 1e-7))
     assert (start.eta, start.zeta) == pytest.approx((1e-6, 1e-7), rel=1e-12)
     after = scalar_step(start, q=3e-6, T=5e-7)
     alpha = 0.5 / 0.5**0.5
@@ -254,12 +261,12 @@ def test_the_recursion_of_one_state():
     assert after.zeta == pytest.approx(5e-7 / 0.5 + after.alpha**2 * 1e-7 / (1 - g * 1e-7), rel=1e-12)
     assert after.eta == pytest.approx(3e-6 / 0.5**0.5 + after.alpha * (1e-6 + y * 1e-7) / (1 - g * 1e-7), rel=1e-12)
     assert after.gain[0] == pytest.approx(after.alpha * 1e-7 * 0.5, rel=1e-6)
-    assert theory.state_error_bound(after)[0] == pytest.approx(after.eta * 0.5**0.5, rel=1e-12)
-    assert theory.covariance_error_bound(after)[0, 0] == pytest.approx(after.zeta * 0.5, rel=1e-12)
+    assert contraction.state_error_bound(after)[0] == pytest.approx(after.eta * 0.5**0.5, rel=1e-12)
+    assert contraction.covariance_error_bound(after)[0, 0] == pytest.approx(after.zeta * 0.5, rel=1e-12)
 
 
 def test_errors_of_the_evaluation_enter():
-    start = theory.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
+    start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
     after = scalar_step(start, d=1e-9)
     assert after.eta == pytest.approx(1e-9 / 0.5**0.5, rel=1e-6)
     assert after.zeta == pytest.approx(1e-9 / 0.5, rel=1e-6)
@@ -267,26 +274,26 @@ def test_errors_of_the_evaluation_enter():
 
 @pytest.mark.parametrize("change", [{"q": np.nan}, {"T": np.inf}, {"d": np.nan}, {"R": -1.0}, {"P": np.nan}], ids=str)
 def test_nothing_known_is_infinite_and_stays_so(change):
-    start = theory.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
+    start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.zeros((1, 1)))
     after = scalar_step(start, **change)
     assert after.eta == after.zeta == np.inf
     later = scalar_step(after)
     assert later.eta == later.zeta == np.inf
-    assert np.all(theory.state_error_bound(later) == np.inf)
+    assert np.all(contraction.state_error_bound(later) == np.inf)
 
 
 def test_a_covariance_that_is_far_off_gives_no_bound():
-    start = theory.contraction_start(np.ones((1, 1)), np.zeros(1), np.full((1, 1), 2.5))
+    start = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.full((1, 1), 2.5))
     assert scalar_step(start).eta == np.inf
-    nearer = theory.contraction_start(np.ones((1, 1)), np.zeros(1), np.full((1, 1), 1.5))
+    nearer = contraction.contraction_start(np.ones((1, 1)), np.zeros(1), np.full((1, 1), 1.5))
     assert scalar_step(nearer).eta < np.inf
 
 
 def test_a_singular_start_is_weighted_all_the_same():
     P = np.array([[1.0, 1.0], [1.0, 1.0]])
-    start = theory.contraction_start(P, np.full(2, 1e-6), np.zeros((2, 2)))
+    start = contraction.contraction_start(P, np.full(2, 1e-6), np.zeros((2, 2)))
     assert start.eta < np.inf
-    assert np.all(theory.state_error_bound(start) >= 1e-6)
+    assert np.all(contraction.state_error_bound(start) >= 1e-6)
     assert np.all(np.linalg.matrix_rank(start.L) == 2)
 
 
@@ -297,14 +304,14 @@ def test_evaluation_errors_cover_what_float64_does():
         z = exact(rng.integers(-99, 100, 2))
         Phi, H, Q, R, x1, P1, z1 = map(floats, (*given, x, P, z))
         stored = [exact(each) for each in (Phi, H, Q, R, x1, P1, z1)]
-        true = theory.exact_step(*stored)
+        true = exact_step.exact_step(*stored)
         Pp = Phi @ P1 @ Phi.T + Q
         S = H @ Pp @ H.T + R
         L = np.linalg.cholesky((S + S.T) / 2)
         K = np.linalg.solve(L.T, np.linalg.solve(L, H @ Pp)).T
         v = z1 - H @ (Phi @ x1)
         x2, P2 = Phi @ x1 + K @ v, Pp - K @ (H @ Pp)
-        dq, dT, dK, dv = theory.evaluation_errors(Phi, H, Q, R, x1, P1, z1, floats(true.gain), S, 2.0**-53)
+        dq, dT, dK, dv = contraction.evaluation_errors(Phi, H, Q, R, x1, P1, z1, floats(true.gain), S, 2.0**-53)
         for computed, right, allowed in (
             (x2, true.x, dq),
             ((P2 + P2.T) / 2, true.P, dT),
@@ -322,14 +329,14 @@ def test_the_spectral_norm_is_bounded_from_above_and_sharply(n):
         for scale in (0.5, 0.999999, 1.0, 3.0):
             X = Z / np.linalg.svd(Z)[1][0] * scale
             top = np.linalg.svd(X)[1][0]
-            found = theory._norm2(X)
+            found = kernels_contraction._norm2(X)
             # Its square is sharp to a thousandth of its distance from 1, relatively; numpy's own error is below 1e-13.
             assert top * (1 - 1e-13) <= found <= top * (1 + 0.6e-3 * abs(1 - top**2)) + 1e-11
 
 
 def test_a_companion_bounds_by_the_triangle():
-    assert np.all(theory.companion_bound([-3.0, 0.0], [1.0, 2.0]) >= [4.0, 2.0])
-    assert theory.companion_bound(np.array([-3.0]), np.array([1.0]))[0] == pytest.approx(4)
+    assert np.all(contraction.companion_bound([-3.0, 0.0], [1.0, 2.0]) >= [4.0, 2.0])
+    assert contraction.companion_bound(np.array([-3.0]), np.array([1.0]))[0] == pytest.approx(4)
 
 
 # -- the smallest filters -------------------------------------------------------------------------
@@ -371,8 +378,8 @@ def test_nothing_is_broken_where_nothing_cancels():
 
 @pytest.mark.parametrize("second", [False, True])
 @pytest.mark.parametrize("fmt", [FloatFormat(10, 2), FloatFormat(2, 6)], ids=str)
-def test_the_mildest_is_the_mildest(fmt, second):
-    found = smallest.mildest(fmt, second)
+def test_the_largest_violating_noise_is_the_largest(fmt, second):
+    found = smallest.largest_violating_noise(fmt, second)
     numbers = {Fraction(d, fmt.base ** (fmt.precision - 1 + e)) for e in range(3) for d in range(1, 100)}
     for name, largest in found.items():
         assert getattr(smallest.ratios(fmt, smallest.scalar(fmt, largest), second), name) > 1

@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import answers, theory, year
-from gpbnb.kalman.experiment import TRUTH, Followed, Form, emulate, reference
-from gpbnb.kalman.model import YEAR
-from gpbnb.kalman.year import BLOCK, CASES, FOLLOWED, HEADER, MODELS, Case, Journey, travel
+from gpbnb.kalman import answers, contraction, year, year_cases, year_runs
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import Run, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
+from gpbnb.kalman.simulation import BLOCK
+from gpbnb.kalman.year import HEADER
+from gpbnb.kalman.year_cases import BOUNDED_CASES, CASES, MODELS, Case
+from gpbnb.kalman.year_runs import ResumableRun, run_cases
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
-SINGLE = Case(MODELS[0], 2, 24, NEAREST, Form.REPORT)
+SINGLE = Case(MODELS[0], 2, 24, NEAREST, Form.HUNG)
 MILLIARCSECOND = 1.0
 
 
@@ -35,13 +41,13 @@ def slices():
 @pytest.mark.parametrize("key", slices())
 def test_a_slice_of_every_year_comes_out_digit_for_digit(key):
     case = Case(key[0], int(key[1]), int(key[2]), Rounding(key[3]), Form[key[4].upper()])
-    marks = tuple(mark for mark in year.marks() if mark <= 464)
-    z = year.simulation(case.model).measurements(marks[-1])
-    told = year.model(case.model, case.base)
-    again = year.rows(case, emulate(told, z, case.fmt, case.form, marks, true(case.model, case.base)))
+    checkpoint_steps = tuple(mark for mark in year_cases.checkpoint_steps() if mark <= 464)
+    z = year_cases.simulation(case.model).measurements(checkpoint_steps[-1])
+    given = year_cases.model(case.model, case.base)
+    again = year.rows(case, emulate(given, z, case.fmt, case.form, checkpoint_steps, true(case.model, case.base)))
     lines = [line for line in stored("year") if line[:5] == key]
     # The last column is an eigenvalue, whose last digits are those of a machine's LAPACK.
-    assert [line[:-1] for line in again] == [line[:-1] for line in lines[: len(marks)]]
+    assert [line[:-1] for line in again] == [line[:-1] for line in lines[: len(checkpoint_steps)]]
     for line, other in zip(again, lines, strict=False):
         assert float(line[-1]) == pytest.approx(float(other[-1]), rel=1e-4, abs=1e-12)
 
@@ -52,16 +58,17 @@ REFERENCES = {}
 def true(name, base):
     """The reference, once for all cases."""
     if (name, base) not in REFERENCES:
-        marks = tuple(mark for mark in year.marks() if mark <= 464)
-        REFERENCES[name, base] = reference(year.model(name, base), year.simulation(name).measurements(464), marks)
+        checkpoint_steps = tuple(mark for mark in year_cases.checkpoint_steps() if mark <= 464)
+        z = year_cases.simulation(name).measurements(464)
+        REFERENCES[name, base] = reference(year_cases.model(name, base), z, checkpoint_steps)
     return REFERENCES[name, base]
 
 
 @pytest.mark.parametrize("base", [2, 10])
 def test_a_slice_of_the_bounds_comes_out_again(base, tmp_path, monkeypatch):
-    case = Case(MODELS[0], base, 0, NEAREST, Form.USUAL)
-    assert case in FOLLOWED
-    travel([case], tmp_path, 464, progress=False)
+    case = Case(MODELS[0], base, 0, NEAREST, Form.INNOVATION)
+    assert case in BOUNDED_CASES
+    run_cases([case], tmp_path, 464, progress=False)
     again = year.bound_rows(case, tmp_path, 464)
     lines = [line for line in stored("bounds") if line[1] == str(base)]
     assert again == lines[: len(again)]
@@ -73,7 +80,7 @@ def test_every_case_is_stored_to_the_end_of_the_year():
     assert [run.case for run in runs] == list(CASES)
     assert len(set(CASES)) == len(CASES) == 45
     for run in runs:
-        assert run.steps.tolist() == list(year.marks())
+        assert run.steps.tolist() == list(year_cases.checkpoint_steps())
         assert run.steps[-1] == YEAR == 3_153_600
         assert run.stopped is None
         assert run.drift.shape == run.rate.shape == (len(run.steps), 2)
@@ -83,12 +90,12 @@ def test_every_case_is_stored_to_the_end_of_the_year():
     assert set(made["cases"]) == {case.name for case in CASES}
     assert set(made["references"]) == {case.reference.name for case in CASES}
     assert {"machine", "versions", "command"} <= set(made)
-    covered = {(c.base, c.rounding) for c in CASES if c.form is Form.REPORT}
+    covered = {(c.base, c.rounding) for c in CASES if c.form is Form.HUNG}
     assert covered == {(2, NEAREST), (2, CHOP), (10, NEAREST), (10, CHOP)}
     assert {c.form for c in CASES if c.base == 2 and c.precision == 24} == set(Form)
 
 
-def at_end(base, precision, rounding=NEAREST, form=Form.REPORT, name=MODELS[0]):
+def at_end(base, precision, rounding=NEAREST, form=Form.HUNG, name=MODELS[0]):
     (run,) = (run for run in year.load() if run.case == Case(name, base, precision, rounding, form))
     return run
 
@@ -105,21 +112,21 @@ def test_the_error_goes_from_useless_to_negligible():
     assert errors == sorted(errors, reverse=True)
     decimal = [worst(at_end(10, t)) for t in (4, 6, 8, 10, 16)]
     assert decimal == sorted(decimal, reverse=True)
-    # Known to the digit: the smallest that stay within the goal, the one before and the one after.
+    # Known to the digit: the smallest that stay within the tolerance, the one before and the one after.
     most = {t: answers.largest(at_end(2, t)) for t in (31, 32, 33)}
     assert max(most[32], most[33]) < MILLIARCSECOND < most[31]
     assert answers.largest(at_end(10, 10)) < MILLIARCSECOND < answers.largest(at_end(10, 9))
     for t in (24, 28, 32):
         assert worst(at_end(2, t, CHOP)) > worst(at_end(2, t))
     # Joseph's form and the factors change little: what is lost is lost in the estimate.
-    for form in (Form.USUAL, Form.JOSEPH, Form.UD):
+    for form in (Form.INNOVATION, Form.JOSEPH, Form.UD):
         assert 0.5 < worst(at_end(2, 24, form=form)) / worst(at_end(2, 24)) < 2
 
 
 def test_the_refined_bound_is_near_the_error_at_the_end_of_the_year():
     """By a companion, the reference: at most 100 times the error is asked for."""
     bounds = year.bounds()
-    assert set(bounds) == set(FOLLOWED)
+    assert set(bounds) == set(BOUNDED_CASES)
     ratios = []
     for run in year.load():
         if run.case.reference in bounds:
@@ -127,7 +134,7 @@ def test_the_refined_bound_is_near_the_error_at_the_end_of_the_year():
             assert of_reference.steps.tolist() == run.steps.tolist()
             for name in ("drift", "rate"):
                 error, own = getattr(run, name)[-1], getattr(of_reference, name)[-1]
-                total = theory.companion_bound(error, own)
+                total = contraction.companion_bound(error, own)
                 assert (total >= np.abs(error)).all()
                 ratios.append((total / np.abs(error)).max())
     assert len(ratios) == 2 * 43
@@ -152,7 +159,7 @@ def test_what_the_filter_knows_is_what_it_thinks():
         assert 0.05 < rate < MILLIARCSECOND
 
 
-# -- what runs are told ---------------------------------------------------------------------------
+# -- what runs are given ---------------------------------------------------------------------------
 
 
 def test_in_one_base_every_format_holds_the_model_and_the_measurements():
@@ -161,18 +168,18 @@ def test_in_one_base_every_format_holds_the_model_and_the_measurements():
     assert min(case.precision for case in CASES if case.base == 2) == 14
     assert min(case.precision for case in CASES if case.base == 10) == 4
     for name, base in {(case.model, case.base) for case in CASES}:
-        told = year.model(name, base)
-        stored_again = told.rounded(FloatFormat(base, 14 if base == 2 else 4, CHOP))
+        given = year_cases.model(name, base)
+        stored_again = given.rounded(FloatFormat(base, 14 if base == 2 else 4, CHOP))
         for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
-            assert (getattr(told, letter) == getattr(stored_again, letter)).all()
-    z = year.simulation(MODELS[0]).measurements(BLOCK)
+            assert (getattr(given, letter) == getattr(stored_again, letter)).all()
+    z = year_cases.simulation(MODELS[0]).measurements(BLOCK)
     assert (z == np.rint(z)).all()
     assert np.abs(z).max() < 10**4  # four decimal digits
 
 
-def test_marks_are_at_equal_ratios():
-    assert year.marks()[-1] == YEAR
-    assert year.marks(100) == (1, 2, 5, 10, 22, 46, 100)
+def test_checkpoint_steps_are_at_equal_ratios():
+    assert year_cases.checkpoint_steps()[-1] == YEAR
+    assert year_cases.checkpoint_steps(100) == (1, 2, 5, 10, 22, 46, 100)
 
 
 def test_cases_have_names_of_their_own():
@@ -184,28 +191,28 @@ def test_cases_have_names_of_their_own():
 
 
 def test_the_fingerprint_tells_whatever_changes_a_run(monkeypatch):
-    def told(case=SINGLE, steps=500):
-        year.fingerprint.cache_clear()
-        return year.fingerprint(case, steps)
+    def given(case=SINGLE, steps=500):
+        year_runs.fingerprint.cache_clear()
+        return year_runs.fingerprint(case, steps)
 
-    first = told()
-    assert told() == first
-    others = {told(steps=501), told(SINGLE._replace(precision=25)), told(SINGLE._replace(rounding=CHOP))}
-    others |= {told(SINGLE._replace(form=form)) for form in Form if form is not Form.REPORT}
-    others |= {told(SINGLE._replace(model=name)) for name in MODELS[1:]} | {told(SINGLE.reference)}
-    monkeypatch.setattr(year, "TRUTH", tuple(value + 1 for value in TRUTH))
-    others.add(told())
+    first = given()
+    assert given() == first
+    others = {given(steps=501), given(SINGLE._replace(precision=25)), given(SINGLE._replace(rounding=CHOP))}
+    others |= {given(SINGLE._replace(form=form)) for form in Form if form is not Form.HUNG}
+    others |= {given(SINGLE._replace(model=name)) for name in MODELS[1:]} | {given(SINGLE.reference)}
+    monkeypatch.setattr(year_runs, "TRUTH", tuple(value + 1 for value in TRUTH))
+    others.add(given())
     monkeypatch.undo()
-    monkeypatch.setattr(year, "FOLLOWED", frozenset([SINGLE]))
-    others.add(told())
+    monkeypatch.setattr(year_runs, "BOUNDED_CASES", frozenset([SINGLE]))
+    others.add(given())
     monkeypatch.undo()
-    step = year.Run.take
-    monkeypatch.setattr(year.Run, "take", lambda self, z: step(self, z + 1))  # code that computes otherwise
-    others.add(told())
+    step = Run.take
+    monkeypatch.setattr(Run, "take", lambda self, z: step(self, z + 1))  # code that computes otherwise
+    others.add(given())
     monkeypatch.undo()
     assert first not in others
     assert len(others) == 13
-    year.fingerprint.cache_clear()
+    year_runs.fingerprint.cache_clear()
 
 
 # -- interruption ---------------------------------------------------------------------------------
@@ -214,15 +221,15 @@ STEPS = 2 * BLOCK + 100
 
 
 def results(directory):
-    year._true.cache_clear()
-    run = Journey(SINGLE, directory, STEPS).run
-    return year.rows(SINGLE, year.history(SINGLE, directory, STEPS)), run.x.tolist(), run.P.tolist()
+    year_runs.reference_checkpoints.cache_clear()
+    run = ResumableRun(SINGLE, directory, STEPS).run
+    return year.rows(SINGLE, year_runs.history(SINGLE, directory, STEPS)), run.x.tolist(), run.P.tolist()
 
 
 def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeypatch):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    travel([SINGLE], whole, STEPS, progress=False)
-    save, saved = Journey.save, []
+    run_cases([SINGLE], whole, STEPS, progress=False)
+    save, saved = ResumableRun.save, []
 
     def save_and_stop(self):
         save(self)
@@ -230,23 +237,23 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
         if self.run.steps == BLOCK:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Journey, "save", save_and_stop)
+    monkeypatch.setattr(ResumableRun, "save", save_and_stop)
     for _ in range(2):  # once in the reference, once in the run
         with pytest.raises(KeyboardInterrupt):
-            travel([SINGLE], parts, STEPS, progress=False, each=1)
-    travel([SINGLE], parts, STEPS, progress=False, each=1)
+            run_cases([SINGLE], parts, STEPS, progress=False, each=1)
+    run_cases([SINGLE], parts, STEPS, progress=False, each=1)
     ends = (BLOCK, 2 * BLOCK, STEPS)
     assert saved == [(case, steps) for case in (SINGLE.reference, SINGLE) for steps in ends]
     monkeypatch.undo()
     assert results(parts) == results(whole)
     assert year.bound_rows(SINGLE.reference, parts, STEPS) == year.bound_rows(SINGLE.reference, whole, STEPS)
-    year._true.cache_clear()
+    year_runs.reference_checkpoints.cache_clear()
     assert sorted(file.name for file in parts.iterdir()) == [f"{SINGLE.reference.name}.npz", f"{SINGLE.name}.npz"]
     # Finished runs are not taken up again; those of another code are.
-    monkeypatch.setattr(Journey, "go_on", lambda *_: pytest.fail("a finished run went on"))
-    travel([SINGLE], parts, STEPS, progress=False)
-    monkeypatch.setattr(year, "fingerprint", lambda case, steps: "other")
-    assert Journey(SINGLE, parts, STEPS).run.steps == 0
+    monkeypatch.setattr(ResumableRun, "advance", lambda *_: pytest.fail("a finished run went on"))
+    run_cases([SINGLE], parts, STEPS, progress=False)
+    monkeypatch.setattr(year_runs, "fingerprint", lambda case, steps: "other")
+    assert ResumableRun(SINGLE, parts, STEPS).run.steps == 0
 
 
 def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
@@ -255,7 +262,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
     assert year.main(given) == 0
     runs = year.load(here)
     assert [run.case for run in runs] == list(CASES[:3])
-    assert all(run.steps.tolist() == list(year.marks(100)) for run in runs)
+    assert all(run.steps.tolist() == list(year_cases.checkpoint_steps(100)) for run in runs)
     # As far as it goes, it is the year.
     for run in runs:
         whole = at_end(2, run.case.precision)
@@ -272,7 +279,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(year, "travel", interrupted)
+    monkeypatch.setattr(year, "run_cases", interrupted)
     assert year.main(given) == 130
 
 
@@ -283,6 +290,6 @@ def test_a_year_that_lost_its_variance_says_when():
     assert HEADER[:5] == ("model", "base", "precision", "rounding", "form")
 
 
-def test_a_case_is_followed_only_where_the_others_rest_on_it(tmp_path):
-    assert isinstance(Journey(SINGLE.reference, tmp_path, 10).run, Followed)
-    assert not isinstance(Journey(SINGLE, tmp_path, 10).run, Followed)
+def test_a_case_is_bounded_only_where_the_others_rest_on_it(tmp_path):
+    assert isinstance(ResumableRun(SINGLE.reference, tmp_path, 10).run, BoundedRun)
+    assert not isinstance(ResumableRun(SINGLE, tmp_path, 10).run, BoundedRun)

@@ -1,4 +1,4 @@
-"""Topics made up for the tests, as modules that can be imported by name."""
+"""Topics made up for the tests, as modules that a subprocess can import by name too."""
 
 import re
 import textwrap
@@ -15,7 +15,8 @@ def topic(tmp_path, monkeypatch):
 
     def make(name, body):
         source = (
-            "from gpbnb.ledger.finding import Checks, Verdict, answer, compare, unverifiable\n\nCHECKS = Checks()\n\n"
+            "from gpbnb.ledger.finding import Verdict, answer, compare, unverifiable\n"
+            "from gpbnb.ledger.registry import Checks\n\nCHECKS = Checks()\n\n"
         )
         (tmp_path / f"{name}.py").write_text(source + textwrap.dedent(body), encoding="utf-8")
         return name
@@ -35,6 +36,6 @@ def complete(topic, request):
         @CHECKS.add(*{CHECKED})
         def both():
             CALLS.append(1)
-            return compare(False, "$|a|$, not \\"b\\"", Verdict.TYPO, "line one\\nline two")
+            return compare(False, "$|a|$, not \\"b\\"", Verdict.MISPRINT, "line one\\nline two")
         """,
     )

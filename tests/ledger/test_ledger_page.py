@@ -1,4 +1,4 @@
-"""The ledger as HTML: rows under their ids, math for MathJax, options that count right, links that name rows."""
+"""The ledger as HTML: each statement on one page, formulas for MathJax, filters that count right, working links."""
 
 import json
 import re
@@ -8,21 +8,21 @@ from pathlib import Path
 import pytest
 
 from gpbnb import ledger
-from gpbnb.ledger import Row, load_inventory, page
-from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
-from gpbnb.ledger.statements import DOCUMENTS, Entry
+from gpbnb.ledger import Row, load_statements, page
+from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.statements import DOCUMENTS, Statement
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FINDINGS = (
     compare(True, "yes"),
     compare(False, r"$a<b$ & <c>", Verdict.WRONG, "see the chapter *Rounding bounds*; *not* x*y*z, x*y* z"),
-    compare(False, "one", Verdict.TYPO),
+    compare(False, "one", Verdict.MISPRINT),
     unverifiable("", "no data"),
     answer(True, "$|x|$", "here"),
 )
-INVENTORY = load_inventory()
-ROWS = tuple(Row(entry, FINDINGS[place % len(FINDINGS)]) for place, entry in enumerate(INVENTORY))
-UNCHECKED = Row(Entry("savage2016.x", "savage2016", "-", "-", "x", "claim", "a"), None)
+STATEMENTS = load_statements()
+ROWS = tuple(Row(statement, FINDINGS[place % len(FINDINGS)]) for place, statement in enumerate(STATEMENTS))
+EVERY_PAGE = "".join(ledger.ledger_page(ROWS, each).html for each in ledger.PAGES)
 
 
 class Tags(HTMLParser):
@@ -46,199 +46,128 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
     def handle_data(self, data):
-        if "td" in self.open or "th" in self.open:
+        if {"td", "th"} & set(self.open):
             self.cells[-1] += data
 
-    def all(self, tag):
-        return [attrs for name, attrs in self.tags if name == tag]
+    def all(self, name):
+        return [attrs for tag, attrs in self.tags if tag == name]
 
 
-def test_every_entry_is_a_row_under_its_id():
-    found = Tags(ledger.searchable(ROWS).html)
-    rows = [attrs for attrs in found.all("tr") if "id" in attrs]
-    assert sorted(attrs["id"] for attrs in rows) == sorted(entry.id for entry in INVENTORY)
-    by_id = {row.entry.id: row for row in ROWS}
+def test_every_statement_is_on_exactly_one_page():
+    assert [[each.name for each in ledger.PAGES if each.holds(s)] for s in STATEMENTS] == [
+        [page.address(s).partition(".html")[0]] for s in STATEMENTS
+    ]
+    ids = [row["id"] for row in Tags(EVERY_PAGE).all("tr") if "id" in row]
+    assert sorted(ids) == sorted(statement.id for statement in STATEMENTS)
+
+
+@pytest.mark.parametrize("each", ledger.PAGES, ids=lambda each: each.name)
+def test_a_page_of_the_ledger_is_a_page_of_the_book(each):
+    assert each.document in DOCUMENTS
+    text = (BOOK / f"{each.name}.md").read_text(encoding="utf-8")
+    assert f"```{{ledger}} page {each.name}\n" in text
+    assert f"  - file: book/{each.name}\n" in (BOOK.parent / "_toc.yml").read_text(encoding="utf-8")
+
+
+def test_rows_carry_what_the_filters_need():
     owner = ledger.topics()
-    for attrs in rows:
-        row = by_id[attrs["id"]]
-        assert attrs["data-kind"] == row.entry.kind
+    rows = {attrs["id"]: attrs for attrs in Tags(EVERY_PAGE).all("tr") if "id" in attrs}
+    for row in ROWS:
+        attrs = rows[row.statement.id]
+        assert attrs["data-kind"] == row.statement.kind
         assert attrs["data-verdict"] == row.outcome
-        assert attrs["data-chapter"] == owner.get(row.entry.id, "")
+        assert attrs["data-chapter"] == owner.get(row.statement.id, "")
 
 
-def test_tables_are_the_chapters_of_the_documents_with_their_rows():
-    html = ledger.searchable(ROWS).html
-    parts = list(dict.fromkeys((entry.document, entry.chapter) for entry in INVENTORY))
-    tables = Tags(html).all("table")
-    assert [(t["data-document"], t["data-part"]) for t in tables] == parts
-    for (document, chapter), table in zip(parts, re.findall(r"<table.*?</table>", html, re.S), strict=True):
-        ids = re.findall(r'<tr id="([^"]+)"', table)
-        expected = [e.id for e in INVENTORY if (e.document, e.chapter) == (document, chapter)]
-        assert sorted(ids) == sorted(expected)
-        place = document if chapter == "-" else f"{document}, ch. {chapter}"
-        caption = f"{place}: {len(ids)} {'entries' if len(ids) > 1 else 'entry'}"
-        assert re.search(r"<caption>(.*?)</caption>", table)[1] == caption
-        assert re.findall(r'<th scope="row"><a href="#([^"]+)">', table) == ids
-        cells = Tags(table).cells
-        assert len(cells) == 3 * (len(ids) + 1)
+def test_all_formulas_are_marked_and_no_dollar_is_left():
+    texts = [
+        t for row in ROWS for t in (row.statement.item, row.statement.printed, row.finding.recomputed, row.finding.note)
+    ]
+    assert EVERY_PAGE.count('<span class="math notranslate nohighlight">') == sum(t.count("$") // 2 for t in texts)
+    assert "$" not in EVERY_PAGE
 
 
-def test_a_table_of_one_row_says_so():
-    assert "<caption>savage2016: 1 entry</caption>" in ledger.searchable([UNCHECKED]).html
-
-
-def test_printed_and_recomputed_reach_the_cells_as_math_and_prose():
-    row = Row(Entry("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", r"$a<b$ & so on"), FINDINGS[1])
-    *_, item, verdict, found = Tags(ledger.searchable([row]).html).cells
-    assert item == "eq (x)II.6, equation"
-    assert verdict == "wrong"
-    assert found == r"\(a<b\) & so on\(a<b\) & <c>see the chapter Rounding bounds; not x*y*z, x*y* z"
-    html = ledger.searchable([row]).html
-    assert re.findall(r'<p class="(\w+)">', html) == ["printed", "recomputed", "note"]
+def test_text_is_escaped_and_a_chapter_named_in_a_note_is_linked():
+    statement = Statement("hung1984.II.x", "hung1984", "II", "2", "$a<b$ & so", "claim", "$a<b$ & so on")
+    html = ledger.ledger_page([Row(statement, FINDINGS[1])], ledger.PAGES[0]).html
+    assert r"\(a&lt;b\)</span> &amp; so on" in html
     assert '<a href="rounding.html">Rounding bounds</a>; <em>not</em> x*y*z, x*y* z' in html
-    assert html.count('<span class="math notranslate nohighlight">') == 2
-
-
-def test_all_math_of_the_ledger_is_marked_and_no_dollar_left():
-    html = ledger.searchable(ROWS).html
-    texts = [t for row in ROWS for t in (row.entry.item, row.entry.printed, row.finding.recomputed, row.finding.note)]
-    assert html.count('<span class="math notranslate nohighlight">') == sum(t.count("$") // 2 for t in texts)
-    assert "$" not in html
+    assert re.findall(r'<p class="(\w+)">', html) == ["printed", "recomputed", "note"]
 
 
 def test_a_row_without_a_check_is_shown_as_such():
-    html = ledger.searchable([UNCHECKED]).html
+    unchecked = Row(Statement("savage2016.x", "savage2016", "-", "-", "x", "claim", "a"), None)
+    html = ledger.ledger_page([unchecked], ledger.PAGES[-1]).html
     assert 'data-verdict="no check" data-chapter=""' in html
     assert Tags(html).cells[-2:] == ["no check", "a"]
 
 
 def test_the_options_of_each_filter_count_its_rows():
-    html = ledger.searchable(ROWS).html
     owner = ledger.topics()
-    values = {
-        "verdict": [row.outcome for row in ROWS],
-        "kind": [row.entry.kind for row in ROWS],
-        "chapter": [owner[row.entry.id] for row in ROWS if row.entry.id in owner],
-        "document": [v for e in INVENTORY for v in (e.document, f"{e.document} {e.chapter}")],
-    }
-    for name, expected in values.items():
-        select = re.search(rf'<select name="{name}".*?</select>', html, re.S)[0]
-        options = re.findall(r'<option value="([^"]+)">[^<]*\((\d+)\)</option>', select)
-        assert sorted(options) == sorted((v, str(expected.count(v))) for v in set(expected))
-        assert select.count('<option value="">all</option>') == 1
+    for each in ledger.PAGES:
+        inside = [row for row in ROWS if each.holds(row.statement)]
+        values = {
+            "verdict": [row.outcome for row in inside],
+            "kind": [row.statement.kind for row in inside],
+            "chapter": [owner[row.statement.id] for row in inside if row.statement.id in owner],
+        }
+        html = ledger.ledger_page(ROWS, each).html
+        for name, expected in values.items():
+            select = re.search(rf'<select name="{name}".*?</select>', html, re.DOTALL)[0]
+            options = re.findall(r'<option value="([^"]+)">[^<]*\((\d+)\)</option>', select)
+            assert sorted(options) == sorted((v, str(expected.count(v))) for v in set(expected))
+            assert select.count('<option value="">all</option>') == 1
 
 
 def test_the_form_waits_for_the_script_and_every_control_has_a_label():
-    html = ledger.searchable(ROWS).html
-    form = re.search(r"<form.*?</form>", html, re.S)[0]
+    form = re.search(r"<form.*?</form>", EVERY_PAGE, re.DOTALL)[0]
     assert re.match(r"<form [^>]*hidden>", form)
-    labels = re.findall(r"<label>(.*?)</label>", form, re.S)
-    assert len(labels) == 5
+    labels = re.findall(r"<label>(.*?)</label>", form, re.DOTALL)
+    assert len(labels) == 4
     assert all(re.match(r"\w[\w ]* <(input|select) ", label) for label in labels)
     assert 'aria-live="polite"' in form
 
 
-def test_brief_and_links_lead_to_rows_of_the_complete_ledger():
-    some = ROWS[3:9]
-    targets = [f"errata.html#{row.entry.id}" for row in some]
-    brief = Tags(ledger.brief(some).html)
-    assert [a["href"] for a in brief.all("a") if a["href"].startswith("errata")] == targets
-    links = ledger.links(some)
-    assert [a["href"] for a in Tags(links.html).all("a")] == targets
-    parts = dict.fromkeys((row.entry.document, row.entry.chapter) for row in some)
-    assert re.findall(r"<li>(.*?): <a", links.html) == [f"{document}, ch. {chapter}" for document, chapter in parts]
-    assert re.findall(r"<li>(.*?): <a", ledger.links([UNCHECKED]).html) == ["savage2016"]
-    assert brief.cells[:3] == ["Item", "Verdict", "Printed, recomputed, and note"]
-    assert re.search(r"<br>(.*?)</th>", ledger.brief(some[:1]).html)[1] == "hung1984, I"
-    eq20 = next(row for row in ROWS if row.entry.id == "hung1984.II.eq20")
-    assert re.search(r"<br>(.*?)</th>", ledger.brief([eq20]).html)[1] == "hung1984, II.6"
-    undone = ledger.brief(some, left_undone=True)
-    assert Tags(undone.html).cells[2] == "Left undone, and our answer"
-    assert 'class="ledger-table ledger-undone"' in undone.html
-    assert repr(undone).startswith("<6 entries: ")
+def test_the_error_table_lists_disagreements_with_the_most_serious_first():
+    table = ledger.error_table(ROWS)
+    found = re.findall(r'class="verdict verdict-([\w-]+)"', table.html)
+    assert found == ["wrong"] * 131 + ["misprint"] * 131 == sorted(found, key=["wrong", "misprint"].index)
+    links = [a["href"] for a in Tags(table.html).all("a") if a["href"].startswith("ledger")]
+    by_address = {page.address(row.statement): row for row in ROWS}
+    assert {by_address[link].finding.verdict for link in links} == {Verdict.WRONG, Verdict.MISPRINT}
 
 
-def test_the_chapter_of_the_check_is_linked_once():
-    owner = ledger.topics()
-    row = next(r for r in ROWS if owner.get(r.entry.id) == "rounding" and r.outcome == "wrong")
-    assert ledger.brief([row]).html.count('href="rounding.html"') == 1
-    other = next(r for r in ROWS if owner.get(r.entry.id) == "rounding" and r.outcome == "verified")
-    assert ledger.brief([other]).html.count('href="rounding.html"') == 1
+def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
+    root = next(iter(ledger.load_roots()), None)
+    if root is None:
+        pytest.skip("roots.csv is empty")
+    spoiled = [Row(s, compare(False, "1", Verdict.WRONG, root=root)) for s in STATEMENTS[:3]]
+    html = ledger.root_table([*spoiled, *ROWS[3:]]).html
+    assert [a["id"] for a in Tags(html).all("tr") if "id" in a] == [f"root-{root}"]
+    assert [a["href"] for a in Tags(html).all("a")] == [page.address(row.statement) for row in spoiled]
+    assert "<td>3</td>" in html
 
 
-@pytest.mark.parametrize("verdict", Verdict)
-def test_told_tells_where_print_and_recomputation_differ_and_of_nothing_else(verdict):
-    agrees = {Verdict.VERIFIED: True, Verdict.ANSWERED: True, Verdict.UNVERIFIABLE: None}.get(verdict, False)
-    row = Row(INVENTORY[0], Finding("found", agrees, verdict, "a note"))
-    if agrees is False and verdict is not Verdict.OPEN:
-        assert ledger.told([row], row.entry.id) == (row,)
-    else:
-        with pytest.raises(ValueError, match=f"is {verdict.value}, no error"):
-            ledger.told([row], row.entry.id)
+def test_every_verdict_that_a_claim_can_have_has_an_outcome():
+    outcomes = {}
+    for verdict in (Verdict.VERIFIED, Verdict.UNVERIFIABLE, *DISAGREEMENTS):
+        agrees = {Verdict.VERIFIED: True, Verdict.UNVERIFIABLE: None}.get(verdict, False)
+        rows = [Row(statement, Finding("1", agrees, verdict, "why")) for statement in STATEMENTS]
+        html = ledger.claim_table(rows).html
+        found = re.findall(r'class="verdict [\w-]+">([^<]+)<', html)
+        assert len(found) == len(page.CLAIMS)
+        outcomes[verdict] = found[0]
+        assert set(found) == {found[0]}
+    assert len(set(outcomes.values())) == len(outcomes) - 1
+    assert outcomes[Verdict.VERIFIED] == "replicated"
+    assert outcomes[Verdict.WRONG] == "refuted"
 
 
-def test_told_refuses_what_is_no_error():
-    by_outcome = {row.outcome: row.entry.id for row in ROWS}
-    picked = ledger.told(ROWS, by_outcome["typo"], by_outcome["wrong"])
-    assert [row.outcome for row in picked] == ["typo", "wrong"]
-    with pytest.raises(ValueError, match="verified, no error; change the text"):
-        ledger.told(ROWS, by_outcome["verified"])
-    with pytest.raises(ValueError, match="missing, no error"):
-        ledger.told([UNCHECKED], UNCHECKED.entry.id)
-    with pytest.raises(KeyError, match=r"no row 'hung1984\.none' among"):
-        ledger.told(ROWS, "hung1984.none")
-
-
-def test_of_topic():
-    owner = ledger.topics()
-    found = ledger.of_topic(ROWS, "rounding")
-    assert [row.entry.id for row in found] == [e.id for e in INVENTORY if owner.get(e.id) == "rounding"]
-    wrong = ledger.of_topic(ROWS, "rounding", "wrong", "typo")
-    assert {row.outcome for row in wrong} == {"wrong", "typo"}
-    assert set(wrong) <= set(found)
-    with pytest.raises(ValueError, match="no topic 'Rounding'; here are: rounding"):
-        ledger.of_topic(ROWS, "Rounding")
-    with pytest.raises(ValueError, match="no verdict 'Wrong'; here are: verified"):
-        ledger.of_topic(ROWS, "rounding", "Wrong")
-
-
-def test_of_kind_and_of_ids_run_the_checks_of_those_alone(monkeypatch):
-    asked = []
-
-    def examine(entries, checks):
-        asked.extend(entry.id for entry in entries)
-        return tuple(Row(entry, FINDINGS[0]) for entry in entries)
-
-    monkeypatch.setattr(page, "examine", examine)
-    expected = [entry.id for entry in INVENTORY if entry.kind == "open"]
-    assert sorted(row.entry.id for row in ledger.of_kind("open")) == sorted(expected) == sorted(asked)
-    ids = ("hung1984.II.eq8", "hung1982.III.eq18")
-    assert tuple(row.entry.id for row in ledger.of_ids(*ids)) == ids
-    with pytest.raises(ValueError, match="no entry of kind 'opened'; here are: claim"):
-        ledger.of_kind("opened")
-    with pytest.raises(KeyError, match=r"no entry 'hung1984\.none'"):
-        ledger.of_ids("hung1984.none")
-
-
-def test_entries_of_a_kind_come_in_reading_order(monkeypatch):
-    monkeypatch.setattr(page, "load_inventory", lambda: INVENTORY[::-1])
-    monkeypatch.setattr(page, "examine", lambda entries, checks: tuple(Row(e, FINDINGS[0]) for e in entries))
-    claims = ledger.of_kind("claim")
-    assert claims == ledger.checking.in_reading_order(claims)
-    assert [row.entry for row in claims] != [entry for entry in INVENTORY[::-1] if entry.kind == "claim"]
-
-
-def test_a_check_that_raises_is_not_passed_over(monkeypatch):
-    broken, other = ValueError("broken"), KeyError("other")
-    errors = (broken, other, broken, None)
-
-    def examine(entries, checks):
-        return tuple(Row(e, None if error else FINDINGS[0], error) for e, error in zip(entries, errors, strict=True))
-
-    monkeypatch.setattr(page, "examine", examine)
-    with pytest.raises(ExceptionGroup, match="checks of 3 entries failed") as caught:
-        ledger.of_ids("hung1984.II.eq8", "hung1982.III.eq18", "hung1984.II.eq9", "hung1984.II.eq20")
-    assert caught.value.exceptions == (broken, other)
+def test_note_table_labels_what_was_left_undone():
+    table = ledger.note_table(ROWS[:6], left_undone=True)
+    assert 'class="ledger-table ledger-undone"' in table.html
+    assert Tags(table.html).cells[:3] == ["Statement", "Verdict", "Evidence"]
+    assert repr(table) == "<6 statements>"
 
 
 @pytest.mark.parametrize("by", ["document", "chapter", "kind"])
@@ -257,23 +186,22 @@ def test_counts_add_up(by):
 
 
 def test_counts_by_something_else_are_refused():
-    with pytest.raises(ValueError, match="by='verdict'; take one of document, chapter, kind"):
-        ledger.count_table(ROWS, "verdict")
+    with pytest.raises(ValueError, match="by='colour'; take one of document, chapter, kind"):
+        ledger.count_table(ROWS, "colour")
 
 
-def test_titles_of_chapters_are_those_of_the_book():
-    for topic, title in ledger.CHAPTERS.items():
-        path = BOOK / f"{topic}.ipynb"
-        if path.exists():
-            cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
-            assert "".join(cells[0]["source"]).startswith(f"# {title}\n"), path.name
+def test_select_topic():
+    owner = ledger.topics()
+    found = ledger.select_topic(ROWS, "rounding")
+    assert [row.statement.id for row in found] == [s.id for s in STATEMENTS if owner.get(s.id) == "rounding"]
+    wrong = ledger.select_topic(ROWS, "rounding", Verdict.WRONG, Verdict.MISPRINT)
+    assert wrong == tuple(row for row in found if row.outcome in ("wrong", "misprint")) != ()
+    with pytest.raises(ValueError, match="no topic 'Rounding'; the topics are rounding"):
+        ledger.select_topic(ROWS, "Rounding")
 
 
-def test_every_topic_has_a_chapter():
+def test_every_topic_has_a_chapter_of_its_title():
     assert set(ledger.topics().values()) <= set(ledger.CHAPTERS)
-
-
-def test_powers_of_ten_in_prose_are_written_as_such():
-    row = Row(Entry("hung1984.II.x", "hung1984", "II", "6", "eq (x)", "equation", "1.5e-08 and $1e-8$, 2e3x"), None)
-    assert r"1.5&nbsp;×&nbsp;10<sup>−8</sup> and <span" in ledger.searchable([row]).html
-    assert r"\(1e-8\)</span>, 2e3x" in ledger.searchable([row]).html
+    for topic, title in ledger.CHAPTERS.items():
+        cells = json.loads((BOOK / f"{topic}.ipynb").read_text(encoding="utf-8"))["cells"]
+        assert "".join(cells[0]["source"]).splitlines()[0] == f"# {title}"

@@ -5,25 +5,26 @@ import io
 import itertools
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-from gpbnb.ledger import Row, load_inventory, summary_table, table
+from gpbnb.ledger import Row, load_statements, summary_table, table
 from gpbnb.ledger.finding import Verdict, answer, compare, unverifiable
 from gpbnb.ledger.render import to_csv, to_json, to_markdown, to_text
-from gpbnb.ledger.statements import Entry
+from gpbnb.ledger.statements import Statement
 
-ENTRY = Entry("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
+ENTRY = Statement("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
 FINDINGS = {
-    "typo": compare(False, r"$(n+m-1)\beta$", Verdict.TYPO, 'one "sign", \nas |(20)| of 1982'),
+    "misprint": compare(False, r"$(n+m-1)\beta$", Verdict.MISPRINT, 'one "sign", \nas |(20)| of 1982'),
     "verified": compare(True, "yes"),
     "unverifiable": unverifiable("", "no data"),
     "answered": answer(True, "done", "here"),
 }
 ROWS = (*(Row(ENTRY, finding) for finding in FINDINGS.values()), Row(ENTRY, None), Row(ENTRY, None, ValueError("x")))
-EVERYTHING = tuple(Row(entry, FINDINGS["typo"]) for entry in load_inventory())
+EVERYTHING = tuple(Row(entry, FINDINGS["misprint"]) for entry in load_statements())
 
 
 def test_csv_is_rfc_4180_with_the_columns_of_the_contract():
@@ -31,7 +32,7 @@ def test_csv_is_rfc_4180_with_the_columns_of_the_contract():
     assert text.startswith("id,document,kind,printed,recomputed,agrees,verdict,note\r\n")
     assert text.endswith("\r\n")
     assert text.split("\r\n")[1] == (
-        r"hung1984.II.eq20,hung1984,equation,$|\tilde Q/Q|\le(n+m+1)\beta$,$(n+m-1)\beta$,false,typo,"
+        r"hung1984.II.eq20,hung1984,equation,$|\tilde Q/Q|\le(n+m+1)\beta$,$(n+m-1)\beta$,false,misprint,"
         '"one ""sign"", \nas |(20)| of 1982"'
     )
     records = list(csv.DictReader(io.StringIO(text, newline=""), strict=True))
@@ -52,15 +53,15 @@ def test_json_says_the_same():
         "printed": ENTRY.printed,
         "recomputed": r"$(n+m-1)\beta$",
         "agrees": False,
-        "verdict": "typo",
-        "note": FINDINGS["typo"].note,
+        "verdict": "misprint",
+        "note": FINDINGS["misprint"].note,
     }
     assert json.loads(to_json(())) == []
 
 
 def test_text_is_a_line_an_entry():
     assert to_text(ROWS).splitlines() == [
-        r'typo          hung1984.II.eq20  $(n+m-1)\beta$  one "sign", as |(20)| of 1982',
+        r'misprint      hung1984.II.eq20  $(n+m-1)\beta$  one "sign", as |(20)| of 1982',
         "verified      hung1984.II.eq20  yes",
         "unverifiable  hung1984.II.eq20  no data",
         "answered      hung1984.II.eq20  done  here",
@@ -94,7 +95,7 @@ def test_a_table_renders_with_its_math_and_prose_unharmed():
     printed = ([r"\vert \tilde Q/Q\vert \le(n+m+1)\beta"], "")
     assert body[0] == [
         ([], "hung1984, II.6: eq (20)"),
-        ([], "typo"),
+        ([], "misprint"),
         printed,
         ([r"(n+m-1)\beta"], ""),
         ([], 'one "sign", as |(20)| of 1982'),
@@ -115,7 +116,7 @@ def test_a_table_renders_with_its_math_and_prose_unharmed():
     ],
 )
 def test_bars_within_math(math, safe):
-    entry = Entry(**{**vars(ENTRY), "printed": f"${math}$"})
+    entry = replace(ENTRY, text=f"${math}$")
     _, body = rendered(table([Row(entry, None)]).markdown())
     assert [found.strip() for found in body[2][0]] == [safe]
 
@@ -124,7 +125,7 @@ def test_bars_within_math(math, safe):
     "prose", ["a*b*c", "u_j_k", "A~, b~_j ~~x~~", "[1] `x` <y> <https://z>", r"a\b", "#1 {x} |y| &lt;"]
 )
 def test_prose_is_not_markup(prose):
-    entry = Entry(**{**vars(ENTRY), "item": prose, "printed": f"{prose} $x$ {prose}"})
+    entry = replace(ENTRY, item=prose, text=f"{prose} $x$ {prose}")
     _, body = rendered(table([Row(entry, None)]).markdown())
     assert body[0] == ([], f"hung1984, II.6: {prose}")
     assert body[2] == (["x"], f"{prose}  {prose}")
@@ -136,7 +137,7 @@ def test_the_whole_inventory_makes_a_sound_table():
     assert len(lines) == len(EVERYTHING) + 2
     assert {len(cells(line)) for line in lines} == {5}
     _, *body = rendered(markdown)
-    printed = {(row.entry.id, row.entry.printed) for row in EVERYTHING}
+    printed = {(row.statement.id, row.statement.printed) for row in EVERYTHING}
     assert len(body) == len(printed)
     prose = sorted("".join(text.split("$")[::2]) for _, text in printed)
     assert sorted(row[2][1] for row in body) == prose
@@ -150,20 +151,20 @@ def test_rows_may_be_an_iterator():
 
 
 def test_representations_are_short_and_stable():
-    title = "Ledger of 6 entries: 1 verified, 1 typo, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
+    title = "Ledger of 6 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
     assert repr(table(ROWS)) == f"<{title}>"
     assert repr(summary_table(ROWS)) == f"<{title}; by section>"
-    assert repr(table(())) == "<Ledger of 0 entries: none>"
+    assert repr(table(())) == "<Ledger of 0 statements: none>"
     assert table(ROWS)._repr_markdown_() == table(ROWS).markdown() == to_markdown(ROWS)[:-1]
 
 
 def test_summary_table():
-    far = Row(Entry(**{**vars(ENTRY), "section": "9.2"}), FINDINGS["verified"])
-    apart = Row(Entry("savage2016.main.eq1", "savage2016", "-", "analysis", "eq (1)", "equation", "$a$"), None)
-    plain = Row(Entry("hung1984.I.x", "hung1984", "I", "-", "x", "claim", "a"), None)
+    far = Row(replace(ENTRY, section="9.2"), FINDINGS["verified"])
+    apart = Row(Statement("savage2016.main.eq1", "savage2016", "-", "analysis", "eq (1)", "equation", "$a$"), None)
+    plain = Row(Statement("hung1984.I.x", "hung1984", "I", "-", "x", "claim", "a"), None)
     found = [[prose for _, prose in row] for row in rendered(summary_table((*ROWS[:2], far, apart, plain)).markdown())]
     assert found == [
-        ["Document", "Section", "verified", "typo", "no check", "entries"],
+        ["Document", "Section", "verified", "misprint", "no check", "statements"],
         ["hung1984", "II.6", "1", "1", "0", "2"],
         ["hung1984", "II.9.2", "1", "0", "0", "1"],
         ["hung1984", "I", "0", "0", "1", "1"],

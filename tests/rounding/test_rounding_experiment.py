@@ -11,8 +11,8 @@ import pytest
 import sympy as sp
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import column_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.rounding import derivation, experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from drawn import colour, legend_of
 
-from gpbnb.arithmetic.bounds import column_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.display import style
 from gpbnb.rounding import experiment, figures, theory
 

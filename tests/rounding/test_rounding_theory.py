@@ -11,8 +11,9 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb.arithmetic.bounds import column_sum_norm, gamma
+from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.rounding import theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -15,16 +15,18 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
 from gpbnb.integration.theory import needed_precision
 from gpbnb.inversion.bounds import smallest_precision
-from gpbnb.kalman import year
-from gpbnb.kalman.experiment import Form, Run, emulate, log_spaced, reference
+from gpbnb.kalman import gravity_probe_b, year, year_cases
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement, required_precision, survey
-from gpbnb.kalman.theory import coefficients
+from gpbnb.kalman.report_bounds import coefficients
 from gpbnb.wordlength import examples, figures, study, tables
 
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)
-GOAL = (0.01, math.inf, math.inf)
+TOLERANCE = (0.01, math.inf, math.inf)
 FOUND = Requirement(FloatFormat(2, 17), "emulation", 300, ((16, 2.0), (17, 0.5), (18, 0.4)))
 NONE = replace(FOUND, fmt=None)
 
@@ -38,8 +40,8 @@ def test_the_models_are_what_their_docstrings_say():
     assert math.sqrt(TILT.R[0, 1, 1]) == 2
     assert examples.tilt("1e-6").Q[0, 2, 2] == Fraction("1e-6")
     assert examples.tracker("1000").x0[0] == 1000
-    assert examples.precise().R[0, 0, 0] == Fraction("1e-12")
-    for model in (examples.tracker(), examples.precise()):
+    assert examples.precise_tracker().R[0, 0, 0] == Fraction("1e-12")
+    for model in (examples.tracker(), examples.precise_tracker()):
         t = model.Phi[0, 0, 1]  # between measurements; white noise of the acceleration, 0.1 m²/s³
         assert model.Q[0].tolist() == [[t**3 / 30, t**2 / 20], [t**2 / 20, t / 10]]
     Q, more = examples.altimeter().Q[0], examples.altimeter("1e-12").Q[0]
@@ -57,7 +59,7 @@ def test_measurements_begin_alike_and_are_multiples_of_their_resolution():
 
 def test_normal_numbers_are_those_of_numpy():
     for name, kind in (("binary16", np.float16), ("binary32", np.float32), ("binary64", np.float64)):
-        low, high = examples.NORMAL[name]
+        low, high = examples.NORMAL_RANGE[name]
         info = np.finfo(kind)
         assert 2.0**low == float(info.smallest_normal)
         assert 2.0**high <= float(info.max) < 2 * 2.0**high
@@ -78,19 +80,19 @@ def test_normal_matrix():
 
 @pytest.mark.parametrize("base", [2, 10])
 def test_printed_precision_is_the_least_that_meets_125(base):
-    goal, size = Fraction(1, 100), Fraction(40)
-    t = study.printed_precision(6000, 3, 2, goal, size, base)
+    tolerance, size = Fraction(1, 100), Fraction(40)
+    t = study.printed_precision(6000, 3, 2, tolerance, size, base)
     total = sum(coefficients(6000, 3, 2)) * size
-    assert total * FloatFormat(base, t).unit_roundoff <= goal < total * FloatFormat(base, t - 1).unit_roundoff
-    assert study.printed_precision(6000, 3, 2, goal, size, base, carried=True) > t
+    assert total * FloatFormat(base, t).unit_roundoff <= tolerance < total * FloatFormat(base, t - 1).unit_roundoff
+    assert study.printed_precision(6000, 3, 2, tolerance, size, base, carried=True) > t
 
 
 def test_growth_answers_for_the_first_steps():
-    model = year.model(year.MODELS[0], 2)
-    z = year.simulation(year.MODELS[0]).measurements(12)
-    goal = [1] * 4 + [math.inf] * 6
-    (found,) = study.growth(model, z, goal, [12], form=Form.UD)
-    assert found == required_precision(model, 12, goal, form=Form.UD, z=z)
+    model = year_cases.model(year_cases.MODELS[0], 2)
+    z = year_cases.simulation(year_cases.MODELS[0]).measurements(12)
+    tolerance = [1] * 4 + [math.inf] * 6
+    (found,) = study.required_precision_by_steps(model, z, tolerance, [12], form=Form.UD)
+    assert found == required_precision(model, 12, tolerance, form=Form.UD, z=z)
 
 
 def test_growth_knows_nothing_of_what_comes_later():
@@ -102,27 +104,27 @@ def test_growth_knows_nothing_of_what_comes_later():
     later = LinearModel(Phi, H, [calm] * 6 + [thin], R, [3, -1], P0)
     for basis in ("emulation", "bound"):
         alone = [required_precision(model, k, 1e-4, basis=basis, z=z[:k]) for k in (2, 6)]
-        assert study.growth(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
-        assert study.growth(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
+        assert study.required_precision_by_steps(later, z, 1e-4, (2, 6), basis=basis) == tuple(alone)
+        assert study.required_precision_by_steps(later, z, 1e-4, (7,), basis=basis)[0].tried != alone[1].tried
 
 
 def test_growth_refuses_steps_that_were_not_measured():
     for steps in ([0], [10, 301]):
         with pytest.raises(ValueError, match="and 300 measurements; needed from 1 to 300 steps"):
-            study.growth(TILT, Z, GOAL, steps)
+            study.required_precision_by_steps(TILT, Z, TOLERANCE, steps)
 
 
 def test_growth_grows():
-    found = study.growth(TILT, Z, GOAL, (10, 300), basis="bound")
+    found = study.required_precision_by_steps(TILT, Z, TOLERANCE, (10, 300), basis="bound")
     assert [each.steps for each in found] == [10, 300]
     assert found[0].fmt.precision < found[1].fmt.precision
     assert {each.basis for each in found} == {"bound"}
 
 
 def test_years_needed_against_each_run():
-    kind = year.Case(year.MODELS[0], 2, 0, Rounding.NEAREST, Form.REPORT)
+    kind = year_cases.Case(year_cases.MODELS[0], 2, 0, Rounding.NEAREST, Form.HUNG)
     runs = [run for run in year.load() if run.case == kind._replace(precision=run.case.precision)]
-    found = dict(study.years_needed(runs, 1.0))
+    found = dict(study.precision_by_step(runs, 1.0))
     for run in runs:
         worst = 0.0
         for i, step in enumerate(run.steps.tolist()):
@@ -131,23 +133,23 @@ def test_years_needed_against_each_run():
             if run.case.precision == found[step]:
                 assert worst <= 1
     assert list(found.values()) == sorted(found.values())
-    assert found[year.YEAR] == 32
+    assert found[gravity_probe_b.YEAR] == 32
     with pytest.raises(ValueError, match="got runs of 2 kinds; needed one"):
-        study.years_needed([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
+        study.precision_by_step([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
 
 
-def test_a_run_that_left_the_goal_does_not_come_back():
+def test_a_run_that_left_the_tolerance_does_not_come_back():
     (first, *_) = year.load()
     one = first.steps.tolist()[:3]
     drift = np.array([[0.5, 0.0], [0.0, -2.0], [0.5, 0.0]])
     run = replace(first, steps=first.steps[:3], drift=drift, rate=np.zeros((3, 2)))
-    assert study.years_needed([run], 1.0) == ((one[0], run.case.precision),)
+    assert study.precision_by_step([run], 1.0) == ((one[0], run.case.precision),)
 
 
 def test_spans_hold_every_number():
-    kept = reference(TILT, Z, log_spaced(300, 16))
-    numbers = {"estimate": kept.x, "gain": kept.K, "covariance": kept.P}
-    found = {each.name: each for each in study.spans(TILT, Z)}
+    checkpoints = reference(TILT, Z, log_spaced(300, 16))
+    numbers = {"estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
+    found = {each.name: each for each in study.binary_ranges(TILT, Z)}
     for name, values in numbers.items():
         sizes = np.abs(values.astype(float)).ravel()
         sizes = sizes[sizes > 0]
@@ -156,15 +158,15 @@ def test_spans_hold_every_number():
     assert found["model"][1:] == (-34, 8)  # 1e-10 and 400
 
 
-def test_deafness_is_that_of_the_runs():
-    fmt, marks = FloatFormat(2, 12), tuple(range(1, 301))
-    (coarse, fine) = study.deafness(TILT, Z, 2, [fmt, FloatFormat(2, 40)], last=200)
-    history = emulate(TILT, Z, fmt, Form.USUAL, marks, reference(TILT, Z, marks))
-    true = reference(TILT, Z, marks)
+def test_update_stagnation_is_that_of_the_runs():
+    fmt, checkpoint_steps = FloatFormat(2, 12), tuple(range(1, 301))
+    (coarse, fine) = study.update_stagnation(TILT, Z, 2, [fmt, FloatFormat(2, 40)], last=200)
+    history = emulate(TILT, Z, fmt, Form.INNOVATION, checkpoint_steps, reference(TILT, Z, checkpoint_steps))
+    true = reference(TILT, Z, checkpoint_steps)
     bias = history.state[:, 2] + true.x[:, 2].astype(float)
-    assert coarse.still == pytest.approx(np.mean(np.abs(np.diff(bias[-201:])) < 1e-9), abs=1e-12)
-    assert coarse.still > 0
-    assert fine.still == 0
+    assert coarse.unchanged == pytest.approx(np.mean(np.abs(np.diff(bias[-201:])) < 1e-9), abs=1e-12)
+    assert coarse.unchanged > 0
+    assert fine.unchanged == 0
     assert coarse.variance == pytest.approx(1 + history.covariance[-1, 2, 2] / float(true.P[-1, 2, 2]), rel=1e-12)
     watched = np.array(sorted({*log_spaced(300, 16), *range(100, 301)})) - 1
     assert coarse.error == np.abs(history.state[watched, 0]).max()
@@ -172,34 +174,36 @@ def test_deafness_is_that_of_the_runs():
     # Of the last steps, each is compared with the one before it, the first of them as well.
     steady = [bool(step) for step in np.abs(np.diff(bias)) < 1e-9]
     for last in (next(k for k in range(1, 300) if steady[-k]), 299):
-        (found,) = study.deafness(TILT, Z, 2, [fmt], last=last)
-        assert found.still == sum(steady[-last:]) / last
-    assert study.hidden_bits(TILT, Z, 2) == pytest.approx(math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12)
+        (found,) = study.update_stagnation(TILT, Z, 2, [fmt], last=last)
+        assert found.unchanged == sum(steady[-last:]) / last
+    assert study.bits_hiding_process_noise(TILT, Z, 2) == pytest.approx(
+        math.log2(float(true.P[-1, 2, 2]) / 1e-10), rel=1e-12
+    )
 
 
 def test_what_the_watch_of_a_state_refuses():
     for state in (-1, 3):
         with pytest.raises(ValueError, match="needed an index from 0 to 2"):
-            study.deafness(TILT, Z, state, [FloatFormat(2, 12)])
+            study.update_stagnation(TILT, Z, state, [FloatFormat(2, 12)])
         with pytest.raises(ValueError, match="needed an index from 0 to 2"):
-            study.hidden_bits(TILT, Z, state)
+            study.bits_hiding_process_noise(TILT, Z, state)
     for last in (0, 300):
         with pytest.raises(ValueError, match=f"got {last} steps to watch of 300"):
-            study.deafness(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
-    assert study.hidden_bits(TILT, Z, 0) == math.inf
+            study.update_stagnation(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
+    assert study.bits_hiding_process_noise(TILT, Z, 0) == math.inf
     with pytest.raises(ValueError, match="NaN or infinity"):
-        study.spans(TILT, Z * math.nan)
+        study.binary_ranges(TILT, Z * math.nan)
 
 
 def test_largest_estimate():
-    kept = reference(TILT, Z, log_spaced(300, 16))
-    assert study.largest_estimate(TILT, Z) == max(abs(x) for x in kept.x.ravel())
+    checkpoints = reference(TILT, Z, log_spaced(300, 16))
+    assert study.largest_estimate(TILT, Z) == max(abs(x) for x in checkpoints.x.ravel())
 
 
 def test_a_companion_bounds_closely():
-    thirds, marks = Z / 3, log_spaced(300, 16)  # which no format of base 2 holds
-    error, bound = study.companion(TILT, thirds, FloatFormat(2, 20))
-    history = emulate(TILT, thirds, FloatFormat(2, 20), Form.USUAL, marks)
+    thirds, checkpoint_steps = Z / 3, log_spaced(300, 16)  # which no format of base 2 holds
+    error, bound = study.companion_run(TILT, thirds, FloatFormat(2, 20))
+    history = emulate(TILT, thirds, FloatFormat(2, 20), Form.INNOVATION, checkpoint_steps)
     assert error == pytest.approx(np.abs(history.state).max(axis=0), rel=1e-12)
     assert (error > 0).all()
     assert (error <= bound).all()
@@ -207,13 +211,13 @@ def test_a_companion_bounds_closely():
 
 
 def test_a_companion_where_the_running_bound_says_nothing():
-    model, z = examples.precise(), np.full((20, 1), 1.0)
+    model, z = examples.precise_tracker(), np.full((20, 1), 1.0)
     assert survey(model, z, 0.01, [40], basis="bound") == ((40, math.inf),)
     found = required_precision(model, 20, 0.01, basis="bound", z=z)
     last = max(digits for digits, ratio in found.tried if math.isinf(ratio))
     assert last >= 40
     assert found.why == f"in {last} digits the bound says nothing"
-    error, bound = study.companion(model, z, FloatFormat(2, 40))
+    error, bound = study.companion_run(model, z, FloatFormat(2, 40))
     assert (error <= bound).all()
     assert bound[0] < 0.01
 
@@ -221,27 +225,27 @@ def test_a_companion_where_the_running_bound_says_nothing():
 def test_what_the_inverse_refuses():
     for matrix in ([[2, 1], [0, 2]], [[1, 2, 3], [2, 1, 3]], [[0, 1], [1, 2]]):
         with pytest.raises(ValueError, match=r"fit: got shape .* needed a symmetric matrix with a positive diagonal"):
-            study.inverse("fit", matrix, 1e-3)
-    for goal in (0, -1.0, math.nan, math.inf):
+            study.inverse_precision("fit", matrix, 1e-3)
+    for tolerance in (0, -1.0, math.nan, math.inf):
         with pytest.raises(ValueError, match="needed a relative error above 0"):
-            study.inverse("fit", [[2, 1], [1, 2]], goal)
+            study.inverse_precision("fit", [[2, 1], [1, 2]], tolerance)
 
 
 def test_a_sensor_that_is_silent_is_a_row_of_zeros():
     """Whatever stands for its measurement; and as if there were no such sensor."""
-    kept = {"x0": TILT.x0, "P0": TILT.P0, "Phi": TILT.Phi, "Q": TILT.Q}
+    others = {"x0": TILT.x0, "P0": TILT.P0, "Phi": TILT.Phi, "Q": TILT.Q}
     H, R = np.stack([TILT.H[0], TILT.H[0]]), TILT.R
     H[1, 1] = 0
-    told, alone = LinearModel(H=H, R=R, **kept), LinearModel(H=TILT.H[:, :1], R=R[:, :1, :1], **kept)
+    given, alone = LinearModel(H=H, R=R, **others), LinearModel(H=TILT.H[:, :1], R=R[:, :1, :1], **others)
     z = Z[:2].copy()
     states = []
     for value in (0.0, 77.0):
         z[1, 1] = value
-        states.append([emulated(told, z, FloatFormat(2, 24), form).tolist() for form in Form])
+        states.append([emulated(given, z, FloatFormat(2, 24), form).tolist() for form in Form])
     assert states[0] == states[1]
     first = reference(TILT, z, (1,))
     after = LinearModel(alone.Phi, alone.H, alone.Q, alone.R, first.x[0], (first.P[0] + first.P[0].T) / 2)
-    assert reference(told, z, (2,)).x[0].astype(float) == pytest.approx(
+    assert reference(given, z, (2,)).x[0].astype(float) == pytest.approx(
         reference(after, z[1:, :1], (1,)).x[0].astype(float), rel=1e-12
     )
 
@@ -314,15 +318,15 @@ class Even(Single):
 
 
 def in_numbers(model, number):
-    """What :func:`study.innovation` is told, in numbers of another kind."""
+    """What :func:`study.innovation_form` is given, in numbers of another kind."""
     letters = ("Phi", "H", "Q", "R", "x0", "P0")
     return {letter: np.frompyfunc(number, 1, 1)(getattr(model, letter)) for letter in letters}
 
 
-def emulated(model, z, fmt, form=Form.USUAL):
+def emulated(model, z, fmt, form=Form.INNOVATION):
     run = Run(model, fmt, form, range(1, len(z) + 1))
     run.take(z)
-    return run.kept().x
+    return run.checkpoints().x
 
 
 def test_the_emulation_is_the_processors_float32_but_for_ties(monkeypatch):
@@ -332,12 +336,12 @@ def test_the_emulation_is_the_processors_float32_but_for_ties(monkeypatch):
     stored = TILT.rounded(fmt)
     ours = emulated(stored, z, fmt)
     plain = study.native(stored, z, np.float32)
-    told = in_numbers(stored, lambda entry: Single(float(entry)))
-    first = study.innovation(told, np.frompyfunc(Single, 1, 1)(z[:1]))
+    given = in_numbers(stored, lambda entry: Single(float(entry)))
+    first = study.innovation_form(given, np.frompyfunc(Single, 1, 1)(z[:1]))
     assert Single.moved == 0  # no tie in the first step
     assert [float(x.value) for x in first[0]] == plain[0].tolist()
     assert list(map(Fraction, plain[0].tolist())) == ours[0].tolist()
-    found = study.innovation(told, np.frompyfunc(Single, 1, 1)(z))
+    found = study.innovation_form(given, np.frompyfunc(Single, 1, 1)(z))
     assert [[Fraction(float(x.value)) for x in row] for row in found] == ours.tolist()
     assert Single.moved > 100
     assert (plain[1:] != ours[1:].astype(float)).any()
@@ -348,22 +352,26 @@ def test_arrays_of_a_type_are_computed_as_its_numbers_one_by_one():
     dense = LinearModel(
         rng.standard_normal((3, 3)) / 3, rng.standard_normal((2, 3)), np.eye(3), 2 * np.eye(2), [1, 2, 3], np.eye(3)
     )
-    found = study.innovation(in_numbers(dense, lambda entry: Even(float(entry))), np.frompyfunc(Even, 1, 1)(Z[:40]))
+    found = study.innovation_form(
+        in_numbers(dense, lambda entry: Even(float(entry))), np.frompyfunc(Even, 1, 1)(Z[:40])
+    )
     assert [[float(x.value) for x in row] for row in found] == study.native(dense, Z[:40], np.float32).tolist()
 
 
 def test_a_type_of_numpy_has_a_range_and_the_errors_of_its_digits(capsys):
-    single, marks = study.native_error(TILT, Z, np.float32), np.array(log_spaced(300, 16))
-    true = reference(TILT, Z, marks.tolist()).x.astype(float)
-    assert single.tolist() == np.abs(study.native(TILT, Z, np.float32)[marks - 1] - true).max(axis=0).tolist()
+    single, checkpoint_steps = study.native_error(TILT, Z, np.float32), np.array(log_spaced(300, 16))
+    true = reference(TILT, Z, checkpoint_steps.tolist()).x.astype(float)
+    assert (
+        single.tolist() == np.abs(study.native(TILT, Z, np.float32)[checkpoint_steps - 1] - true).max(axis=0).tolist()
+    )
     assert (study.native_error(TILT, Z, np.float64) < 1e-12).all()
     assert ((single > 1e-8) & (single < 1e-4)).all()
     assert capsys.readouterr().err == ""
     study.native(TILT, Z, np.float16, progress=True)
     assert "300/300" in capsys.readouterr().err
     # A variance of 4e2 and 1e6 units, squared, is beyond binary16: 65504.
-    assert not np.isfinite(study.native(study.in_units(TILT, (1, 1000, 1)), Z, np.float16)).all()
-    assert np.isfinite(study.native(study.in_units(TILT, (1, 1000, 1)), Z, np.float32)).all()
+    assert not np.isfinite(study.native(study.rescaled(TILT, (1, 1000, 1)), Z, np.float16)).all()
+    assert np.isfinite(study.native(study.rescaled(TILT, (1, 1000, 1)), Z, np.float32)).all()
 
 
 @pytest.mark.parametrize(
@@ -378,13 +386,13 @@ def test_the_emulation_is_that_of_decimal(rounding, name):
         return Decimal(entry.numerator) / Decimal(entry.denominator)
 
     with localcontext(Context(prec=8, rounding=name)):
-        found = study.innovation(in_numbers(stored, number), np.frompyfunc(number, 1, 1)(measured.to_fractions()))
+        found = study.innovation_form(in_numbers(stored, number), np.frompyfunc(number, 1, 1)(measured.to_fractions()))
     assert [list(map(Fraction, row)) for row in found] == emulated(stored, measured, fmt).tolist()
 
 
 def test_inverse_knows_its_condition():
     matrix = examples.normal_matrix(2, range(11))
-    found = study.inverse("fit", matrix, 1e-3)
+    found = study.inverse_precision("fit", matrix, 1e-3)
     plain = matrix.astype(float)
     assert found.condition == pytest.approx(np.linalg.cond(plain, 1), rel=1e-9)
     scale = 2.0 ** -np.round(np.log2(plain.diagonal()) / 2)
@@ -398,20 +406,20 @@ def test_units_of_powers_of_two_change_nothing():
     fmt, sizes = FloatFormat(2, 15), (4, 1, Fraction(1, 1024))
     for form in Form:
         plain = emulate(TILT, Z, fmt, form).state
-        other = emulate(study.in_units(TILT, sizes), Z, fmt, form).state
+        other = emulate(study.rescaled(TILT, sizes), Z, fmt, form).state
         assert np.array_equal(other / np.array(sizes, dtype=float), plain)
-    tens = emulate(study.in_units(TILT, (1, 1, 1000)), Z, fmt, Form.USUAL).state / (1, 1, 1000)
-    assert not np.array_equal(tens, emulate(TILT, Z, fmt, Form.USUAL).state)
+    tens = emulate(study.rescaled(TILT, (1, 1, 1000)), Z, fmt, Form.INNOVATION).state / (1, 1, 1000)
+    assert not np.array_equal(tens, emulate(TILT, Z, fmt, Form.INNOVATION).state)
 
 
 def test_units_change_the_estimates_and_nothing_else():
     sizes = (3, Fraction(1, 7), 10)
-    plain, other = (reference(model, Z, (300,)) for model in (TILT, study.in_units(TILT, sizes)))
+    plain, other = (reference(model, Z, (300,)) for model in (TILT, study.rescaled(TILT, sizes)))
     assert (other.x[0] / sizes).astype(float) == pytest.approx(plain.x[0].astype(float), rel=1e-25, abs=0)
     with pytest.raises(ValueError, match="needed 3 positive numbers"):
-        study.in_units(TILT, (1, 2))
+        study.rescaled(TILT, (1, 2))
     with pytest.raises(ValueError, match="needed 3 positive numbers"):
-        study.in_units(TILT, (1, 2, 0))
+        study.rescaled(TILT, (1, 2, 0))
 
 
 # -- tables -------------------------------------------------------------------------------------------
@@ -426,25 +434,27 @@ def test_answers():
 
 
 def test_cells():
-    deaf = tables.deaf([study.Deafness(FloatFormat(2, 12), 0.5, 0.25, 0.03)], 0.01)
+    deaf = tables.update_stagnation([study.UpdateStagnation(FloatFormat(2, 12), 0.5, 0.25, 0.03)], 0.01)
     assert deaf.body == (("12 bits", "0.5", "25 %", "3"),)
-    spans = tables.spans([study.Span("gain", -20, 3), study.Span("all", -2000, 2000), study.Span("x", -14, 15)])
+    spans = tables.binary_ranges(
+        [study.BinaryRange("gain", -20, 3), study.BinaryRange("all", -2000, 2000), study.BinaryRange("x", -14, 15)]
+    )
     assert [row[-1] for row in spans.body] == [
         "binary32, binary64, bfloat16, TF32",
         "none",
         "binary16, binary32, binary64, bfloat16, TF32",
     ]
-    inverses = tables.inverses([study.Inverse("fit", 123.0, 45.0, 6, 7)])
+    inverses = tables.inverse_precisions([study.InversePrecision("fit", 123.0, 45.0, 6, 7)])
     assert inverses.body == (("fit", "120", "45", "6", "7"),)
 
 
 def test_processors():
     table = tables.processors()
-    told = {row[0]: row[1:] for row in table.body}
-    assert told["binary16"] == ("FloatFormat(2, 11)", "0.00049", "$2^{-14}$", "$2^{16}$")
-    assert told["bfloat16"] == ("FloatFormat(2, 8)", "0.0039", "$2^{-126}$", "$2^{128}$")
-    assert told["TF32"][0] == told["binary16"][0]
-    assert set(told) == set(examples.NORMAL)
+    given = {row[0]: row[1:] for row in table.body}
+    assert given["binary16"] == ("FloatFormat(2, 11)", "0.00049", "$2^{-14}$", "$2^{16}$")
+    assert given["bfloat16"] == ("FloatFormat(2, 8)", "0.0039", "$2^{-126}$", "$2^{128}$")
+    assert given["TF32"][0] == given["binary16"][0]
+    assert set(given) == set(examples.NORMAL_RANGE)
 
 
 def test_integrator():
@@ -460,11 +470,11 @@ def test_integrator():
 
 def test_survey(ax):
     artists = figures.survey({"UD": [(8, math.inf), (10, 5.0), (12, 0.1)]}, {"UD": [(10, math.inf), (12, 3.0)]}, ax)
-    points, line, goal, *rest = artists
+    points, line, tolerance, *rest = artists
     assert points.get_xydata().tolist() == [[10, 5], [12, 0.1]]
     assert line.get_xydata().tolist() == [[12, 3]]
     assert points.get_color() == line.get_color()
-    assert list(goal.get_ydata()) == [1, 1]
+    assert list(tolerance.get_ydata()) == [1, 1]
     assert [text.get_text() for text in rest[1::2]] == ["binary16"]
     assert ax.get_yscale() == "log"
 

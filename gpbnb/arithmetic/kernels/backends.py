@@ -302,6 +302,7 @@ def _shape(a: Components, b: Components) -> tuple[int, ...]:
 
 @lru_cache(maxsize=1)
 def _loops() -> Any:
+    # Here, and not above: numba takes a second to import, and exact arithmetic does not need it.
     from gpbnb.arithmetic.kernels import elementwise
 
     return elementwise

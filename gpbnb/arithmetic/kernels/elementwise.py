@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit
-
 from gpbnb.arithmetic.kernels import scalar
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import compare, load, lost, put
 
 
 def _two(operation: Any) -> Callable[..., bool]:
-    @njit(cache=True, nogil=True)
+    @compiled
     def loop(fmt: Any, n: int, a: Any, b: Any, c: Any) -> Any:
         gone = False
         for i in range(n):
@@ -28,7 +27,7 @@ def _two(operation: Any) -> Callable[..., bool]:
 
 
 def _one(operation: Any) -> Callable[..., bool]:
-    @njit(cache=True, nogil=True)
+    @compiled
     def loop(fmt: Any, n: int, a: Any, c: Any) -> Any:
         gone = False
         for i in range(n):
@@ -41,7 +40,7 @@ def _one(operation: Any) -> Callable[..., bool]:
 
 
 def _fold(operation: Any) -> Callable[..., bool]:
-    @njit(cache=True, nogil=True)
+    @compiled
     def loop(fmt: Any, n: int, width: int, a: Any, c: Any) -> Any:
         gone = False
         for j in range(width):
@@ -60,14 +59,14 @@ ENTRIES |= {name: _one(getattr(scalar, name)) for name in ("sqrt", "round_")}
 FOLDS = {name: _fold(getattr(scalar, name)) for name in ("add", "multiply")}
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def compared(fmt: Any, n: int, a: Any, b: Any, c: Any) -> None:
     """c[i] = -1, 0 or 1 as a[i] is less than, equal to or greater than b[i]."""
     for i in range(n):
         c[i] = compare(fmt, load(fmt, a, i), load(fmt, b, i))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """The matrix product c = a b; OverflowError as :func:`gpbnb.arithmetic.kernels.scalar.matmul`."""
     scalar.matmul(fmt, a, b, c)

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import (
     absolute,
     add,
@@ -26,7 +25,7 @@ from gpbnb.arithmetic.kernels.scalar import (
 )
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
     """Factor a (n, n): the upper factor on and above the diagonal, below it the multipliers of the lower.
 
@@ -57,7 +56,7 @@ def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
     return -1
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def reduce(fmt: Any, factors: Any, b: Any) -> None:
     """Reduce the right-hand sides b (n, p), rows in the order of the factors that :func:`lu` made."""
     n = factors.shape[0]
@@ -68,7 +67,7 @@ def reduce(fmt: Any, factors: Any, b: Any) -> None:
                 store(fmt, b, (i, j), add(fmt, load(fmt, b, (i, j)), multiply(fmt, m, load(fmt, b, (k, j)))))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def substitute(fmt: Any, factors: Any, b: Any) -> None:
     """Back substitution: from the reduced right-hand sides b (n, p) to the solutions."""
     n = factors.shape[0]

@@ -3,7 +3,7 @@
 A loop is written once, with a tag of :mod:`gpbnb.arithmetic.kernels.tags` as its first argument. numba compiles it
 for the type of the tag::
 
-    @njit(cache=True, nogil=True)
+    @compiled
     def decay(fmt, factor, x):
         f = load(fmt, factor, 0)
         for k in range(1, len(x)):

@@ -13,12 +13,14 @@ from operator import mul
 
 import numpy as np
 
-from gpbnb import ledger
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import dot
 from gpbnb.budget import derivation, experiment, theory
 from gpbnb.budget.theory import ErrorForm, Kind
-from gpbnb.ledger.finding import Checks, Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.checks import rolling
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Checks
+from gpbnb.ledger.statements import load_statements, quote
 from gpbnb.measurement import ARCSEC, MAS, STATES, apply, deroll, measurement_matrix, rotation, spin_in_readout
 
 CHECKS = Checks()
@@ -36,7 +38,7 @@ TITLE_PAGE = "NAS8-34426"
 
 @CHECKS.add("hung1984.I.contents")
 def contents() -> Finding:
-    entries = [entry for entry in ledger.load_inventory() if entry.document == "hung1984"]
+    entries = [entry for entry in load_statements() if entry.document == "hung1984"]
     return unverifiable(
         f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries))}",
         "the scan has no page numbers and no distribution list",
@@ -96,10 +98,9 @@ def revised_chain() -> bool:
 
 @CHECKS.add("hung1984.I.1-f-study")
 def one_over_f_study() -> Finding:
-    entries = [entry for entry in ledger.load_inventory() if entry.id.startswith("hung1984.III.")]
+    entries = [entry for entry in load_statements() if entry.id.startswith("hung1984.III.")]
     left = [entry for entry in entries if entry.kind == "open"]
-    done = ledger.counts(ledger.examine(left, ledger.checking.load_checks(ledger.load_inventory())))
-    count = done.get(Verdict.ANSWERED.value, 0)
+    count = sum(rolling.CHECKS.run(entry).verdict is Verdict.ANSWERED for entry in left)
     return answer(
         bool(left) and count == len(left),
         f"of the {len(left)} studies that ch. III leaves open, {count} are answered here",
@@ -116,9 +117,9 @@ def period_1984() -> Finding:
 @CHECKS.add("hung1984.I.contract")
 def contract() -> Finding:
     return compare(
-        TITLE_PAGE in ledger.quote("hung1984.I.contract"),
+        TITLE_PAGE in quote("hung1984.I.contract"),
         TITLE_PAGE,
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="the title page and hung1982 have an S, where this page, or its scan, has a 5",
     )
 
@@ -153,7 +154,7 @@ def history() -> Finding:
 
 @CHECKS.add("hung1982.I.previous-contract")
 def previous_contract() -> Finding:
-    told, listed = (ledger.quote(f"hung1982.{key}") for key in ("I.previous-contract", "II.references"))
+    told, listed = (quote(f"hung1982.{key}") for key in ("I.previous-contract", "II.references"))
     numbers = [re.findall(r"NAS8-\d+", each) for each in (told, listed)]
     award, end, start = date(1980, 4, 1), date(1981, 2, 18), date(1981, 6, 24)
     dates = "April 1980" in told and "18 February 1981" in listed
@@ -168,7 +169,7 @@ def previous_contract() -> Finding:
 @CHECKS.add("hung1982.I.contract")
 def contract_1982() -> Finding:
     return compare(
-        TITLE_PAGE in ledger.quote("hung1982.I.contract"),
+        TITLE_PAGE in quote("hung1982.I.contract"),
         f"{TITLE_PAGE}, as on the title page of hung1984",
         Verdict.INCONSISTENT,
     )
@@ -176,10 +177,10 @@ def contract_1982() -> Finding:
 
 @CHECKS.add("hung1982.I.chapters-ii-and-iii")
 def chapters() -> Finding:
-    where = {entry.item: entry.chapter for entry in ledger.load_inventory() if entry.document == "hung1982"}
+    where = {entry.item: entry.chapter for entry in load_statements() if entry.document == "hung1982"}
     found = [where["classification by statistics"], where["main result"]]
     return compare(
-        re.findall("Chapter ([IVX]+)", ledger.quote("hung1982.I.chapters-ii-and-iii")) == found,
+        re.findall("Chapter ([IVX]+)", quote("hung1982.I.chapters-ii-and-iii")) == found,
         f"they are chapters {' and '.join(found)}",
         Verdict.INCONSISTENT,
     )
@@ -192,12 +193,12 @@ def references() -> Finding:
 
 @CHECKS.add("hung1982.I.chapter-reference")
 def chapter_reference() -> Finding:
-    entries = [entry for entry in ledger.load_inventory() if entry.document == "hung1982"]
+    entries = [entry for entry in load_statements() if entry.document == "hung1982"]
     (where,) = {entry.chapter for entry in entries if entry.item == "six frames"}
     return compare(
-        ledger.quote("hung1982.I.chapter-reference").endswith(f"Chapter {where}"),
+        quote("hung1982.I.chapter-reference").endswith(f"Chapter {where}"),
         f"the measurement geometry is chapter {where}",
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="two letters changed places; there is no chapter VI",
     )
 

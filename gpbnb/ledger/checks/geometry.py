@@ -11,7 +11,8 @@ import sympy as sp
 from gpbnb.display.derivation import Derivation
 from gpbnb.geometry import derivation, experiment, theory
 from gpbnb.geometry.derivation import ALPHA, BETA, GAMMA, THETA, up_to
-from gpbnb.ledger.finding import Checks, Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Checks
 from gpbnb.measurement import (
     ARCSEC,
     MAS,
@@ -165,7 +166,7 @@ def intermediate_frame() -> Finding:
         turned < 1e-9,
         f"pointings of (−2, 4) and (7, −1) arcseconds turn it by {turned / ARCSEC:.1f}; at both (7) gives the drift to "
         f"{apart / MAS:.0e} milliarcseconds",
-        Verdict.TYPO if apart < 1e-3 * MAS else Verdict.WRONG,
+        Verdict.MISPRINT if apart < 1e-3 * MAS else Verdict.WRONG,
         otherwise_note="it stands still only as long as the roll axis does; (5) to (7) are of one instant and do not "
         "ask it to",
     )

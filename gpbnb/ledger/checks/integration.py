@@ -29,7 +29,8 @@ from gpbnb.integration.derivation import (
     P,
     T,
 )
-from gpbnb.ledger.finding import Checks, Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Checks
 
 CHECKS = Checks()
 CHAPTER = "chapter *Digital integration error*"
@@ -273,7 +274,7 @@ def transition_integral() -> Finding:
         same(as_printed, zero),
         "$\\Phi(\\tau)=I+\\int_0^\\tau A\\Phi\\,d\\tau_1$; (7) exceeds the printed integral by "
         f"${sp.latex(as_printed)}$",
-        Verdict.TYPO if same(with_identity, zero) else Verdict.WRONG,
+        Verdict.MISPRINT if same(with_identity, zero) else Verdict.WRONG,
         otherwise_note="the $I$ is missing, against $\\Phi(0)=I$ beside it, and the limits are those of $t$, not of "
         "$\\tau$; as printed only $\\Phi=0$ solves it; (7) is right. The limits are the author's, since both integrals "
         "have them; the $I$ may be the scan's loss",
@@ -289,7 +290,7 @@ def noise_integral() -> Finding:
         same(right, as_printed),
         "$\\underline q_n=\\int\\Phi(t_n-\\tau)\\,\\underline n_p(\\tau)\\,d\\tau$; as printed, $E(q_1^2)$ would fall "
         f"to {variance:.2g} of $\\sigma_x^2$ after five correlation times, where it is {expected:.2g}",
-        Verdict.TYPO if same(right, turned) else Verdict.WRONG,
+        Verdict.MISPRINT if same(right, turned) else Verdict.WRONG,
         otherwise_note="$\\Phi(\\tau-t_{n-1})$ would do for the covariance, time being reversed; the document "
         "never uses $\\underline q_n$ but for being new; $P$ for $p$ is a slip of type",
     )
@@ -348,7 +349,7 @@ def squared_mean() -> Finding:
     return compare(
         agrees,
         "$E(x_{2n}^2)$; the print is the square of a mean, which is zero",
-        Verdict.TYPO if holds else Verdict.WRONG,
+        Verdict.MISPRINT if holds else Verdict.WRONG,
         otherwise_note=f"(13) has $P_{{22}}$ again, and the term before has its square inside; author or scan, either "
         f"may have moved it; {spoiled('(12)')}",
     )
@@ -363,7 +364,7 @@ def rate() -> Finding:
     return compare(
         any(same(candidate, wanted) for candidate in candidates),
         "$\\Delta P_{ee_n}/T$; none of $\\Delta P_{11}$, $\\Delta P_{22}$, $\\Delta P_{32}$, $\\Delta P_{33}$ is it",
-        Verdict.TYPO if mends else Verdict.WRONG,
+        Verdict.MISPRINT if mends else Verdict.WRONG,
         otherwise_note="$ij$ for $ee$, as in (15) below it, so by the author rather than the scan; the last member is "
         "right",
     )
@@ -464,7 +465,7 @@ def p32() -> Finding:
     return compare(
         agrees,
         "the last term is $\\frac12\\phi_{21}P_{11_{n-1}}T$",
-        Verdict.TYPO if holds else Verdict.WRONG,
+        Verdict.MISPRINT if holds else Verdict.WRONG,
         otherwise_note=f"the factor $\\frac12$ is back in (32), as (16) and (17) have it, so that author or scan "
         f"dropped it here alone; {spoiled('(18)')}, a negative variance",
     )
@@ -497,7 +498,7 @@ def covariance_components() -> Finding:
     return compare(
         holds and same(second, printed),
         f"$\\dot P_{{12}}={sp.latex(second.subs(OMEGA, sp.Symbol('omega_bw')))}$; the others as printed",
-        Verdict.TYPO if holds and same(second, printed.subs("omega_BW", OMEGA)) else Verdict.WRONG,
+        Verdict.MISPRINT if holds and same(second, printed.subs("omega_BW", OMEGA)) else Verdict.WRONG,
         otherwise_note="capitals in the subscript, by author or scan, here alone; $A$ is that of (4), not of (3)",
     )
 
@@ -556,7 +557,7 @@ def p22_recursion() -> Finding:
     return compare(
         same(change, derivation.p22_change(printed=True)),
         "$\\frac2{\\omega_{bw}}[T-\\frac1{\\omega_{bw}}(1-e^{-\\omega_{bw}T})e^{-\\omega_{bw}t_{n-1}}]P_{11\\infty}$",
-        Verdict.TYPO if holds and harmless else Verdict.WRONG,
+        Verdict.MISPRINT if holds and harmless else Verdict.WRONG,
         otherwise_note="a time less a number, where (24) has $\\frac1{\\omega_{bw}}$; dropped by author or scan; no "
         "more than a slip, since for large $n$ the term dies away; but it spoils the "
         f"build-up: the first change of $P_{{22}}$ for $\\omega_{{bw}}=10$, $T=0.01$ is {found:.3g}, not {right:.3g}",
@@ -657,7 +658,7 @@ def rate_in_mu() -> Finding:
     return compare(
         same(first, second, third, fourth),
         "$(1+\\phi_{11})T-\\frac2{\\omega_{bw}}(1-\\phi_{11})$ over $1-\\phi_{11}$ in the second member",
-        Verdict.TYPO if same(first, third, fourth) else Verdict.WRONG,
+        Verdict.MISPRINT if same(first, third, fourth) else Verdict.WRONG,
         otherwise_note=f"its $T$ is lost, by author or scan, and back in the third; {spoiled('(34)')}; with $T=1$ "
         "nobody would see it",
     )
@@ -752,7 +753,7 @@ def series() -> Finding:
     return compare(
         same(numerator, printed) and others,
         "the cubic term of the numerator is $\\frac1{12}\\mu^3$; all else, and the result $\\frac16\\mu$, is right",
-        Verdict.TYPO if others else Verdict.WRONG,
+        Verdict.MISPRINT if others else Verdict.WRONG,
         otherwise_note="the quadratic term is halved with the 2 in front, the cubic one not, by author or scan; "
         f"dropped in the next line; kept, it would add a term ${sp.latex(slips()['(37)'] - MU / 6)}$ to what is an odd "
         "function of $\\mu$",

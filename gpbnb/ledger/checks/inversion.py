@@ -13,15 +13,15 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb import ledger
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, inverse_of
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
 from gpbnb.inversion import derivation, example, experiment, procedure, theory
 from gpbnb.inversion.theory import Reduction
-from gpbnb.ledger.finding import Checks, Finding, Verdict, both, compare, unverifiable
-from gpbnb.ledger.statements import load_inventory, quote
+from gpbnb.ledger.finding import Finding, Verdict, compare, unverifiable
+from gpbnb.ledger.registry import Checks, both
+from gpbnb.ledger.statements import load_statements, quote
 
 CHECKS = Checks()
 
@@ -188,7 +188,7 @@ def reference_33() -> Finding:
     return compare(
         cited is columns_of_the_inverse,
         "what is solved $n$ times is (33); (29) is a chain of matrix products",
-        Verdict.TYPO if meant is columns_of_the_inverse else Verdict.WRONG,
+        Verdict.MISPRINT if meant is columns_of_the_inverse else Verdict.WRONG,
         otherwise_note="(33) is meant, and printed in hung1984",
     )
 
@@ -320,7 +320,7 @@ def relative_error() -> Finding:
     return compare(
         equal == count,
         f"equal in {equal} of {count} cases, at most in {below}",
-        Verdict.TYPO if below == count else Verdict.WRONG,
+        Verdict.MISPRINT if below == count else Verdict.WRONG,
         otherwise_note="$\\le$ is meant, as in (43) and in hung1982 (44)",
     )
 
@@ -495,7 +495,7 @@ def errors_of_the_first_step_1982() -> Finding:
     return compare(
         zero(printed - derivation.printed_entry_error()),
         "$3\\epsilon\\,a_{ij}(1)-2\\epsilon\\,a_{ij}(0)$, as its own (48) has it",
-        Verdict.TYPO if meant else Verdict.WRONG,
+        Verdict.MISPRINT if meant else Verdict.WRONG,
         otherwise_note="the second (1) is a slip for (0), mended in hung1984; the formula meant has the fault of (48)",
     )
 
@@ -559,7 +559,7 @@ def right_side_definition() -> Finding:
     return compare(
         zero(first - meant) and zero(second - meant),
         "$b_i(0)+m_{i1}b_1(0)=b_i(0)-\\frac{a_{i1}(0)}{a_{11}(0)}b_1(0)$",
-        Verdict.TYPO if zero(meant - (bi + m * b1)) else Verdict.WRONG,
+        Verdict.MISPRINT if zero(meant - (bi + m * b1)) else Verdict.WRONG,
         otherwise_note="two slips: the sign of $m_{i1}$, which contains the minus of (46), and $b_i(0)$ for $b_1(0)$ "
         "in the product; the last line below is right for $b_1(0)$",
     )
@@ -585,7 +585,7 @@ def right_side_step() -> Finding:
     return compare(
         zero(printed - last),
         "with $b_1(0)$ in the product the last form follows, with $b_i(0)$ it does not",
-        Verdict.TYPO if zero(meant - last) and zero(second - last) else Verdict.WRONG,
+        Verdict.MISPRINT if zero(meant - last) and zero(second - last) else Verdict.WRONG,
         otherwise_note="$b_i(0)$ for $b_1(0)$ in the product, in two lines; hung1982 has it right",
     )
 
@@ -626,7 +626,7 @@ def after_the_first_step_1982() -> Finding:
         bool((zeroth[1:, 1] == first[1:, 1]).all()),
         f"the second column of the example of 11.4 changes from {float(zeroth[1, 1]):g}, {float(zeroth[2, 1]):g} to "
         f"{float(first[1, 1]):g}, {float(first[2, 1]):g}",
-        Verdict.TYPO if (zeroth[0] == first[0]).all() else Verdict.WRONG,
+        Verdict.MISPRINT if (zeroth[0] == first[0]).all() else Verdict.WRONG,
         otherwise_note="(0) for (1) in two entries, mended in hung1984",
     )
 
@@ -687,7 +687,7 @@ def right_side_second_step() -> Finding:
     return compare(
         zero(first - hat),
         "$b_3(2)+3\\epsilon b_3(2)-2\\epsilon\\hat b_3(1)$, without a hat on the first $b_3(2)$",
-        Verdict.TYPO if meant else Verdict.WRONG,
+        Verdict.MISPRINT if meant else Verdict.WRONG,
         otherwise_note="as printed the error would be zero; hung1982 has no hat there",
     )
 
@@ -768,7 +768,7 @@ def partial_matrix() -> Finding:
     return compare(
         len(indices) == 1,
         f"$A_i$ has a block of $n-i$ rows, {_partial_size(5, 2)} for $n=5$, $i=2$",
-        Verdict.TYPO if right else Verdict.WRONG,
+        Verdict.MISPRINT if right else Verdict.WRONG,
         otherwise_note="one index with two names, $j$ on the left and $i$ in the block",
     )
 
@@ -813,7 +813,7 @@ def _norm_finding(right: bool, extra: str = "") -> Finding:
     return compare(
         found.fails == 0 and found.least == 1,
         f"{found}; at most {found.largest:.2g} of it",
-        Verdict.TYPO if found.fails == 0 else Verdict.WRONG,
+        Verdict.MISPRINT if found.fails == 0 else Verdict.WRONG,
         otherwise_note="$\\le$ is meant. Sizes are added here as they must be, and it is a bound to first order; but "
         f"the procedure of 11.3 does not use it{extra}",
     )
@@ -847,7 +847,7 @@ def triangular_matrix() -> Finding:
     return compare(
         superscripts(True),
         "row $k$ of $\\hat A_T$ is that of $\\hat A(k-1)$, off the diagonal too",
-        Verdict.TYPO if superscripts(False) else Verdict.WRONG,
+        Verdict.MISPRINT if superscripts(False) else Verdict.WRONG,
         otherwise_note="(0) for $(k-1)$ right of the diagonal; the diagonal is right, and nothing later uses the "
         "superscripts",
     )
@@ -900,7 +900,7 @@ def before_68() -> Finding:
     return compare(
         zero(derivation.line_before_68(brackets=False)),
         "$(\\hat A-\\Delta A)(\\hat x-\\Delta x)=\\hat b-\\Delta b$",
-        Verdict.TYPO if zero(derivation.line_before_68()) else Verdict.WRONG,
+        Verdict.MISPRINT if zero(derivation.line_before_68()) else Verdict.WRONG,
         otherwise_note="brackets are missing, which hung1982 has",
     )
 
@@ -933,7 +933,7 @@ def computed_inverse() -> Finding:
         same,
         f"the inverse of the perturbed matrix differs from the computed one: by {float(apart):.1e} in norm, in the "
         "example of 11.4 in four digits",
-        Verdict.TYPO if second_order else Verdict.WRONG,
+        Verdict.MISPRINT if second_order else Verdict.WRONG,
         otherwise_note="$\\hat A$ is not known, and one system gives one column; the computed inverse takes its "
         "place, at the price of a term of second order",
     )
@@ -1012,7 +1012,7 @@ def second_equation() -> Finding:
     return compare(
         derivation.leftover(77, hats=False) == 0,
         f"as printed it leaves ${sp.latex(derivation.leftover(77, hats=False))}$, with $\\hat x_3$ nothing",
-        Verdict.TYPO if derivation.leftover(77) == 0 else Verdict.WRONG,
+        Verdict.MISPRINT if derivation.leftover(77) == 0 else Verdict.WRONG,
         otherwise_note="$\\hat x_3$ is meant, and printed in hung1982",
     )
 
@@ -1030,7 +1030,7 @@ def first_row_with_hats() -> Finding:
     return compare(
         zero(left),
         f"without hats it is (71a), exactly; with them it differs from $x_1$ by ${sp.latex(sp.factor(left))}$",
-        Verdict.TYPO if zero(plain - x1) and bool(first_row().agrees) else Verdict.WRONG,
+        Verdict.MISPRINT if zero(plain - x1) and bool(first_row().agrees) else Verdict.WRONG,
         otherwise_note="the hats belong to the next line, what is computed; where $x_2$ is taken from (71b), above "
         "(75), there is none",
     )
@@ -1075,7 +1075,7 @@ def assembled() -> Finding:
     return compare(
         _assembled(hats=False),
         "it holds to first order with $\\hat x_1,\\hat x_2,\\hat x_3$",
-        Verdict.TYPO if _assembled(hats=True) else Verdict.WRONG,
+        Verdict.MISPRINT if _assembled(hats=True) else Verdict.WRONG,
         otherwise_note="hats are missing in the vector, which is labelled $\\hat x$",
     )
 
@@ -1104,7 +1104,7 @@ def factored_three() -> Finding:
     return compare(
         _factored(3, sp.Integer(1)),
         "$A_D\\,\\mathrm{diag}(0,4,3)\\,\\epsilon$",
-        Verdict.TYPO if _factored(3, derivation.EPSILON) else Verdict.WRONG,
+        Verdict.MISPRINT if _factored(3, derivation.EPSILON) else Verdict.WRONG,
         otherwise_note="the second form lacks the $\\epsilon$ of the first",
     )
 
@@ -1151,7 +1151,7 @@ def weights() -> Finding:
     return compare(
         twice == 0,
         f"$1\\le k<j\\le n$; as printed, {twice} entries have two values for $n={n}$, those of the diagonal",
-        Verdict.TYPO if _weights_counted() else Verdict.WRONG,
+        Verdict.MISPRINT if _weights_counted() else Verdict.WRONG,
         otherwise_note="$k<j$ is meant, and printed in (87) and in hung1982",
     )
 
@@ -1186,7 +1186,7 @@ def factored() -> Finding:
     return compare(
         all(_factored(n, sp.Integer(1)) for n in sizes),
         "the first form is (87); the second is $A_DM_A\\,\\epsilon$",
-        Verdict.TYPO if all(_factored(n, derivation.EPSILON) for n in sizes) else Verdict.WRONG,
+        Verdict.MISPRINT if all(_factored(n, derivation.EPSILON) for n in sizes) else Verdict.WRONG,
         otherwise_note="the second form lacks the $\\epsilon$ of the first; hung1982 has β there",
     )
 
@@ -1349,7 +1349,7 @@ def relative_error_norm() -> Finding:
         ratio == e,
         f"$\\|\\delta(A^{{-1}})\\|/\\|\\hat A^{{-1}}\\|={float(ratio):.2g}$ and $\\|E\\|={float(e):.2g}$ in the "
         "example of 11.4",
-        Verdict.TYPO if definition and ratio <= e else Verdict.WRONG,
+        Verdict.MISPRINT if definition and ratio <= e else Verdict.WRONG,
         otherwise_note="the signs are interchanged: $\\epsilon=\\|\\delta(A^{-1})\\|/\\|\\hat A^{-1}\\|\\le\\|E\\|$, "
         "by (96)",
     )
@@ -1432,12 +1432,12 @@ def letter_d() -> Finding:
 
 @CHECKS.add("hung1984.II.s11-3.figure-number")
 def number_of_the_chart() -> Finding:
-    figures = [e for e in ledger.load_inventory() if e.document == "hung1984" and e.kind == "figure"]
+    figures = [e for e in load_statements() if e.document == "hung1984" and e.kind == "figure"]
     chapters = list(dict.fromkeys(e.chapter for e in figures if e.item.startswith("Figure III-1")))
     return compare(
         len(chapters) == 1,
         f"chapters {' and '.join(chapters)} have a Figure III-1",
-        Verdict.TYPO if "II" in chapters else Verdict.INCONSISTENT,
+        Verdict.MISPRINT if "II" in chapters else Verdict.INCONSISTENT,
         otherwise_note="Figure II-1 is meant: in hung1982, from which it was taken over, this was chapter III",
     )
 
@@ -1627,10 +1627,10 @@ def claims_1982() -> Finding:
 
 @CHECKS.add(*both("s11-4.reference-to-figure-1"))
 def reference_to_figure() -> Finding:
-    there = {one.item.split(" (")[0] for one in load_inventory() if one.kind == "figure" and one.id in CHECKS}
+    there = {one.item.split(" (")[0] for one in load_statements() if one.kind == "figure" and one.id in CHECKS}
     return compare(
         any(quote(place).endswith(figure) for place in both("s11-4.reference-to-figure-1") for figure in there),
         f"the one flow chart of these sections is {', '.join(there)}",
-        Verdict.TYPO if len(there) == 1 else Verdict.INCONSISTENT,
+        Verdict.MISPRINT if len(there) == 1 else Verdict.INCONSISTENT,
         otherwise_note="Figure III-1 is meant",
     )

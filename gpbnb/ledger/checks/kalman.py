@@ -11,11 +11,22 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, max_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
 from gpbnb.display.tables import scientific
-from gpbnb.kalman import derivation, experiment, smallest, theory, year
-from gpbnb.ledger.finding import Check, Checks, Finding, Verdict, answer, both, compare, unverifiable
+from gpbnb.kalman import (
+    contraction,
+    derivation,
+    emulation,
+    exact_step,
+    forms,
+    report_bounds,
+    smallest,
+    year,
+    year_cases,
+)
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Check, Checks, both
 from gpbnb.ledger.statements import quote
 
 CHECKS = Checks()
@@ -33,7 +44,7 @@ DIMENSIONS = (3, 2)
 
 
 @cache
-def filtered() -> tuple[tuple[smallest.Case, theory.ExactStep], ...]:
+def filtered() -> tuple[tuple[smallest.Case, exact_step.ExactStep], ...]:
     """Four exact steps of a filter with small random numbers: what each began with, and what came of it."""
     rng = np.random.default_rng(98)
     n, m = DIMENSIONS
@@ -52,7 +63,7 @@ def filtered() -> tuple[tuple[smallest.Case, theory.ExactStep], ...]:
     steps = []
     for _ in range(4):
         case = smallest.Case(Phi, H, Q, R, x, P, numbers(m))
-        step = theory.exact_step(*case)
+        step = exact_step.exact_step(*case)
         steps.append((case, step))
         x, P = step.x, step.P
     return tuple(steps)
@@ -93,7 +104,7 @@ def excess(statement: str) -> float:
         A, B = FOUR.array([["1.001", 1], [1, 0]]), FOUR.array(smallest.correlated().P)
         product = exact(A) @ exact(B) @ exact(A.T)
         error = abs((A @ B @ A.T).to_fractions() - product)
-        allowed = beta * theory.prediction_count(2) * abs(product)
+        allowed = beta * report_bounds.prediction_count(2) * abs(product)
         return float(max(e / a for e, a in zip(error.flat, allowed.flat, strict=True) if a))
     if statement == "(106)":
         case = smallest.correlated()
@@ -101,14 +112,14 @@ def excess(statement: str) -> float:
         return float(abs(fl(fl(case.P[0, 0] * case.H[0, 0]) + case.P[0, 1]) - first) / (beta * (2 + 1) * abs(first)))
     if statement in ("(104)", "(107)"):
         case = smallest.scalar(FOUR, ".004", "7.5")
-        true = theory.exact_step(*case)
+        true = exact_step.exact_step(*case)
         _, K, P = smallest.rounded_step(FOUR, case, second=True)
         if statement == "(104)":
-            allowed = (1 + 1 + 1 + theory.prediction_count(1)) * true.P + true.predicted
+            allowed = (1 + 1 + 1 + report_bounds.prediction_count(1)) * true.P + true.predicted
             return float(abs(P - true.P)[0, 0] / (beta * allowed[0, 0]))
         rest = abs(true.predicted @ case.H.T)[0, 0] / case.R[0, 0]
-        return float(abs(K - true.gain)[0, 0] / (beta * (theory.gain_count(1, 1) * abs(true.gain)[0, 0] + rest)))
-    true = theory.exact_step(*scalar)
+        return float(abs(K - true.gain)[0, 0] / (beta * (report_bounds.gain_count(1, 1) * abs(true.gain)[0, 0] + rest)))
+    true = exact_step.exact_step(*scalar)
     F, K = true.transition[0, 0], true.gain[0, 0]
     x, rounded, _ = smallest.rounded_step(FOUR, scalar, second=statement != "(114)")
     if statement == "(112)":  # 5n + 3m + 4 and 4n + 3m + 3
@@ -116,7 +127,7 @@ def excess(statement: str) -> float:
     if statement == "(113)":  # 4n + 3m + 3, for z = 1
         return float(abs(rounded[0, 0] - K) / (beta * 10 * K))
     if statement == "(114)":
-        return float(abs(x[0] - true.x[0]) / (beta * theory.transition_count(1, 1) * F))
+        return float(abs(x[0] - true.x[0]) / (beta * report_bounds.transition_count(1, 1) * F))
     raise KeyError(statement)
 
 
@@ -143,7 +154,7 @@ def model_equations() -> Finding:
     return compare(
         conformable,
         f"with $n={n}$, $m={m}$, $w_kv_j$ is no product; $w_kv_j^T$ is one, and with it (98)-(101) are optimal",
-        Verdict.TYPO if all(optimal().values()) else Verdict.WRONG,
+        Verdict.MISPRINT if all(optimal().values()) else Verdict.WRONG,
         otherwise_note="a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ are one letter, as are $v$ and $V$",
     )
 
@@ -151,13 +162,13 @@ def model_equations() -> Finding:
 @CHECKS.add("hung1984.II.s12.claim-asterisk")
 def asterisk() -> Finding:
     case = smallest.scalar(FOUR)
-    true = theory.exact_step(*case)
+    true = exact_step.exact_step(*case)
     x, _, _ = smallest.rounded_step(FOUR, case)
     by_111 = true.transition @ case.x + true.gain @ case.z
     return compare(
         bool(np.all(x == by_111)),
         f"a step of one state in four digits gives {float(x[0]):g}, (111) {float(by_111[0]):.4g}",
-        Verdict.TYPO if loops_close() else Verdict.WRONG,
+        Verdict.MISPRINT if loops_close() else Verdict.WRONG,
         otherwise_note="from (111) on $x$ is the exact estimate, as (118) says, and $\\hat x$ the rounded one",
     )
 
@@ -181,7 +192,7 @@ def estimate() -> Finding:
 
 @CHECKS.add("hung1984.II.eq99", "hung1984.II.s12.eq99-recalled")
 def gains() -> Finding:
-    cyclic = theory.order(second=True) is None
+    cyclic = report_bounds.order(second=True) is None
     return compare(
         optimal()["(99)"] and optimal()["second (99)"] and derivation.contraction().holds,
         "both forms agree in exact arithmetic; with the second "
@@ -222,7 +233,7 @@ def covariance() -> Finding:
     return compare(
         "K_kH_k" in quote("hung1984.II.eq101") and optimal()["(101)"],
         "with $K_k$ it is the covariance of the optimal estimate, in exact arithmetic",
-        Verdict.TYPO if optimal()["(101)"] else Verdict.WRONG,
+        Verdict.MISPRINT if optimal()["(101)"] else Verdict.WRONG,
         otherwise_note="$K_p$ for $K_k$, which stands where (101) is recalled",
     )
 
@@ -535,8 +546,8 @@ def four_steps_bounded() -> Finding:
 
 @CHECKS.add("hung1984.II.eq125", "hung1982.III.eq124-125", *both("s12.claim-main-result"))
 def main_result() -> Finding:
-    k, n, m = theory.EXAMPLE
-    counts = theory.coefficients(k, n, m)
+    k, n, m = report_bounds.EXAMPLE
+    counts = report_bounds.coefficients(k, n, m)
     symbolic = [int(c.subs({derivation.K: k, N: n, M: m})) for c in derivation.printed_coefficients()]
     return printed(
         "(125)",
@@ -560,7 +571,7 @@ def dependence() -> Finding:
     def value(
         k: int = 3, n: int = 2, m: int = 1, x: int = 1, B: int = 1, beta: Fraction = FOUR.unit_roundoff
     ) -> Fraction:
-        return theory.state_bound(Fraction(x), Fraction(B), beta, theory.coefficients(k, n, m))
+        return report_bounds.state_bound(Fraction(x), Fraction(B), beta, report_bounds.coefficients(k, n, m))
 
     others = [value(k=4), value(n=3), value(m=2), value(x=2), value(B=2), value(beta=FOUR.unit_roundoff * 2)]
     return compare(
@@ -575,14 +586,14 @@ def word() -> Finding:
     return compare(
         "iterations" in quote("hung1984.II.s12.word-interactions"),
         f"$k$ counts the iterations of the filter, {Fraction(YEAR, STEP)} in a year",
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="iterations are meant, and an iteration period of ten seconds",
     )
 
 
 @CHECKS.add(*both("s12.claim-usefulness"))
 def usefulness() -> Finding:
-    seventeen = FloatFormat(10, int(theory.PRINTED["second digits"]))
+    seventeen = FloatFormat(10, int(report_bounds.PRINTED["second digits"]))
     times = smallest.ratios(seventeen, smallest.scalar(seventeen)).state
     return compare(
         times <= 1,
@@ -598,26 +609,26 @@ def usefulness() -> Finding:
 @CHECKS.add("hung1984.II.s12.example-sampling", "hung1984.II.s12.example-k", "hung1982.III.s12.example-k")
 def steps_of_a_year() -> Finding:
     k = Fraction(YEAR, STEP)
-    return compare(k == theory.EXAMPLE[0] and prints_as(k, "3.1536e6"), f"${int(k)}$")
+    return compare(k == report_bounds.EXAMPLE[0] and prints_as(k, "3.1536e6"), f"${int(k)}$")
 
 
 @CHECKS.add("hung1984.II.s12.example-n-m", "hung1982.III.s12.example-n-m-and-sampling")
 def dimensions() -> Finding:
     return unverifiable(
-        f"with them $7n+3m+6={theory.coefficients(1, *theory.EXAMPLE[1:]).first}$",
+        f"with them $7n+3m+6={report_bounds.coefficients(1, *report_bounds.EXAMPLE[1:]).first}$",
         "an assumption: which ten states and two measurements is not said",
     )
 
 
 def example_number(name: str, value: Fraction | int, text: str, note: str) -> Finding:
-    shown = theory.PRINTED[name]
+    shown = report_bounds.PRINTED[name]
     return compare(prints_as(value, shown), text, Verdict.WRONG, otherwise_note=note)
 
 
 @CHECKS.add(*both("s12.example-first-coefficient"))
 def first_coefficient() -> Finding:
-    value = theory.coefficients(*theory.EXAMPLE).first
-    slips = theory.one_figure_slips(*theory.EXAMPLE, theory.PRINTED["first coefficient"])
+    value = report_bounds.coefficients(*report_bounds.EXAMPLE).first
+    slips = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, report_bounds.PRINTED["first coefficient"])
     ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in slips)
     return example_number(
         "first coefficient",
@@ -629,9 +640,9 @@ def first_coefficient() -> Finding:
 
 @CHECKS.add(*both("s12.example-second-coefficient"))
 def second_coefficient() -> Finding:
-    value = theory.coefficients(*theory.EXAMPLE).second
-    product = theory.read_as_product(*theory.EXAMPLE, 84)
-    found = prints_as(product, theory.PRINTED["second coefficient"])
+    value = report_bounds.coefficients(*report_bounds.EXAMPLE).second
+    product = report_bounds.read_as_product(*report_bounds.EXAMPLE, 84)
+    found = prints_as(product, report_bounds.PRINTED["second coefficient"])
     return example_number(
         "second coefficient",
         value,
@@ -655,7 +666,7 @@ def formula_8() -> Finding:
 
 @CHECKS.add("hung1984.II.s12.example-beta-first-term")
 def first_beta() -> Finding:
-    beta = Fraction(1, theory.coefficients(*theory.EXAMPLE).first)
+    beta = Fraction(1, report_bounds.coefficients(*report_bounds.EXAMPLE).first)
     return compare(
         prints_as(beta, ".3775e8"),
         scientific(beta, 4),
@@ -666,28 +677,32 @@ def first_beta() -> Finding:
 
 @CHECKS.add("hung1982.III.s12.example-beta-first")
 def first_beta_1982() -> Finding:
-    beta = Fraction(1, theory.coefficients(*theory.EXAMPLE).first)
+    beta = Fraction(1, report_bounds.coefficients(*report_bounds.EXAMPLE).first)
     return example_number("first beta", beta, scientific(beta, 4), "one over the printed coefficient, which is wrong")
 
 
 @CHECKS.add("hung1984.II.s12.example-beta-second-term", "hung1982.III.s12.example-beta-second")
 def second_beta() -> Finding:
-    beta = Fraction(1, theory.coefficients(*theory.EXAMPLE).second)
+    beta = Fraction(1, report_bounds.coefficients(*report_bounds.EXAMPLE).second)
     return example_number("second beta", beta, scientific(beta, 4), "one over the printed coefficient, which is wrong")
 
 
 def _digits(which: str) -> tuple[int, int, float]:
     """Digits that the formula asks for, that the printed β does, and that β as a real number."""
-    coefficient = getattr(theory.coefficients(*theory.EXAMPLE), which)
-    beta = Fraction(theory.PRINTED[f"{which} beta"])
-    return theory.required_precision(coefficient), theory.required_precision(1 / beta), 1 - math.log10(2 * float(beta))
+    coefficient = getattr(report_bounds.coefficients(*report_bounds.EXAMPLE), which)
+    beta = Fraction(report_bounds.PRINTED[f"{which} beta"])
+    formula, printed = (
+        report_bounds.precision_for_coefficient(coefficient),
+        report_bounds.precision_for_coefficient(1 / beta),
+    )
+    return formula, printed, 1 - math.log10(2 * float(beta))
 
 
 @CHECKS.add(*both("s12.example-9-digits"))
 def first_digits() -> Finding:
     needed, by_printed, real = _digits("first")
     return compare(
-        needed == int(theory.PRINTED["first digits"]),
+        needed == int(report_bounds.PRINTED["first digits"]),
         f"{needed}; for the printed β {by_printed}, since (8) gives $t={real:.2f}$",
         Verdict.WRONG,
         otherwise_note="rounded to nearest where it must be rounded up: nine digits break the criterion",
@@ -697,9 +712,9 @@ def first_digits() -> Finding:
 @CHECKS.add(*both("s12.example-17-digits"))
 def second_digits() -> Finding:
     needed, by_printed, real = _digits("second")
-    double = theory.coefficients(*theory.EXAMPLE).second * FloatFormat(2, 53).unit_roundoff
+    double = report_bounds.coefficients(*report_bounds.EXAMPLE).second * FloatFormat(2, 53).unit_roundoff
     return compare(
-        needed == int(theory.PRINTED["second digits"]),
+        needed == int(report_bounds.PRINTED["second digits"]),
         f"{needed}; for the printed β {by_printed}, since (8) gives $t={real:.2f}$",
         Verdict.WRONG,
         otherwise_note=f"the printed number rules IEEE double out, the formula does not: $b\\beta={float(double):.2g}$",
@@ -708,8 +723,8 @@ def second_digits() -> Finding:
 
 @CHECKS.add(*both("s12.example-one-term"))
 def one_term() -> Finding:
-    k, n, m = theory.EXAMPLE
-    first, second = theory.coefficients(k, n, m)
+    k, n, m = report_bounds.EXAMPLE
+    first, second = report_bounds.coefficients(k, n, m)
     return compare(
         second < k * first,
         f"the first term dominates where $\\|x_k\\|>{scientific(Fraction(second, first), 3).strip('$')}\\,B$",
@@ -719,10 +734,10 @@ def one_term() -> Finding:
 
 @CHECKS.add(*both("s12.example-criterion"), *both("s12.example-criterion-second"))
 def criterion() -> Finding:
-    counts = theory.coefficients(*theory.EXAMPLE)
+    counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
     granted = [coefficient * Fraction(1, coefficient) for coefficient in counts]
     goal = Fraction(GOAL, SIGNAL)
-    digits = [theory.required_precision(coefficient, goal) for coefficient in counts]
+    digits = [report_bounds.precision_for_coefficient(coefficient, goal) for coefficient in counts]
     return compare(
         all(grant <= goal for grant in granted),
         f"it grants an error of all of $\\|x_k\\|$, or of $B$; for {GOAL} mas in {SIGNAL} the terms ask for "
@@ -772,17 +787,17 @@ def refined() -> tuple[int, int, float]:
             Q, R, P = (exact(np.diag(rng.integers(1, 10, size))) / 8 for size in (2, 1, 2))
             run = truth = smallest.Case(Phi, H, Q, R, exact(rng.integers(-9, 10, 2)), P, exact([0]))
             model = [as_float(each) for each in (Phi, H, Q, R)]
-            bound = theory.contraction_start(as_float(P), np.zeros(2), np.zeros((2, 2)))
+            bound = contraction.contraction_start(as_float(P), np.zeros(2), np.zeros((2, 2)))
             for _ in range(5):
                 z = exact(rng.integers(-9, 10, 1))
                 run, truth = run._replace(z=z), truth._replace(z=z)
-                here, true = theory.exact_step(*run), theory.exact_step(*truth)
+                here, true = exact_step.exact_step(*run), exact_step.exact_step(*truth)
                 x, _, P = smallest.rounded_step(fmt, run, second)
                 P = (P + P.T) / 2
                 given = [as_float(each) for each in (run.x, run.P, z)]
                 K, S = as_float(here.gain), as_float(here.innovation_covariance)
-                dq, dT, dK, dv = theory.evaluation_errors(*model, *given, K, S, 2.0**-102)
-                bound = theory.contraction_step(
+                dq, dT, dK, dv = contraction.evaluation_errors(*model, *given, K, S, 2.0**-102)
+                bound = contraction.contraction_step(
                     bound,
                     *model,
                     K,
@@ -797,7 +812,7 @@ def refined() -> tuple[int, int, float]:
                 )
                 run, truth = run._replace(x=x, P=P), truth._replace(x=true.x, P=true.P)
                 errors = np.abs(np.append(as_float(x - true.x), as_float(P - true.P)))
-                bounds = np.append(theory.state_error_bound(bound), theory.covariance_error_bound(bound))
+                bounds = np.append(contraction.state_error_bound(bound), contraction.covariance_error_bound(bound))
                 tried += len(errors)
                 violations += int((errors > bounds).sum())
                 factors += (bounds[errors > 0] / errors[errors > 0]).tolist()
@@ -833,8 +848,8 @@ def year_again() -> bool:
     if case.fmt is None:
         raise ValueError(f"got {case.name} first in year.csv; needed a run in a format")
     steps = tuple(int(step) for step in stored.steps if step <= 10)
-    z = year.simulation(case.model).measurements(max(steps))
-    found = experiment.emulate(year.model(case.model, case.base), z, case.fmt, case.form, steps)
+    z = year_cases.simulation(case.model).measurements(max(steps))
+    found = emulation.emulate(year_cases.model(case.model, case.base), z, case.fmt, case.form, steps)
     again = np.array([[float(f"{number:.6g}") for number in line] for line in found.state[:, 2:4]])
     return bool(np.array_equal(again, stored.rate[: len(steps)]))
 
@@ -844,11 +859,11 @@ def needed_precision(base: int) -> int | None:
     """Fewest digits, of those stored, from which on the drift rates, at all steps kept, stay within the goal."""
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
-        usual = found.case._replace(precision=0) == year.Case(
-            year.MODELS[0], base, 0, Rounding.NEAREST, experiment.Form.REPORT
+        usual = found.case._replace(precision=0) == year_cases.Case(
+            year_cases.MODELS[0], base, 0, Rounding.NEAREST, forms.Form.HUNG
         )
         if usual:
-            if found.steps[-1] != theory.EXAMPLE[0] or np.abs(found.rate).max() > GOAL:
+            if found.steps[-1] != report_bounds.EXAMPLE[0] or np.abs(found.rate).max() > GOAL:
                 break
             needed = found.case.precision
     return needed
@@ -857,10 +872,12 @@ def needed_precision(base: int) -> int | None:
 @CHECKS.add(*both("s13.remark-2"))
 def remark_2() -> Finding:
     again, decimal, binary = year_again(), needed_precision(10), needed_precision(2)
-    asked = theory.required_precision(theory.coefficients(*theory.EXAMPLE).second, Fraction(GOAL, SIGNAL))
+    _, n, m = report_bounds.EXAMPLE
+    counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
+    asked = report_bounds.precision_for_coefficient(counts.second, Fraction(GOAL, SIGNAL))
     return answer(
         again and decimal is not None and binary is not None,
-        f"a filter of our own with {theory.EXAMPLE[1]} states and {theory.EXAMPLE[2]} measurements, run for a year: "
+        f"a filter of our own with {n} states and {m} measurements, run for a year: "
         f"{decimal} decimal digits or {binary} bits keep the drift rates within {GOAL} mas a year, of those tried; "
         f"the second term of (125) asks for {asked} digits",
         note=f"{CHAPTER}; the reports print no matrices, noise and time constants are our choice",
@@ -902,7 +919,7 @@ def title(number: int) -> Finding:
     return compare(
         f", {TITLES[number]}, " in quote(f"hung1984.II.s14.reference-{number}"),
         f"the book is called {TITLES[number]}",
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="an s is missing",
     )
 
@@ -925,7 +942,7 @@ def reference_7() -> Finding:
     return compare(
         f"NASA Contract {CONTRACT}, " in quote("hung1984.II.s14.reference-7"),
         CONTRACT,
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="a 5 for the S that the title page has, as in chapter I; by the author or the scan. The date is "
         "a month after the end of the period that the report of 1982 covers",
     )

@@ -12,7 +12,8 @@ from scipy import optimize
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
 from gpbnb.display.tables import scientific
-from gpbnb.ledger.finding import Checks, Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Checks
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import derivation, experiment, theory
 from gpbnb.rolling.theory import DRIFTS, FLOWN_DENSITY, LEVEL, PERIOD, PERIOD_FLOWN
@@ -193,7 +194,7 @@ def eq3() -> Finding:
     return compare(
         bool(sp.simplify(first - middle) == 0),
         "first and last line are equal; the middle one lacks the factor $\\cos\\omega_rt$ of the signal",
-        Verdict.TYPO if last.holds else Verdict.WRONG,
+        Verdict.MISPRINT if last.holds else Verdict.WRONG,
         otherwise_note="the last line, which is used, is right",
     )
 
@@ -301,7 +302,7 @@ def one_over_t() -> Finding:
         math.isclose(long / short, 1 / 2),
         f"half the roll period divides the density of $1/f$ noise at the roll frequency by {long / short:g}; noise as "
         "$1/T$ would be doubled",
-        Verdict.TYPO if abs(slope.value + 1) < 3 * slope.error else Verdict.WRONG,
+        Verdict.MISPRINT if abs(slope.value + 1) < 3 * slope.error else Verdict.WRONG,
         otherwise_note="T for f, by the author or the scan; $1/f$ in all other places",
     )
 
@@ -387,7 +388,7 @@ def cos_5() -> Finding:
     return compare(
         prints_as(five, ".0004", *Rounding),
         f"$1-\\cos^25°={five:.4f}$; $1-\\cos^21°={one:.4f}$",
-        Verdict.TYPO if one < 0.0004 < five else Verdict.WRONG,
+        Verdict.MISPRINT if one < 0.0004 < five else Verdict.WRONG,
         otherwise_note="5° for 1°, by the author or the scan: .9998 is the cosine of one degree",
     )
 
@@ -520,7 +521,7 @@ def s_to_zero() -> Finding:
     return compare(
         start == 1 and abs(end) < 0.01,
         f"by (11) from {start:g} s to {end:.3f} s",
-        Verdict.TYPO if start == 0.5 and abs(end) < 0.01 else Verdict.WRONG,
+        Verdict.MISPRINT if start == 0.5 and abs(end) < 0.01 else Verdict.WRONG,
         otherwise_note="the factor ½ of (11) is left out; it only scales",
     )
 
@@ -554,7 +555,7 @@ def delta_omega_2() -> Finding:
     return compare(
         math.isclose(left, worst) and math.isclose(right, worst),
         f"{scientific(worst, 2)} rad/s; the left side is {scientific(left, 2)}, the right side {scientific(right, 2)}",
-        Verdict.TYPO if math.isclose(right, worst) else Verdict.WRONG,
+        Verdict.MISPRINT if math.isclose(right, worst) else Verdict.WRONG,
         otherwise_note="a zero is missing on the left; the right side, which is used, is right",
     )
 
@@ -566,7 +567,7 @@ def period_2() -> Finding:
     return compare(
         math.isclose(period, with_comma, rel_tol=1e-4),
         f"{scientific(period, 5)} s",
-        Verdict.TYPO if prints_as(period, "1.2566e12", *Rounding) else Verdict.WRONG,
+        Verdict.MISPRINT if prints_as(period, "1.2566e12", *Rounding) else Verdict.WRONG,
         otherwise_note="a comma for the decimal point, by the author or the scan",
     )
 
@@ -635,7 +636,7 @@ def ramp_transform() -> Finding:
     return compare(
         bool(sp.simplify(value - k / w**2) == 0),
         "$-k/\\omega^2+i\\pi k\\,\\delta'(\\omega)$",
-        Verdict.TYPO if sp.simplify(sp.Abs(value) - k / w**2) == 0 else Verdict.WRONG,
+        Verdict.MISPRINT if sp.simplify(sp.Abs(value) - k / w**2) == 0 else Verdict.WRONG,
         otherwise_note="the sign, and the part at zero frequency; of the size alone the next line makes use",
     )
 

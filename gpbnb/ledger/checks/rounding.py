@@ -11,10 +11,11 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm, row_sum_norm
 from gpbnb.display.derivation import first_order
-from gpbnb.ledger.finding import Checks, Finding, Verdict, answer, both, compare, unverifiable
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.registry import Checks, both
 from gpbnb.ledger.statements import quote
 from gpbnb.rounding import derivation, experiment, theory
 
@@ -221,7 +222,7 @@ def split() -> Finding:
     return compare(
         agrees,
         f"with $0<|v|$ {text}; with $0\\le|v|$ {mended_text}",
-        Verdict.TYPO if mends else Verdict.WRONG,
+        Verdict.MISPRINT if mends else Verdict.WRONG,
         otherwise_note="$v=0$ is left out, the case of a number that has no more than $t$ digits; "
         "nothing later uses $v \\ne 0$",
     )
@@ -253,7 +254,7 @@ def example_2b_1982() -> Finding:
     return compare(
         split_is("-.0123456", "-.1234", "-.56e-5", -2),
         pieces("-.0123456"),
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="the first power is $10^{-1}$, in keeping with the printed $e=-1$; mended in hung1984",
     )
 
@@ -266,7 +267,7 @@ def carry() -> Finding:
     return compare(
         before == after,
         f"99.996 has $e={before}$ and rounds to {power(FOUR.round(x))}, which has $e={after}$",
-        Verdict.TYPO,
+        Verdict.MISPRINT,
         otherwise_note="a carry past the first digit raises the exponent; (3) and (5) hold all the same",
     )
 
@@ -320,7 +321,7 @@ def example_3c() -> Finding:
     return compare(
         split_is("-765.4567", "-.765", "-.567e-1", 3),
         f"{pieces('-765.4567')}; $\\hat x=$ {power(rounded)}",
-        Verdict.TYPO if rounded == Fraction("-.7655e3") else Verdict.WRONG,
+        Verdict.MISPRINT if rounded == Fraction("-.7655e3") else Verdict.WRONG,
         otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line and back in the next",
     )
 
@@ -333,7 +334,7 @@ def examples_3_1982() -> Finding:
     return compare(
         rounded and others and split_is("-765.4567", "-.765", "-.567e-1", 3),
         "; ".join(f"{pieces(x)}, $x_R=$ {power(FOUR.round(x))}" for x in printed),
-        Verdict.TYPO if rounded and others else Verdict.WRONG,
+        Verdict.MISPRINT if rounded and others else Verdict.WRONG,
         otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line of (3c), in both reports, and "
         "back in the next; $-.7685$ for the result is the scan's",
     )
@@ -370,7 +371,7 @@ def reference_1() -> Finding:
         all(by_1),
         f"by (1) alone 765.4 is also ${float(u):g}\\times10^{{{e}}}$, and less than $10^{{e-1}}$ in "
         f"{by_1.count(False)} of {len(forms)} forms; in {by_2.count(False)} with $|u|\\ge1/b$, which stands below (2)",
-        Verdict.TYPO if by_2 and all(by_2) else Verdict.WRONG,
+        Verdict.MISPRINT if by_2 and all(by_2) else Verdict.WRONG,
         otherwise_note="(2) is meant: (1) has no $u$, and does not say that $d_1\\ne0$",
     )
 
@@ -382,7 +383,7 @@ def claim_before_6() -> Finding:
     return compare(
         literal,
         f"$u\\ge1/b$ {text}; $|u|\\ge1/b$ {meant_text}",
-        Verdict.TYPO if meant else Verdict.WRONG,
+        Verdict.MISPRINT if meant else Verdict.WRONG,
         otherwise_note="bars are missing: $u$ is negative for negative numbers",
     )
 
@@ -415,7 +416,7 @@ def meaning_of_beta() -> Finding:
         error <= FOUR.unit_roundoff,
         f"the absolute error of 765.4567 is {float(error):g}, above $\\beta={float(FOUR.unit_roundoff):g}$; "
         "the relative errors are below it",
-        Verdict.TYPO if relative else Verdict.WRONG,
+        Verdict.MISPRINT if relative else Verdict.WRONG,
         otherwise_note="a word is missing: β bounds the absolute value of the *relative* error, as (7) and (8) say",
     )
 
@@ -440,7 +441,7 @@ def example_8_x() -> Finding:
     return compare(
         as_printed,
         f"$.7654\\times10^3+.567\\times10^{{-1}}$ is 765.4567; with it {numbers}",
-        Verdict.TYPO if rest else Verdict.WRONG,
+        Verdict.MISPRINT if rest else Verdict.WRONG,
         otherwise_note="767 for 765; the lines that follow use 765",
     )
 
@@ -452,7 +453,7 @@ def example_8_1982() -> Finding:
     return compare(
         as_printed and rest,
         numbers,
-        Verdict.TYPO if rest else Verdict.WRONG,
+        Verdict.MISPRINT if rest else Verdict.WRONG,
         otherwise_note="767 for 765, as in hung1984; the other numbers are those of 765.4567",
     )
 
@@ -514,7 +515,7 @@ def example_13_parameters() -> Finding:
     return compare(
         e == 4,
         f"the example's number has $e={e}$; $\\beta_c=10^{{1-4}}$ has $t=4$",
-        Verdict.TYPO if with_t else Verdict.WRONG,
+        Verdict.MISPRINT if with_t else Verdict.WRONG,
         otherwise_note="$t=4$ is meant",
     )
 
@@ -556,7 +557,7 @@ def example_13_1982() -> Finding:
     return compare(
         agrees and e == 4,
         f"$e={e}$; {text}",
-        Verdict.TYPO if agrees else Verdict.WRONG,
+        Verdict.MISPRINT if agrees else Verdict.WRONG,
         otherwise_note="$t=4$ is meant, not $e=4$, which the scan reads as 6 = 4 and hung1984 repeats; $.7650$ is the "
         "scan's, since the next line has $.7654$; the other numbers are right",
     )
@@ -863,7 +864,7 @@ def three_products_1982() -> Finding:
     return compare(
         bool(sp.expand(error - right - p2) == 0),
         "$a_2b_2(\\epsilon_2+\\epsilon_3+\\epsilon_5)$",
-        Verdict.TYPO if sp.expand(error - right) == 0 else Verdict.WRONG,
+        Verdict.MISPRINT if sp.expand(error - right) == 0 else Verdict.WRONG,
         otherwise_note="a 1 left over from the line above; the bound that follows is right",
     )
 
@@ -995,7 +996,7 @@ def reference_28() -> Finding:
     return compare(
         cited is matmul_bound,
         "the bound of a matrix product is (28); (38) is an equation of section 10",
-        Verdict.TYPO if meant is matmul_bound else Verdict.WRONG,
+        Verdict.MISPRINT if meant is matmul_bound else Verdict.WRONG,
         otherwise_note="(28) is meant, and printed in hung1984",
     )
 

@@ -59,11 +59,11 @@ def recursion(fmt: Any, x: Any, y: Any) -> None:
 
 def by_hand(x: FloatArray, steps: int) -> list[Fraction]:
     """The same with FloatArrays of the exact backend."""
-    a, b = x[0]._exactly(), x[1]._exactly()
-    s = x.format.array(0)._exactly()
+    a, b = x[0].on_exact_backend(), x[1].on_exact_backend()
+    s = x.format.array(0).on_exact_backend()
     results = []
     for k in range(steps):
-        s = s * a + b / x.format.array(k + 2)._exactly()
+        s = s * a + b / x.format.array(k + 2).on_exact_backend()
         s = s - np.sqrt(abs(s))
         if s < 0:
             s = -s + 1
@@ -99,7 +99,7 @@ def test_the_recursion_in_the_reference_and_in_float64() -> None:
 def test_products_of_matrices_in_the_stated_order(fmt: FloatFormat) -> None:
     rng = np.random.default_rng(5)
     a, b = fmt.array(rng.standard_normal((3, 7))), fmt.array(rng.standard_normal((7, 4)))
-    expected = (a._exactly() @ b._exactly()).to_fractions()
+    expected = (a.on_exact_backend() @ b.on_exact_backend()).to_fractions()
     assert a.backend is fmt.backend
     assert np.array_equal((a @ b).to_fractions(), expected)
     assert np.array_equal((b.T @ a.T).T.to_fractions(), expected)

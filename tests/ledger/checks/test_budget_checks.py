@@ -49,7 +49,7 @@ def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert Counter(row.outcome for row in rows) == {
         "verified": 15,
-        "typo": 2,
+        "misprint": 2,
         "wrong": 1,
         "inconsistent": 2,
         "ocr": 1,
@@ -60,7 +60,7 @@ def test_verdicts(rows):
 
 def test_findings_have_their_notes_and_numbers(rows):
     faults.check_texts(rows)
-    found = {row.entry.id: row.finding for row in rows}
+    found = {row.statement.id: row.finding for row in rows}
     assert "0.1508" in found["hung1982.II.44-sources"].recomputed
     assert "25.3%" in found["hung1982.II.rss-total"].recomputed
     assert "0.755" in found["hung1982.II.rss-reduction"].recomputed

@@ -36,7 +36,7 @@ def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert Counter(row.outcome for row in rows) == {
         "verified": 20,
-        "typo": 1,
+        "misprint": 1,
         "wrong": 3,
         "inconsistent": 7,
         "unverifiable": 2,
@@ -51,7 +51,7 @@ def test_verdicts(rows):
 
 def test_findings_have_their_notes_and_numbers(rows):
     faults.check_texts(rows)
-    found = {row.entry.id.removeprefix("hung1982."): row.finding for row in rows}
+    found = {row.statement.id.removeprefix("hung1982."): row.finding for row in rows}
     assert "0, 45, 90 degrees" in found["IV.deltas-zero"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
     assert "signs to change: 2, before C, C" in found["IV.eq8"].recomputed
@@ -146,7 +146,7 @@ def test_both_parts_of_the_statement_on_phi_count(patch):
 
 
 def test_a_frame_that_moves_is_a_slip_only_while_the_drift_is_right(patch):
-    assert FUNCTIONS["intermediate_frame"]().verdict is Verdict.TYPO
+    assert FUNCTIONS["intermediate_frame"]().verdict is Verdict.MISPRINT
     patch(checks, "theta_of", lambda phi, alpha: phi)
     assert FUNCTIONS["intermediate_frame"]().verdict is Verdict.WRONG
 

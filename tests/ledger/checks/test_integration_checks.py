@@ -45,14 +45,24 @@ def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert Counter(row.outcome for row in rows) == {
         "verified": 53,
-        "typo": 9,
+        "misprint": 9,
         "wrong": 1,
         "inconsistent": 1,
         "unverifiable": 3,
         "answered": 2,
     }
-    places = {v: {row.entry.id.removeprefix(MAIN) for row in rows if row.finding.verdict is v} for v in Verdict}
-    assert places[Verdict.TYPO] == {"eq6-phi", "eq6-q-n", "eq12", "eq14", "eq18-p32", "eq21", "eq25", "eq34", "eq37"}
+    places = {v: {row.statement.id.removeprefix(MAIN) for row in rows if row.finding.verdict is v} for v in Verdict}
+    assert places[Verdict.MISPRINT] == {
+        "eq6-phi",
+        "eq6-q-n",
+        "eq12",
+        "eq14",
+        "eq18-p32",
+        "eq21",
+        "eq25",
+        "eq34",
+        "eq37",
+    }
     assert places[Verdict.WRONG] == {"sanalysis.complete-set"}
     assert places[Verdict.INCONSISTENT] == {"sabstract.abstract-claim"}
     assert places[Verdict.ANSWERED] == {"sanalysis.transient", "sanalysis.numerical-example"}

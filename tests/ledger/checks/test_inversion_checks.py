@@ -55,13 +55,13 @@ def test_each_numbered_equation_has_its_entry():
 def test_verdicts_by_document(rows):
     """The present state: to be changed knowingly."""
     counts = {
-        document: Counter(row.outcome for row in rows if row.entry.document == document)
+        document: Counter(row.outcome for row in rows if row.statement.document == document)
         for document in ("hung1984", "hung1982")
     }
-    assert counts["hung1984"] == {"verified": 80, "typo": 19, "wrong": 23, "ocr": 1}
+    assert counts["hung1984"] == {"verified": 80, "misprint": 19, "wrong": 23, "ocr": 1}
     assert counts["hung1982"] == {
         "verified": 45,
-        "typo": 8,
+        "misprint": 8,
         "wrong": 16,
         "inconsistent": 2,
         "ocr": 2,
@@ -70,7 +70,7 @@ def test_verdicts_by_document(rows):
 
 
 def test_which_are_wrong(rows):
-    found = {row.entry.id.split(".", 2)[2] for row in rows if row.finding.verdict is Verdict.WRONG}
+    found = {row.statement.id.split(".", 2)[2] for row in rows if row.finding.verdict is Verdict.WRONG}
     one_epsilon = {"s11.claim-one-epsilon", *(f"eq{number}" for number in (47, 48, 49, 51, 52, 53, 54, 59, 60))}
     sums = {"s11-3.claim-two-sets", "eq90", "eq91", "eq92", "eq96"}
     table = {"s11-4.table-1", *(f"s11-4.table-1-{c}-{n}-places" for c in ("proposed", "actual") for n in (3, 5, 8))}
@@ -363,7 +363,7 @@ AGREE = [
     ("two_sets", replace(checks, "_adds", always(True))),
     ("error_norm", replace(checks, "COUNTEREXAMPLES", {"(96)": ([[2, 1], [1, 3]], checks.FOUR, False)})),
     ("letter_e", replace(checks, "of_example", lambda: (checks.samples()[0], 0.0))),
-    ("number_of_the_chart", replace(ledger, "load_inventory", lambda: [e for e in INVENTORY if e.chapter == "II"])),
+    ("number_of_the_chart", replace(ledger, "load_statements", lambda: [e for e in INVENTORY if e.chapter == "II"])),
     ("relative_error_norm", replace(checks, "column_sum_norm", always(Fraction(1)))),
     ("flow_chart_1982", ALREADY_TRIANGULAR),
     ("proposed_three", reproduced("bound")),
@@ -413,7 +413,7 @@ def test_half_of_it_is_not_enough(patch, name, change):
         ("right_side_definition", nothing_is_zero, Verdict.WRONG),
         ("right_side_step", nothing_is_zero, Verdict.WRONG),
         ("right_side_second_step", nothing_is_zero, Verdict.WRONG),
-        ("after_the_first_step_1982", replace(procedure, "reduce", lambda a, pivot: REDUCE(a, True)), Verdict.TYPO),
+        ("after_the_first_step_1982", replace(procedure, "reduce", lambda a, pivot: REDUCE(a, True)), Verdict.MISPRINT),
         ("partial_matrix", replace(checks, "_partial_size", lambda n, k: n), Verdict.WRONG),
         ("partial_matrix_1982", replace(checks, "_partial_size", lambda n, k: n), Verdict.WRONG),
         ("triangularization_norm", scaled("printed_triangularization_norm", HUNDREDTH), Verdict.WRONG),
@@ -423,7 +423,7 @@ def test_half_of_it_is_not_enough(patch, name, change):
         ("first_row_with_hats", nothing_is_zero, Verdict.WRONG),
         ("first_row_with_hats", all_of(disagrees("first_row")), Verdict.WRONG),
         ("letter_e", scaled("printed_bracket", HUNDREDTH), Verdict.WRONG),
-        ("number_of_the_chart", replace(ledger, "load_inventory", lambda: []), Verdict.INCONSISTENT),
+        ("number_of_the_chart", replace(ledger, "load_statements", lambda: []), Verdict.INCONSISTENT),
         ("second_equation", LEFTOVER, Verdict.WRONG),
         ("assembled", replace(checks, "_assembled", always(False)), Verdict.WRONG),
         ("factored_three", replace(checks, "_factored", always(False)), Verdict.WRONG),

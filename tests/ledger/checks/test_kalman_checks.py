@@ -14,7 +14,7 @@ from faults import all_of, always, breaks, finding, replace
 from gpbnb import ledger
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.derivation import Derivation, Step
-from gpbnb.kalman import derivation, smallest, theory
+from gpbnb.kalman import contraction, derivation, exact_step, report_bounds, smallest
 from gpbnb.ledger.checks import kalman as checks
 from gpbnb.ledger.finding import Verdict
 
@@ -42,12 +42,12 @@ def test_every_entry_of_the_sections_has_a_check_here_and_no_other_has():
 def test_verdicts_by_document(rows):
     """The present state: to be changed knowingly."""
     counts = {
-        document: Counter(row.outcome for row in rows if row.entry.document == document)
+        document: Counter(row.outcome for row in rows if row.statement.document == document)
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {
         "verified": 20,
-        "typo": 7,
+        "misprint": 7,
         "wrong": 29,
         "inconsistent": 3,
         "ocr": 1,
@@ -56,7 +56,7 @@ def test_verdicts_by_document(rows):
     }
     assert counts["hung1982"] == {
         "verified": 11,
-        "typo": 1,
+        "misprint": 1,
         "wrong": 28,
         "inconsistent": 1,
         "ocr": 1,
@@ -105,7 +105,7 @@ def fails(name):
     return breaks(derivation, name)
 
 
-STEP = theory.exact_step
+STEP = exact_step.exact_step
 no_excess = replace(checks, "excess", always(0.5))
 mild = replace(smallest, "ratios", always(smallest.Ratios(0.5, 0.5, 0.5)))
 
@@ -117,7 +117,7 @@ def other_step(**changed):
         found = STEP(*arguments)
         return found._replace(**{name: getattr(found, name) * factor for name, factor in changed.items()})
 
-    return replace(theory, "exact_step", step)
+    return replace(exact_step, "exact_step", step)
 
 
 #: For each check that agrees, changes of the code under which it must not.
@@ -140,16 +140,16 @@ DISAGREE = [
     ("unrolled", replace(checks, "unfolds", always(False))),
     ("unrolled", fails("propagated")),
     ("pattern", fails("general")),
-    ("dependence", replace(theory, "state_bound", lambda x, B, beta, counts: beta * counts.first * x)),
-    ("dependence", replace(theory, "state_bound", lambda x, B, beta, counts: counts.first * x + B)),
+    ("dependence", replace(report_bounds, "state_bound", lambda x, B, beta, counts: beta * counts.first * x)),
+    ("dependence", replace(report_bounds, "state_bound", lambda x, B, beta, counts: counts.first * x + B)),
     ("formula_8", replace(FloatFormat, "unit_roundoff", Fraction(1, 2000))),
     ("steps_of_a_year", replace(checks, "STEP", 20)),
-    ("steps_of_a_year", replace(theory, "EXAMPLE", (3_153_601, 10, 2))),
-    ("one_term", replace(theory, "coefficients", always(theory.Coefficients(1, 10**9)))),
+    ("steps_of_a_year", replace(report_bounds, "EXAMPLE", (3_153_601, 10, 2))),
+    ("one_term", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 10**9)))),
     ("remark_1", replace(checks, "refined", always((240, 1, 20.0)))),
     ("remark_1", replace(checks, "refined", always((240, 0, 2000.0)))),
-    ("remark_1", replace(theory, "state_error_bound", lambda bound: np.zeros(2))),
-    ("remark_1", replace(theory, "covariance_error_bound", lambda bound: np.full((2, 2), 1e9))),
+    ("remark_1", replace(contraction, "state_error_bound", lambda bound: np.zeros(2))),
+    ("remark_1", replace(contraction, "covariance_error_bound", lambda bound: np.full((2, 2), 1e9))),
     ("remark_1", fails("contraction")),
     ("remark_1", fails("recursion")),
     ("remark_2", replace(checks, "year_again", always(False))),
@@ -221,14 +221,20 @@ AGREE = [
     ("usefulness", mild),
     (
         "first_coefficient",
-        replace(theory, "coefficients", always(theory.Coefficients(84 * 3_153_600, 12949 * 10**12))),
+        replace(report_bounds, "coefficients", always(report_bounds.Coefficients(84 * 3_153_600, 12949 * 10**12))),
     ),
-    ("second_coefficient", replace(theory, "coefficients", always(theory.Coefficients(1, 12949 * 10**12)))),
-    ("first_beta", replace(theory, "coefficients", always(theory.Coefficients(Fraction(1, 37_750_000), 1)))),
-    ("first_beta_1982", replace(theory, "coefficients", always(theory.Coefficients(84 * 3_153_600, 1)))),
-    ("second_beta", replace(theory, "coefficients", always(theory.Coefficients(1, 12949 * 10**12)))),
-    ("first_digits", replace(theory, "coefficients", always(theory.Coefficients(10**8, 1)))),
-    ("second_digits", replace(theory, "coefficients", always(theory.Coefficients(1, 12949 * 10**12)))),
+    (
+        "second_coefficient",
+        replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 12949 * 10**12))),
+    ),
+    (
+        "first_beta",
+        replace(report_bounds, "coefficients", always(report_bounds.Coefficients(Fraction(1, 37_750_000), 1))),
+    ),
+    ("first_beta_1982", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(84 * 3_153_600, 1)))),
+    ("second_beta", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 12949 * 10**12)))),
+    ("first_digits", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(10**8, 1)))),
+    ("second_digits", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 12949 * 10**12)))),
     ("criterion", replace(checks, "GOAL", 6606)),
     ("asterisk", replace(smallest, "rounded_step", lambda fmt, case: (STEP(*case).x, None, None))),
     ("word", replace(checks, "quote", always("$k$, the number of iterations"))),

@@ -16,7 +16,8 @@ from faults import always, breaks, replace, times
 from gpbnb import ledger
 from gpbnb.display.derivation import Derivation, Step
 from gpbnb.ledger.checks import rolling as checks
-from gpbnb.ledger.finding import Checks, Verdict
+from gpbnb.ledger.finding import Verdict
+from gpbnb.ledger.registry import Checks
 from gpbnb.rolling import derivation, experiment, theory
 
 ENTRIES = ledger.select(faults.INVENTORY, "hung1984", "III")
@@ -37,7 +38,7 @@ def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert Counter(row.outcome for row in rows) == {
         "verified": 46,
-        "typo": 7,
+        "misprint": 7,
         "wrong": 3,
         "unverifiable": 5,
         "answered": 2,
@@ -51,7 +52,7 @@ def test_which_are_not_right_as_printed(rows):
         return {f"hung1984.III.{place}" for place in places}
 
     assert found[Verdict.WRONG] == ids("s3.no-direct-error", "s4.sample-2-negligible", "s5.ramp-psd")
-    assert found[Verdict.TYPO] == ids(
+    assert found[Verdict.MISPRINT] == ids(
         "eq3",
         "s2.1-over-t",
         "s3.cos-5-deg",

@@ -12,8 +12,8 @@ import pytest
 from faults import all_of, always, breaks, finding, replace, times
 
 from gpbnb import ledger
-from gpbnb.arithmetic.bounds import row_sum_norm
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import row_sum_norm
 from gpbnb.ledger.checks import rounding as checks
 from gpbnb.ledger.finding import Verdict
 from gpbnb.rounding import derivation, experiment, theory
@@ -47,23 +47,30 @@ def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
 def test_verdicts_by_document(rows):
     """The present state: to be changed knowingly."""
     counts = {
-        document: Counter(row.outcome for row in rows if row.entry.document == document)
+        document: Counter(row.outcome for row in rows if row.statement.document == document)
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {
         "verified": 60,
-        "typo": 8,
+        "misprint": 8,
         "wrong": 7,
         "inconsistent": 1,
         "ocr": 1,
         "unverifiable": 4,
         "answered": 1,
     }
-    assert counts["hung1982"] == {"verified": 38, "typo": 10, "wrong": 7, "ocr": 2, "unverifiable": 3, "answered": 1}
+    assert counts["hung1982"] == {
+        "verified": 38,
+        "misprint": 10,
+        "wrong": 7,
+        "ocr": 2,
+        "unverifiable": 3,
+        "answered": 1,
+    }
 
 
 def test_which_are_not_right_as_printed(rows):
-    found = {verdict: {row.entry.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
+    found = {verdict: {row.statement.id for row in rows if row.finding.verdict is verdict} for verdict in Verdict}
     implied = {"s9-2.claim-28-implies", "s9-2.unnumbered-p2-p3"}
     chain = {*implied, "eq30", "eq31"}
     built_on_it = {"s9-2.claim-24-and-31", "s9-2.example-1", "s9-2.example-2"}

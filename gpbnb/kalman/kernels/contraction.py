@@ -1,296 +1,17 @@
-r"""What may happen to a Kalman filter whose every operation is rounded: printed bounds, and one that is a bound.
+r"""Compiled: the contraction bound over one step; :mod:`gpbnb.kalman.contraction` states and explains it.
 
-The bounds named ``printed_…`` are those of hung1984, ch. II, section 12; :func:`coefficients` gives (125) as printed
-and with each of its faults mended. They are exact: ints and Fractions in, Fractions out.
-
-The contraction bound needs no pattern and no first order. Let :math:`(\hat x_k, \hat P_k)` be what any program
-computed, by any form of the filter (of an asymmetric covariance, its symmetric part), and :math:`\mathcal E` one exact
-step (98)-(101). Only two residuals of a step enter,
-
-.. math:: q_k = \hat x_k - \mathcal E_x(\hat x_{k-1}, \hat P_{k-1}, z_k), \qquad
-    T_k = \hat P_k - \mathcal E_P(\hat P_{k-1}),
-
-for the errors :math:`e_k = \hat x_k - x_k` and :math:`E_k = \hat P_k - P_k` obey *exactly*
-
-.. math:: E_k = A_k E_{k-1} F_k^T + T_k, \quad e_k = F_k (e_{k-1} + E_{k-1} y_k) + q_k, \quad
-    F_k = A_k (I - E_{k-1} G_k)^{-1},
-
-    A_k = (I - K^\circ_k H_k)\Phi_{k-1}, \quad y_k = \Phi^T H^T S^{\circ-1}\hat\nu_k, \quad
-    G_k = \Phi^T H^T S^{\circ-1} H \Phi,
-
-where :math:`K^\circ, S^\circ` are the gain and the innovation covariance of (99) for :math:`\hat P_{k-1}`, and
-:math:`\hat\nu_k = z_k - H\Phi\hat x_{k-1}`; :math:`F_k` is (109), the closed loop of the exact filter. Proof:
-:func:`gpbnb.kalman.derivation.contraction`. In the norm :math:`\|v\|_k = \|L_k^{-1}v\|_2`, with :math:`L_kL_k^T`
-about the filter's own covariance, the closed loop does not expand: errors are added up, not multiplied up. The norm has
-no units; an entry of the error is at most :math:`\|v\|_k` of these standard deviations.
-
-The functions of the contraction bound are compiled, take and return float64, and have their own roundings in the bound.
+The functions take and return float64 and include their own roundings in the bound.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from fractions import Fraction
-from graphlib import CycleError, TopologicalSorter
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import column_sum_norm, exact, inverse_of, max_norm
-from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
-
-# -- the counts of the report -----------------------------------------------------------------------------------------
-
-
-def prediction_count(n: int) -> int:
-    """Roundings of the predicted covariance, 2n + 1; hung1984, ch. II, (103)."""
-    return 2 * n + 1
-
-
-def covariance_count(n: int, m: int) -> int:
-    """Roundings of the covariance, 3n + m + 2; hung1984, ch. II, (105)."""
-    return 3 * n + m + 2
-
-
-def gain_count(n: int, m: int) -> int:
-    """Roundings of the gain, 4n + 2m + 3; hung1984, ch. II, (108)."""
-    return 4 * n + 2 * m + 3
-
-
-def transition_count(n: int, m: int) -> int:
-    """Roundings of the closed loop in a step, its product with the state among them, 6n + 3m + 5; (115)."""
-    return 6 * n + 3 * m + 5
-
-
-def input_count(n: int, m: int) -> int:
-    """Roundings of what a step adds, its addition among them, 4n + 3m + 4; hung1984, ch. II, (116)."""
-    return 4 * n + 3 * m + 4
-
-
-def printed_covariance_bound(P: Any, m: int, beta: Fraction) -> NDArray[Any]:
-    r"""Bound entry by entry, :math:`(3n+m+2)\beta\,|P_k|`; hung1984, ch. II, (105).
-
-    Parameters
-    ----------
-    P : (n, n), the exact covariance after the step.
-    m : number of measurements.
-    beta : unit roundoff β.
-    """
-    entries: Any = exact(P)
-    return np.asarray(covariance_count(entries.shape[0], m) * beta * abs(entries))
-
-
-def printed_gain_bound(K: Any, beta: Fraction) -> NDArray[Any]:
-    r"""Bound entry by entry, :math:`(4n+2m+3)\beta\,|K_k|`; hung1984, ch. II, (108). K : (n, m), the exact gain."""
-    entries: Any = exact(K)
-    n, m = entries.shape
-    return np.asarray(gain_count(n, m) * beta * abs(entries))
-
-
-class Coefficients(NamedTuple):
-    r"""What multiplies :math:`\beta\|x_k\|` and :math:`\beta B` in a bound like (125)."""
-
-    first: int
-    second: int
-
-
-def coefficients(
-    k: int, n: int, m: int, once: bool = False, free_signs: bool = False, carried: bool = False
-) -> Coefficients:
-    r"""Return the coefficients of (125), as printed or with faults mended.
-
-    With :math:`c_j` roundings of the closed loop of step j and :math:`d_j` of its input, the report bounds
-    :math:`\|\tilde x_k\|` by :math:`\beta\{a_0\|x_k\| + \sum_{i=1}^k (a_0 - a_i)B\}`,
-    :math:`a_i = \sum_{j=i+1}^k c_j + d_i`, :math:`a_0 = \sum_{j=1}^k c_j`.
-
-    Parameters
-    ----------
-    k : steps. n, m : dimensions of the state and of the measurement.
-    once : do not count the product with the state and the last addition again, that (114)-(116) have counted already.
-    free_signs : let each term have an error of its own sign, :math:`a_0 + a_i` for :math:`a_0 - a_i`.
-    carried : let the errors of P from the steps before go on into P, K and F, as the report's own algebra does with
-        every other error: 3n + m + 2 more roundings at each step.
-
-    Raises
-    ------
-    ValueError : k, n or m below 1.
-
-    References
-    ----------
-    hung1984, ch. II, (112)-(125).
-    """
-    if min(k, n, m) < 1:
-        raise ValueError(f"got k = {k}, n = {n}, m = {m}; needed each at least 1")
-    c, d, more = transition_count(n, m), input_count(n, m), covariance_count(n, m) if carried else 0
-    if not once:
-        c, d = c + n + 1, d + 1
-    first = c * k + more * k * (k - 1) // 2
-    loops = c * k * (k + 1) // 2 + more * (k + 1) * k * (k - 1) // 6  # sum over i of c_1 + ... + c_i
-    inputs = d * k + more * k * (k - 1) // 2
-    return Coefficients(first, 2 * k * first - loops + inputs if free_signs else loops - inputs)
-
-
-MENDINGS: dict[str, dict[str, bool]] = {
-    "as printed": {},
-    "counted once": {"once": True},
-    "and signs free": {"once": True, "free_signs": True},
-    "and errors carried on": {"once": True, "free_signs": True, "carried": True},
-}
-"""Arguments of :func:`coefficients`, one more fault of (125) mended on each line."""
-
-
-def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fraction:
-    r"""Return the least B of (122), :math:`F^i u \le B` for i = 0 … k - 1, in the norms (21) and (22).
-
-    Parameters
-    ----------
-    transitions : F_1 … F_k of (109). inputs : u_1 … u_k of (110).
-
-    Raises
-    ------
-    ValueError : none, or not as many of one as of the other.
-    """
-    if not transitions or len(transitions) != len(inputs):
-        raise ValueError(f"got {len(transitions)} transitions and {len(inputs)} inputs; needed as many, at least one")
-    F, u = max(map(column_sum_norm, transitions)), max(map(max_norm, inputs))
-    return u * max(Fraction(1), F ** (len(inputs) - 1))
-
-
-def state_bound(
-    x_norm: Fraction,
-    B: Fraction,
-    beta: Fraction,
-    counts: Coefficients,
-) -> Fraction:
-    r"""Return :math:`\beta\{a\|x_k\| + bB\}`, (a, b) from :func:`coefficients`; as printed, hung1984, ch. II, (125)."""
-    return beta * (counts.first * x_norm + counts.second * B)
-
-
-def required_precision(
-    coefficient: int | Fraction, goal: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
-) -> int:
-    r"""Smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{goal}`.
-
-    Parameters
-    ----------
-    coefficient : what multiplies β. goal : the error that is granted, in the same units.
-    base, rounding : of the format.
-
-    Raises
-    ------
-    ValueError : coefficient or goal not positive.
-
-    References
-    ----------
-    hung1984, ch. II, (8), (13) and the example of section 12.
-    """
-    if coefficient <= 0 or goal <= 0:
-        raise ValueError(f"got coefficient {coefficient} and goal {goal}; needed both positive")
-    precision = 1
-    while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > goal:
-        precision += 1
-    return precision
-
-
-# -- the closing example ----------------------------------------------------------------------------------------------
-
-EXAMPLE = (3_153_600, 10, 2)
-"""The k, n and m of the closing example, a year of steps of 10 s; hung1984, ch. II, section 12."""
-
-PRINTED = {
-    "first coefficient": "2.6490e8",
-    "second coefficient": "1.2949e16",
-    "first beta": ".3775e-8",
-    "first digits": "9",
-    "second beta": ".7723e-16",
-    "second digits": "17",
-}
-"""Numbers of the closing example as hung1982 prints them; hung1984 loses a minus sign."""
-
-
-def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
-    """The second coefficient with its plus sign read as times, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
-
-    Parameters
-    ----------
-    k, n, m : as in :func:`coefficients`. loop : another value of 7n + 3m + 6.
-    """
-    return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
-
-
-def one_figure_slips(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
-    """Every (a, b, c) that differs from (7, 3, 6) in one figure and for which k(an + bm + c) comes out as `printed`."""
-    right = (7, 3, 6)
-    changed = [(*right[:i], figure, *right[i + 1 :]) for i in range(3) for figure in range(10) if figure != right[i]]
-    return [(a, b, c) for a, b, c in changed if prints_as(k * (a * n + b * m + c), printed)]
-
-
-def dependencies(second: bool) -> dict[str, set[str]]:
-    """Which of (98)-(101) needs which, with the first or the second form of (99)."""
-    return {
-        "(100)": set(),
-        "(99)": {"(101)"} if second else {"(100)"},
-        "(101)": {"(99)", "(100)"},
-        "(98)": {"(99)"},
-    }
-
-
-def order(second: bool) -> tuple[str, ...] | None:
-    """In which order (98)-(101) can be computed; None if in none."""
-    try:
-        return tuple(TopologicalSorter(dependencies(second)).static_order())
-    except CycleError:
-        return None
-
-
-# -- one exact step ---------------------------------------------------------------------------------------------------
-
-
-class ExactStep(NamedTuple):
-    """One exact step; object arrays of Fractions."""
-
-    #: (n,), the estimate (98).
-    x: NDArray[Any]
-    #: (n, n), its covariance (101).
-    P: NDArray[Any]
-    #: (n, n), the predicted covariance (100).
-    predicted: NDArray[Any]
-    #: (n, m), the gain (99).
-    gain: NDArray[Any]
-    #: (m, m), :math:`HP_pH^T + R`.
-    innovation_covariance: NDArray[Any]
-    #: (m,), :math:`z - H\Phi x`.
-    innovation: NDArray[Any]
-    #: (n, n), the closed loop (109).
-    transition: NDArray[Any]
-
-
-def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> ExactStep:
-    """One step of the filter without any rounding, in Fractions; (98)-(101) in the order (100), (99), (101), (98).
-
-    Parameters
-    ----------
-    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model. x (n,), P (n, n) : before the step. z (m,) : measurement.
-
-    Raises
-    ------
-    ZeroDivisionError : :math:`HP_pH^T + R` is singular.
-    """
-    Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
-    predicted = Phi @ P @ Phi.T + Q
-    S = H @ predicted @ H.T + R
-    gain = predicted @ H.T @ inverse_of(S)
-    transition = Phi - gain @ (H @ Phi)
-    innovation = z - H @ (Phi @ x)
-    return ExactStep(
-        Phi @ x + gain @ innovation, predicted - gain @ (H @ predicted), predicted, gain, S, innovation, transition
-    )
-
-
-# -- the contraction bound --------------------------------------------------------------------------------------------
+from gpbnb.arithmetic.kernels.compiling import compiled
 
 _U = 2.0**-53
 
@@ -313,7 +34,7 @@ class Contraction(NamedTuple):
     gain: NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def contraction_start(P: Any, de: Any, dE: Any) -> Any:
     """Begin the bound.
 
@@ -336,7 +57,7 @@ def contraction_start(P: Any, de: Any, dE: Any) -> Any:
     return Contraction(L, eta * up, zeta * up, 1.0, np.zeros(1))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def contraction_step(
     before: Any,
     Phi: Any,
@@ -413,7 +134,7 @@ def contraction_step(
     return Contraction(new, eta, (size_T + alpha * alpha * zeta / known) * up, alpha, columns)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
     r"""Bound the errors of the evaluation of one step, componentwise.
 
@@ -453,21 +174,21 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
     return dq[:, 0], dT, dK, many * seen[:, 0]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def state_error_bound(bound: Any) -> Any:
     r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,), in its units."""
     rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
     return rows * bound.eta
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def covariance_error_bound(bound: Any) -> Any:
     r"""Bound each entry of the error of the covariance, :math:`\zeta\sqrt{(LL^T)_{ii}(LL^T)_{jj}}`; (n, n)."""
     rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
     return bound.zeta * np.outer(rows, rows)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
     r"""Bound each entry of the error of the gain that the program used in the step that led to `bound`; (n, m).
 
@@ -482,26 +203,13 @@ def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
     return (np.abs(used - K) + dK + _U * (np.abs(used) + np.abs(K)) + np.outer(rows, bound.gain)) * up
 
 
-def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
-    r"""Bound the errors of a run by those of a companion, of more digits say, that has a small bound of its own.
-
-    .. math:: |\hat x - x| \le |\hat x - \hat x_c| + |\hat x_c - x|
-
-    Parameters
-    ----------
-    difference : the run minus its companion, entry by entry, subtracted before it became float64.
-    bound : of each entry of the companion's errors, as from :func:`state_error_bound`.
-    """
-    return (np.abs(difference) + np.asarray(bound)) * (1 + 4 * _U)
-
-
-@njit(cache=True)
+@compiled
 def _many(n: int, m: int) -> float:
     """Bounds the relative error, by magnitudes, of what a step computes in float64."""
     return (16 * (n + m) + 64) * _U
 
 
-@njit(cache=True)
+@compiled
 def _times(A: Any, B: Any) -> Any:
     rows, inner, columns = A.shape[0], A.shape[1], B.shape[1]
     product = np.zeros((rows, columns))
@@ -514,7 +222,7 @@ def _times(A: Any, B: Any) -> Any:
     return product
 
 
-@njit(cache=True)
+@compiled
 def _norm(A: Any) -> float:
     total = 0.0
     for i in range(A.shape[0]):
@@ -523,7 +231,7 @@ def _norm(A: Any) -> float:
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@compiled
 def _norm2(X: Any) -> float:
     """Upper bound of the largest singular value: mu - X'X proved positive by elimination, mu found by bisection.
 
@@ -548,7 +256,7 @@ def _norm2(X: Any) -> float:
     return math.sqrt(high * (1 + 4 * n * (n + 2) * _U) + 4 * (n + 2) * _U * trace) * (1 + 4 * _U)
 
 
-@njit(cache=True)
+@compiled
 def _is_positive(mu: float, B: Any) -> bool:
     n = len(B)
     M = -B
@@ -564,7 +272,7 @@ def _is_positive(mu: float, B: Any) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def _weights(W: Any) -> Any:
     """A nonsingular lower factor of about W: any will do, so a pivot that is lost is replaced by a small one."""
     n = len(W)
@@ -585,7 +293,7 @@ def _weights(W: Any) -> Any:
     return L
 
 
-@njit(cache=True)
+@compiled
 def _inverse(L: Any) -> Any:
     """Y near the inverse of a lower matrix, and a bound of the Frobenius norm of YL - I."""
     n = len(L)
@@ -600,7 +308,7 @@ def _inverse(L: Any) -> Any:
     return Y, _norm(_times(Y, L) - np.eye(n)) + _many(n, 0) * _norm(_times(np.abs(Y), np.abs(L)))
 
 
-@njit(cache=True)
+@compiled
 def _inverse_general(S: Any) -> Any:
     """Inverse of S by elimination with pivoting, and a componentwise bound of its error; infinite if singular."""
     m = len(S)

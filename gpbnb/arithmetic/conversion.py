@@ -1,0 +1,124 @@
+"""Reading numbers of any type without rounding them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence, Set
+from decimal import Decimal
+from numbers import Rational
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_DECIMAL = re.compile(r"\s*([+-]?)(\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
+_RATIO = re.compile(r"\s*([+-]?\d+)\s*/\s*(\d+)\s*", re.ASCII)
+_ACCEPTED = "a str, int, float, Decimal or Fraction"
+
+
+def exact_ratio(value: Any) -> tuple[int, int, int]:
+    """Read a number without rounding it.
+
+    Returns
+    -------
+    p, q, k : integers with value = ``p / q * 10**k``, ``q > 0``.
+
+    Raises
+    ------
+    TypeError : `value` is not a number.
+    ValueError : a string that is not a number; NaN or infinity.
+    """
+    if isinstance(value, str):
+        return _read(value)
+    if isinstance(value, (bool, np.bool_)):
+        raise TypeError(f"got the truth value {value!r}; needed {_ACCEPTED}; write 1 or 0")
+    if isinstance(value, np.timedelta64):  # an np.integer, yet with a unit
+        raise TypeError(f"got {value!r} of type timedelta64; needed {_ACCEPTED}")
+    if isinstance(value, (int, np.integer)):
+        return int(value), 1, 0
+    if isinstance(value, Rational):
+        return int(value.numerator), int(value.denominator), 0
+    if isinstance(value, Decimal):
+        sign, digits, exponent = value.as_tuple()
+        if not isinstance(exponent, int):
+            raise ValueError(_not_finite(value))
+        p = int(Decimal((0, digits, 0)))
+        return (-p if sign else p), 1, exponent
+    # Python's and NumPy's floats, those of gmpy2 and sympy, and whatever else converts exactly
+    if hasattr(value, "as_integer_ratio"):
+        try:
+            p, q = value.as_integer_ratio()
+        except (ValueError, OverflowError):
+            raise ValueError(_not_finite(value)) from None
+        return int(p), int(q), 0
+    raise TypeError(f"got {value!r} of type {type(value).__name__}; needed {_ACCEPTED}")
+
+
+def _read(text: str) -> tuple[int, int, int]:
+    if match := _DECIMAL.fullmatch(text):
+        sign, digits, exponent = match.groups()
+        whole, _, places = digits.partition(".")
+        p = _integer(whole + places)
+        return (-p if sign == "-" else p), 1, _integer(exponent or "0") - len(places)
+    if match := _RATIO.fullmatch(text):
+        p, q = _integer(match[1]), _integer(match[2])
+        if q == 0:
+            raise ValueError(f"got {text!r}; needed a denominator other than zero; correct it")
+        return p, q, 0
+    if re.fullmatch(r"\s*[+-]?(nan|inf|infinity)\s*", text, re.IGNORECASE):
+        raise ValueError(_not_finite(repr(text)))
+    raise ValueError(
+        f"got {text!r}; needed a number such as '765.4567', '1e-3' or '1/3', "
+        "with a point as decimal mark and no separators"
+    )
+
+
+def _integer(digits: str) -> int:
+    """Read an integer of any length; ``int`` refuses more than 4300 digits."""
+    return int(Decimal(digits))
+
+
+def _not_finite(value: object) -> str:
+    return f"got {value}; needed a finite number; remove or replace the entry"
+
+
+def entries(values: Any) -> NDArray[Any]:
+    """An object array of the numbers in `values`, whatever holds them."""
+    if isinstance(values, np.ma.MaskedArray):
+        raise TypeError("got a masked array; needed every entry; fill it first: a.filled(...)")
+    if hasattr(values, "to_fractions"):  # an array of a format
+        return single(values.to_fractions()) if not values.ndim else np.asarray(values.to_fractions(), dtype=object)
+    if isinstance(values, (str, bytes, bytearray, np.generic)):
+        return single(values)
+    if hasattr(values, "__array__"):
+        values = np.asarray(values)
+        if values.dtype.kind not in "iufUTO":
+            raise TypeError(
+                f"got an array of dtype {values.dtype}; needed integers, floats, strings, or "
+                "objects that are numbers; convert it: a.astype(float)"
+            )
+        return values.astype(object)
+    if isinstance(values, Sequence):
+        components = [entries(value) for value in values]
+        shapes = {part.shape for part in components}
+        if len(shapes) > 1:
+            raise ValueError(
+                f"got nested lists with parts of shapes {', '.join(map(str, sorted(shapes)))}; "
+                "needed parts of one shape; fill or cut the lists"
+            )
+        array = np.empty((len(components), *(shapes.pop() if components else ())), object)
+        for i, part in enumerate(components):
+            array[i] = part[()]  # of a single number: itself, not an array of it
+        return array
+    if isinstance(values, (Set, Mapping, Iterator)):
+        raise TypeError(
+            f"got a {type(values).__name__}; needed a number, list or array; make it a list first: list(...)"
+        )
+    return single(values)
+
+
+def single(value: Any) -> NDArray[Any]:
+    """An object array of no axes that holds `value`, whatever it is."""
+    array = np.empty(1, object)
+    array[0] = value
+    return array.reshape(())

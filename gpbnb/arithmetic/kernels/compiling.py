@@ -1,0 +1,196 @@
+"""The decorator of compiled functions that callers in Python use, and the cache that keeps what was compiled.
+
+numba's own cache compares the file that defines a function. It does not notice a change in another file whose functions
+are compiled in. The cache here has a key for all files that the defining file imports. Several processes can
+fill it at the same time: they wait for each other and compile nothing twice.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pickle
+import platform
+import sys
+import time
+from collections.abc import Callable
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import IO, Any
+
+import llvmlite
+import numba
+import numpy as np
+from numba import njit
+from numba.core import caching
+
+from gpbnb.caching import cache_folder, digest, imported, writable
+
+try:
+    import fcntl
+except ImportError:  # Windows: processes do not wait for each other there
+    fcntl = None  # type: ignore[assignment]
+
+_VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
+_LONGEST_WAIT = 240.0  # seconds, for another process that compiles the same
+_KEPT = 30 * 24 * 3600.0  # seconds after its last use
+_NOTICE = (
+    "gpbnb: compiling for this processor. The first use of a function takes up to a minute; "
+    "later runs load the result from {}.\n"
+)
+
+
+def compiled(function: Callable[..., Any]) -> Any:
+    """Compile a function when it is first called, for the types it is called with, or load it from the cache.
+
+    It releases the interpreter's lock.
+    """
+    dispatcher = njit(nogil=True)(function)
+    if _folder() is not None:
+        dispatcher._cache = _Cache(function)
+    return dispatcher
+
+
+@lru_cache(maxsize=1)
+def _folder() -> Path | None:
+    chosen = Path(numba.config.CACHE_DIR).absolute()
+    return chosen if numba.config.CACHE_DIR and writable(chosen) else cache_folder("compiled")
+
+
+@cache
+def _stamp(path: Path) -> str:
+    return digest(imported(path))
+
+
+@lru_cache(maxsize=1)
+def _tell(folder: Path) -> None:
+    if not os.environ.get("GPBNB_QUIET"):
+        sys.stderr.write(_NOTICE.format(folder))
+        sys.stderr.flush()
+    with contextlib.suppress(OSError):
+        for old in folder.glob("*.compiled"):
+            if time.time() - old.stat().st_mtime > _KEPT:
+                old.unlink()
+
+
+class _Locator(caching._CacheLocator):  # type: ignore[misc]
+    def __init__(self, function: Any, file: str) -> None:
+        self._py_file = file
+        self._lineno = function.__code__.co_firstlineno
+        self._folder = _folder()
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        return _stamp(Path(self._py_file).resolve())
+
+    def get_disambiguator(self) -> str:
+        return str(self._lineno)
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> _Locator:
+        return cls(function, file)
+
+
+class _Implementation(caching.CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = (_Locator,)
+
+
+class _Cache(caching.FunctionCache):  # type: ignore[misc]
+    """numba's cache of a function, with one file for each set of types."""
+
+    _impl_class = _Implementation
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._cache_file = _Files(Path(self._cache_path), f"{function.__module__}.{function.__name__}", _stamp_of(self))
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        finally:
+            self._cache_file.release()
+
+
+def _stamp_of(cache: _Cache) -> tuple[str, ...]:
+    return (cache._impl.locator.get_source_stamp(), *_VERSIONS)
+
+
+class _Files:
+    """What numba asks of its files: load, save and flush."""
+
+    def __init__(self, folder: Path, name: str, stamp: tuple[str, ...]) -> None:
+        self._folder, self._name, self._stamp = folder, name, stamp
+        self._locks: dict[Path, IO[bytes]] = {}
+
+    def load(self, key: Any) -> Any:
+        path = self._path(key)
+        found = self._read(path, key)
+        if found is None:
+            self._wait(path)
+            found = self._read(path, key)
+            if found is None:
+                _tell(self._folder)
+            else:
+                self.release()
+        return found
+
+    def save(self, key: Any, data: Any) -> None:
+        path = self._path(key)
+        draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+        try:
+            draft.write_bytes(caching.dumps((self._stamp, key, data)))
+            draft.replace(path)
+        except OSError:  # a full disk costs time only
+            draft.unlink(missing_ok=True)
+
+    def flush(self) -> None:
+        for path in self._folder.glob(f"{self._name}.*.compiled"):
+            path.unlink(missing_ok=True)
+
+    def release(self) -> None:
+        """Let the others that wait for this function read it."""
+        while self._locks:
+            path, lock = self._locks.popitem()
+            path.unlink(missing_ok=True)
+            lock.close()
+
+    def _path(self, key: Any) -> Path:
+        # The name need not tell all keys apart: the key stands in the file, too.
+        short = hashlib.sha256(repr((self._stamp, str(key))).encode()).hexdigest()[:24]
+        return self._folder / f"{self._name}.{short}.compiled"
+
+    def _read(self, path: Path, key: Any) -> Any:
+        try:
+            stamp, stored, data = pickle.loads(path.read_bytes())
+        except OSError:
+            return None
+        except Exception:  # cut off, or of another version: compile it again
+            return None
+        if stamp != self._stamp or stored != key:
+            return None
+        with contextlib.suppress(OSError):
+            os.utime(path)
+        return data
+
+    def _wait(self, path: Path) -> None:
+        """Wait until no other process compiles the same, and keep others waiting until :meth:`release`."""
+        name = path.with_suffix(".lock")
+        if fcntl is None or name in self._locks:  # held since a compilation that failed
+            return
+        with contextlib.suppress(OSError):
+            lock = name.open("wb")
+            began = time.monotonic()
+            while True:
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    if time.monotonic() - began > _LONGEST_WAIT:
+                        lock.close()
+                        return
+                    time.sleep(0.05)
+                else:
+                    self._locks[name] = lock
+                    return

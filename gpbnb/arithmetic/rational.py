@@ -1,0 +1,117 @@
+"""Exact matrices of Fractions: conversion, inverse, norms.
+
+Entries may be Fractions, ints, floats (taken at their exact binary value) or an array of a format.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.conversion import exact_ratio
+
+
+def exact(values: Any) -> NDArray[Any]:
+    """Entries as exact Fractions, in an object array of the same shape.
+
+    Raises
+    ------
+    ValueError : an entry is NaN or infinite.
+    TypeError : an entry is not a number.
+    """
+    if hasattr(values, "to_fractions"):
+        values = values.to_fractions()
+    entries: NDArray[Any] = np.asarray(values, dtype=object)
+    fractions = np.empty(entries.size, object)
+    for i, entry in enumerate(entries.ravel().tolist()):
+        if not isinstance(entry, Fraction):
+            try:
+                p, q, power = exact_ratio(entry)
+            except (TypeError, ValueError) as error:
+                index = np.unravel_index(i, entries.shape)
+                where = f"entry {', '.join(map(str, index))}: " if index else ""
+                raise type(error)(f"{where}{error}") from None
+            entry = Fraction(p, q) * Fraction(10) ** power
+        fractions[i] = entry
+    return fractions.reshape(entries.shape)
+
+
+def integers(fractions: NDArray[Any]) -> tuple[NDArray[Any], Fraction]:
+    """Integers, and the one unit that they count, of exact Fractions: sums and products of integers are much faster."""
+    common = math.lcm(*(entry.denominator for entry in fractions.flat))
+    counts = [entry.numerator * (common // entry.denominator) for entry in fractions.flat]
+    return np.array(counts, dtype=object).reshape(fractions.shape), Fraction(1, common)
+
+
+def rationals(a: Any) -> Any:
+    """A matrix (m, n) of exact numbers, or an array of a format, as a matrix of python-flint's rationals."""
+    if hasattr(a, "to_pairs"):  # an array of a format: faster than through Fractions
+        base = a.format.base
+        pairs = zip(*(part.ravel() for part in a.to_pairs()), strict=True)
+        entries = [(m * base**e, 1) if e >= 0 else (m, base**-e) for m, e in pairs]
+    else:
+        a = exact(a)
+        entries = [(x.numerator, x.denominator) for x in a.ravel()]
+    rows, columns = a.shape
+    return fmpq_mat(rows, columns, [fmpq(p, q) for p, q in entries])
+
+
+def true_inverse(a: Any) -> Any:
+    """The exact inverse of a square matrix (n, n), as a matrix of python-flint's rationals.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : `a` is singular.
+    """
+    try:
+        return rationals(a).inv()
+    except ZeroDivisionError:
+        raise np.linalg.LinAlgError(
+            "got a singular matrix; needed one with an inverse, in whatever precision; change an entry"
+        ) from None
+
+
+def inverse_of(a: Any) -> NDArray[Any]:
+    """The exact inverse of a square matrix (n, n), as Fractions.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : `a` is singular.
+    """
+    found = true_inverse(a)
+    entries = [Fraction(int(entry.p), int(entry.q)) for entry in found.entries()]
+    return np.array(entries, dtype=object).reshape(found.nrows(), found.ncols())
+
+
+def max_norm(x: Any) -> Fraction:
+    r"""Largest size of an entry of a vector, :math:`\max_j |x_j|`; hung1984, ch. II, (21)."""
+    entries = exact(x)
+    if entries.ndim != 1:
+        raise ValueError(f"got shape {entries.shape}; needed a vector (n,); take a matrix row by row")
+    return max(abs(entries), default=Fraction(0))
+
+
+def column_sum_norm(a: Any) -> Fraction:
+    r"""Largest column sum, :math:`\max_j \sum_i |a_{ij}|`, of a matrix; hung1984, ch. II, (22)."""
+    if isinstance(a, fmpq_mat):
+        sums = (sum((abs(entry) for entry in column), fmpq(0)) for column in a.transpose().tolist())
+        largest = max(sums, default=fmpq(0))
+        return Fraction(int(largest.p), int(largest.q))
+    return max(_sizes(a).sum(axis=0), default=Fraction(0))
+
+
+def row_sum_norm(a: Any) -> Fraction:
+    r"""Largest row sum, :math:`\max_i \sum_j |a_{ij}|`: the matrix norm that belongs to (21)."""
+    return max(_sizes(a).sum(axis=1), default=Fraction(0))
+
+
+def _sizes(a: Any) -> NDArray[Any]:
+    entries = exact(a)
+    if entries.ndim != 2:
+        raise ValueError(f"got shape {entries.shape}; needed a matrix (m, n); reshape a vector to (n, 1)")
+    return np.asarray(abs(entries))

@@ -1,0 +1,75 @@
+"""The decimal text of numbers, from which their format makes the same numbers again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gpbnb.arithmetic.kernels.exact import ExactKernel, integer_text, kernel
+
+
+def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:
+    """Lay out an array of texts as NumPy lays out numbers, leaving out what NumPy would leave out.
+
+    Parameters
+    ----------
+    texts : the text of the i-th entry, counted row after row.
+    """
+    shown: dict[int, str] = {}
+
+    def entry(place: Any) -> str:
+        i = int(place)
+        if i not in shown:
+            shown[i] = texts(i)
+        return shown[i].rjust(width)
+
+    width = 0
+    if not shape:
+        return entry(0)
+    places = np.arange(math.prod(shape)).reshape(shape)
+    np.array2string(places, formatter={"int": entry})  # to see which are shown and how wide they are
+    width = max(map(len, shown.values()), default=0)
+    return np.array2string(
+        places, separator=separator, prefix=prefix, suffix=")", formatter={"int": entry}, max_line_width=120
+    )
+
+
+def decimal_text(m: int, e: int, form: ExactKernel) -> str:
+    """Decimal digits that round to ``m * base**e`` in the format of a kernel: exact in base 10."""
+    if m == 0:
+        return "0"
+    if form.base == 10:
+        digits, exponent = integer_text(abs(m)), e
+    else:
+        try:
+            digits, exponent = _shortened(abs(m), e, form)
+        except OverflowError:  # the decimal exponent has millions of digits to compute
+            return f"{integer_text(m)}*{integer_text(form.base)}**{integer_text(e)}"
+    digits, exponent = digits.rstrip("0"), exponent + len(digits) - len(digits.rstrip("0"))
+    sign = "-" if m < 0 else ""
+    point = len(digits) + exponent
+    if -4 <= point - 1 < 16:
+        if exponent >= 0:
+            return sign + digits + "0" * exponent
+        if point > 0:
+            return f"{sign}{digits[:point]}.{digits[point:]}"
+        return f"{sign}0.{'0' * -point}{digits}"
+    tail = f".{digits[1:]}" if len(digits) > 1 else ""
+    return f"{sign}{digits[0]}{tail}e{'+' if point > 0 else ''}{integer_text(point - 1)}"
+
+
+def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int]:
+    """Enough decimal digits to tell ``m * base**e`` from its neighbours in the format.
+
+    Rounded up when the format chops, so that chopping them gives the number and not the one below.
+    """
+    count = math.ceil(form.precision * math.log10(form.base)) + 2
+    decimal = kernel(10, count, True)
+    value = form.to_fraction(m, e)
+    digits, exponent = decimal.from_ratio(value.numerator, value.denominator)
+    if not form.nearest and decimal.to_fraction(digits, exponent) < value:
+        digits += 1
+    return integer_text(digits), exponent

@@ -1,0 +1,107 @@
+"""A filter run together with its contraction bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.kalman.contraction import contraction_start
+from gpbnb.kalman.emulation import History, compare_runs
+from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.bounded import advance_bounded
+from gpbnb.kalman.kernels.step import STOPPED
+from gpbnb.kalman.model import LinearModel
+
+
+@dataclass(frozen=True, eq=False)
+class BoundedHistory:
+    """A history, and the contraction bound of each entry of its errors, infinite where there is none.
+
+    Parameters
+    ----------
+    state, gain, covariance : (c, n), (c, n, m) and (c, n, n), in the units of the errors; of the covariance's
+        symmetric part.
+    """
+
+    history: History
+    state: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+
+    def ratios(self) -> NDArray[np.float64]:
+        """Largest error over bound of state, gain and covariance, after each step, (c, 3); above 1 if violated."""
+        error = self.history.covariance
+        symmetric = (error + np.swapaxes(error, 1, 2)) / 2
+        pairs = ((self.history.state, self.state), (self.history.gain, self.gain), (symmetric, self.covariance))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            each = [np.where(e == 0, 0.0, np.abs(e) / b).reshape(len(e), -1).max(axis=1) for e, b in pairs]
+        return np.stack(each, axis=1)
+
+
+class BoundedRun(Run):
+    """A run together with its contraction bound, :mod:`gpbnb.kalman.contraction`; see :class:`Run`.
+
+    Of the reference itself, in double-double, the bound says how far it may be from what is exact.
+    """
+
+    def __init__(
+        self, model: LinearModel, fmt: FloatFormat | None, form: Form, checkpoint_steps: Sequence[int]
+    ) -> None:
+        super().__init__(model, fmt, form, checkpoint_steps)
+        self.stored = model if fmt is None else model.rounded(fmt)
+        given = self.stored.to_float()
+        self._plain = given["Phi"], given["H"], given["Q"], given["R"]
+        self._exact = Run(self.stored, None, Form.INNOVATION, ())._matrices
+        n, m, count = model.n, model.m, len(self.checkpoint_steps)
+        self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
+        zero_n, size = np.zeros(n), np.zeros((n, n))
+        if self.form is Form.UD:  # the first factors may be off
+            size = np.abs((self._covariance() - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
+        self.bound = contraction_start(given["P0"], zero_n, size)
+
+    def _covariance(self) -> NDArray[Any]:
+        U = self.exactly(self.P)
+        triangle = np.triu(U, 1) + np.array(
+            [[Fraction(int(i == j)) for j in range(len(U))] for i in range(len(U))], dtype=object
+        )
+        return np.asarray((triangle * U.diagonal()) @ triangle.T)
+
+    def take(self, z: Any) -> None:
+        """Go on by as many steps as there are measurements, (steps, m)."""
+        if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
+        if self.stopped or not len(z):
+            return
+        packed = self._packed(z)
+        values = double_doubles(self.exactly(packed))
+        packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
+        outputs = (self.checkpoint_steps, (self.X, self.G, self.C), self.bounds, self.notes)
+        inputs = (self.tag, int(self.form), self._matrices, self._exact, self._plain)
+        try:
+            self.bound = advance_bounded(
+                *inputs, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *outputs
+            )
+        except (OverflowError, ZeroDivisionError):
+            self.notes[STOPPED] = self.steps + 1
+
+
+def emulate_with_bound(
+    model: LinearModel, z: Any, fmt: FloatFormat, form: Form = Form.HUNG, checkpoint_steps: Sequence[int] | None = None
+) -> BoundedHistory:
+    """Run the filter rounded, in double-double, and with its contraction bound; arguments as of :func:`emulate`."""
+    measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
+    chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
+    run = BoundedRun(model, fmt, form, chosen)
+    run.take(measured)
+    history = compare_runs(run, reference(run.stored, measured.to_fractions(), chosen))
+    c = len(history.steps)
+    state, gain, covariance = run.bounds
+    return BoundedHistory(history, state[:c], gain[:c], covariance[:c])

@@ -1,0 +1,115 @@
+"""Errors of a filter whose every operation is rounded, against the same filter in double-double."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.model import LinearModel
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Errors of a rounded run, against the reference, after some steps.
+
+    Parameters
+    ----------
+    steps : (c,), those that were reached.
+    state : (c, n), estimate minus reference, in the units of the states.
+    gain, covariance : (c, n, m) and (c, n, n), likewise.
+    reference : of the same steps.
+    indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
+    stopped : the step that a division by zero, or a number beyond the backend's range, ended, if any.
+    """
+
+    model: LinearModel
+    fmt: FloatFormat
+    form: Form
+    steps: NDArray[np.int64]
+    state: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    reference: Checkpoints
+    indefinite: int | None
+    stopped: int | None
+
+    @property
+    def state_norm(self) -> NDArray[np.float64]:
+        """Largest entry of the error of the estimate, (c,); the norm (21)."""
+        return np.abs(self.state).max(axis=1)
+
+    @property
+    def gain_norm(self) -> NDArray[np.float64]:
+        """Largest column sum of the error of the gain over that of the gain, (c,); the norm (22)."""
+        return relative(self.gain, self.reference.K)
+
+    @property
+    def covariance_norm(self) -> NDArray[np.float64]:
+        """Largest column sum of the error of the covariance over that of the covariance, (c,); the norm (22)."""
+        return relative(self.covariance, self.reference.P)
+
+    @property
+    def least_eigenvalue(self) -> NDArray[np.float64]:
+        """Least eigenvalue of the computed covariance, symmetric part, scaled to ones on the true diagonal, (c,)."""
+        true = self.reference.P[: len(self.steps)].astype(np.float64)
+        computed = true + self.covariance
+        scale = np.sqrt(np.diagonal(true, axis1=1, axis2=2))
+        scaled = computed / scale[:, :, np.newaxis] / scale[:, np.newaxis, :]
+        return np.asarray(np.linalg.eigvalsh((scaled + np.swapaxes(scaled, 1, 2)) / 2)[:, 0], dtype=np.float64)
+
+
+def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float64]:
+    """Norms (22), largest column sums, of errors over those of what is true, (c,)."""
+    size = np.abs(true[: len(error)].astype(np.float64)).sum(axis=1).max(axis=1)
+    return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
+
+
+def compare_runs(run: Run, true: Checkpoints) -> History:
+    """Subtract the reference from the checkpoints of a run, at the same steps."""
+    checkpoints = run.checkpoints()
+    c = len(checkpoints.steps)
+    if checkpoints.steps != true.steps[:c]:
+        raise ValueError(
+            f"got checkpoint steps {checkpoints.steps} and, of the reference, {true.steps}; needed the same"
+        )
+    x, K, P = (
+        (each - other[:c]).astype(np.float64)
+        for each, other in ((checkpoints.x, true.x), (checkpoints.K, true.K), (checkpoints.P, true.P))
+    )
+    fmt, steps = cast(FloatFormat, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
+    return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped)
+
+
+def emulate(
+    model: LinearModel,
+    z: Any,
+    fmt: FloatFormat,
+    form: Form = Form.HUNG,
+    checkpoint_steps: Sequence[int] | None = None,
+    true: Checkpoints | None = None,
+) -> History:
+    """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
+
+    Parameters
+    ----------
+    model : n states, m measurements.
+    z : (steps, m), measurements.
+    fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13.
+    checkpoint_steps : steps at which to compare; by default four a decade.
+    true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
+        errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
+    """
+    measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
+    chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
+    run = Run(model, fmt, form, chosen)
+    run.take(measured)
+    if true is None:
+        true = reference(model.rounded(fmt), measured.to_fractions(), chosen)
+    return compare_runs(run, true)

@@ -1,0 +1,50 @@
+"""One step of the filter in exact arithmetic."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.rational import exact, inverse_of
+
+
+class ExactStep(NamedTuple):
+    """One exact step; object arrays of Fractions."""
+
+    #: (n,), the estimate (98).
+    x: NDArray[Any]
+    #: (n, n), its covariance (101).
+    P: NDArray[Any]
+    #: (n, n), the predicted covariance (100).
+    predicted: NDArray[Any]
+    #: (n, m), the gain (99).
+    gain: NDArray[Any]
+    #: (m, m), :math:`HP_pH^T + R`.
+    innovation_covariance: NDArray[Any]
+    #: (m,), :math:`z - H\Phi x`.
+    innovation: NDArray[Any]
+    #: (n, n), the closed loop (109).
+    transition: NDArray[Any]
+
+
+def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> ExactStep:
+    """One step of the filter without any rounding, in Fractions; (98)-(101) in the order (100), (99), (101), (98).
+
+    Parameters
+    ----------
+    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model. x (n,), P (n, n) : before the step. z (m,) : measurement.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : :math:`HP_pH^T + R` is singular.
+    """
+    Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
+    predicted = Phi @ P @ Phi.T + Q
+    S = H @ predicted @ H.T + R
+    gain = predicted @ H.T @ inverse_of(S)
+    transition = Phi - gain @ (H @ Phi)
+    innovation = z - H @ (Phi @ x)
+    return ExactStep(
+        Phi @ x + gain @ innovation, predicted - gain @ (H @ predicted), predicted, gain, S, innovation, transition
+    )

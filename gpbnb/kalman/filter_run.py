@@ -1,0 +1,209 @@
+"""A filter run that can stop and go on: every operation rounded, or in double-double as the reference."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, STOPPED, advance, prepare
+from gpbnb.kalman.model import LinearModel
+
+
+class Run:
+    """A resumable run of a filter: inputs, state and checkpoints.
+
+    Parameters
+    ----------
+    model : n states, m measurements.
+    fmt : the format in which all of it is stored and computed; None for double-double.
+    form : how a step is computed.
+    checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in rising order.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops; checkpoint steps that do not rise.
+    OverflowError : the model has entries beyond the range of the format's backend.
+    """
+
+    def __init__(
+        self, model: LinearModel, fmt: FloatFormat | None, form: Form, checkpoint_steps: Sequence[int]
+    ) -> None:
+        self.model, self.fmt, self.form = model, fmt, Form(form)
+        self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
+        if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
+            raise ValueError(
+                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed steps of 1 or more, each above the last"
+            )
+        if fmt is not None and not isinstance(fmt.backend, Compiled):
+            raise ValueError(
+                f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
+            )
+        Phi, H, Q, R = (self._packed(each) for each in (model.Phi, model.H, model.Q, model.R))
+        PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
+        n, m, count = model.n, model.m, len(self.checkpoint_steps)
+        identity = self._packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
+        self.x, self.P = self._packed(model.x0.reshape(n, 1)), self._packed(model.P0)
+        RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
+        self.X, self.G, self.C = (
+            np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, 1), (n, m), (n, n))
+        )
+        self.notes = np.zeros(4, dtype=np.int64)
+        try:
+            definite = prepare(self.tag, int(form), Q, R, self.P, RI, self.UQ, self.UR)
+        except ZeroDivisionError:
+            definite = False
+        if not definite:
+            raise ValueError(
+                f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
+                "this format; use more digits, or add a little to the diagonals of Q and P0"
+            )
+        self._matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
+
+    @property
+    def tag(self) -> Tag:
+        return DoubleDouble() if self.fmt is None else cast(Compiled, self.fmt.backend).tag
+
+    @property
+    def steps(self) -> int:
+        """How many steps are done."""
+        return int(self.notes[DONE])
+
+    @property
+    def indefinite(self) -> int | None:
+        """The first step at which a variance or a pivot of the innovation covariance was not positive."""
+        return int(self.notes[INDEFINITE]) or None
+
+    @property
+    def stopped(self) -> int | None:
+        """The step that a division by zero, or a number beyond the range of the backend, ended."""
+        return int(self.notes[STOPPED]) or None
+
+    def take(self, z: Any) -> None:
+        """Go on by as many steps as there are measurements, (steps, m); a run that has stopped stays where it is."""
+        if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
+        if self.stopped:
+            return
+        packed = self._packed(z)
+        packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
+        outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
+        try:
+            advance(self.tag, int(self.form), self._matrices, packed, self.steps, self.x, self.P, *outputs)
+        except (OverflowError, ZeroDivisionError):
+            self.notes[STOPPED] = self.steps + 1
+
+    def _packed(self, values: Any) -> NDArray[Any]:
+        """Numbers, each rounded into the format, as the compiled loops take them."""
+        if self.fmt is None:
+            entries = np.asarray(values)
+            if entries.dtype == np.float64:
+                if not np.isfinite(entries).all():
+                    raise ValueError("got measurements with NaN or infinity; needed finite numbers")
+                return np.stack([entries, np.zeros_like(entries)], axis=-1)
+            return double_doubles(entries)
+        array = self.fmt.array(values)
+        if not isinstance(array.backend, Compiled):
+            raise OverflowError(
+                f"got numbers beyond the range of the compiled loops of {self.fmt}; scale the states, or use base 10"
+            )
+        return array.backend.pack(array.components)
+
+    def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
+        """Exact Fractions of what the compiled loops gave."""
+        if self.fmt is None:
+            high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
+            return np.asarray(np.frompyfunc(lambda h, s: Fraction(h) + Fraction(s), 2, 1)(high, low), dtype=object)
+        backend = cast(Compiled, self.fmt.backend)
+        return np.asarray(
+            FloatArray.from_components(backend, backend.unpack(packed), self.fmt).to_fractions(), dtype=object
+        )
+
+    def checkpoints(self) -> Checkpoints:
+        """Estimate, gain and covariance at the checkpoint steps that were reached."""
+        count = int(self.notes[NEXT_CHECKPOINT])
+        x, K, P = (self.exactly(each[:count]) for each in (self.X, self.G, self.C))
+        if self.form is Form.UD:
+            K, P = self._from_factors(K, P)
+        return Checkpoints(tuple(int(step) for step in self.checkpoint_steps[:count]), x[..., 0], K, P)
+
+    def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Gains and covariances that the factors, and the gains of one measurement after the other, stand for."""
+        gains, covariances = np.empty_like(K), np.empty_like(U)
+        H, UR, n = self.exactly(self._matrices[2]), self.exactly(self.UR), self.model.n
+        unit = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
+        for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
+            h, ur = H[step % len(H)], UR[step % len(UR)]
+            upper = np.triu(ur, 1) + np.array([[Fraction(int(i == j)) for j in range(len(ur))] for i in range(len(ur))])
+            inverse_upper = _unit_upper_inverse(upper)
+            rows = inverse_upper @ h
+            whole = K[at].copy()
+            for i in range(self.model.m):
+                for j in range(i):
+                    whole[:, j] -= K[at][:, i] * (rows[i] @ whole[:, j])
+            gains[at] = whole @ inverse_upper
+            d = U[at].diagonal()
+            triangle = np.triu(U[at], 1) + unit
+            covariances[at] = (triangle * d) @ triangle.T
+        return gains, covariances
+
+
+def _unit_upper_inverse(upper: NDArray[Any]) -> NDArray[Any]:
+    m = len(upper)
+    result = np.array([[Fraction(int(i == j)) for j in range(m)] for i in range(m)], dtype=object)
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            result[i] = result[i] - upper[i, k] * result[k]
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoints:
+    """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n)."""
+
+    steps: tuple[int, ...]
+    x: NDArray[Any]
+    K: NDArray[Any]
+    P: NDArray[Any]
+
+
+def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
+    """Steps from 1 to the last, at equal ratios.
+
+    Raises
+    ------
+    ValueError : no steps, or none a decade.
+    """
+    if steps < 1 or per_decade < 1:
+        raise ValueError(f"got {steps} steps, {per_decade} a decade; needed both at least 1")
+    grid = np.rint(10 ** (np.arange(0, int(math.log10(steps) * per_decade) + 1) / per_decade))
+    return tuple(sorted({int(k) for k in grid if k <= steps} | {steps}))
+
+
+def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form: Form = Form.INNOVATION) -> Checkpoints:
+    """Run the filter in double-double, whose operations have relative errors below 2**-102.
+
+    Parameters
+    ----------
+    z : (steps, m), measurements; float64 or Fractions.
+    checkpoint_steps : steps whose results are saved.
+
+    Raises
+    ------
+    ArithmeticError : a division by zero or a number beyond 2**1000, even so: the model is degenerate.
+    """
+    run = Run(model, None, form, checkpoint_steps)
+    run.take(z)
+    if run.stopped:
+        raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
+    return run.checkpoints()

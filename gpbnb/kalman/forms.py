@@ -1,0 +1,45 @@
+"""The forms of the filter: the order in which one step is computed."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Form(IntEnum):
+    r"""The order in which one step is computed; in exact arithmetic all forms agree.
+
+    P_p is the predicted covariance (100).
+
+    ================  ===================================================================================
+    form              gain, covariance, estimate
+    ================  ===================================================================================
+    HUNG              the first form of (99); :math:`(I - KH)P_p`; (111) with (109) and (110)
+    HUNG_SECOND_GAIN  the same, but the estimate takes :math:`P H^T R^{-1}`, the second form of (99), with
+                      the new P
+    INNOVATION        the first form of (99); :math:`(I - KH)P_p`; (98), by the innovation
+    JOSEPH            as INNOVATION, but :math:`(I - KH)P_p(I - KH)^T + KRK^T`
+    UD                Thornton's and Bierman's recursions of the factors of :math:`P = UDU^T`
+    ================  ===================================================================================
+
+    References
+    ----------
+    hung1984, ch. II, eqs. (98)-(101), (109)-(111); Bierman 1977, ch. V, VI.
+    """
+
+    HUNG = 0
+    HUNG_SECOND_GAIN = 1
+    INNOVATION = 2
+    JOSEPH = 3
+    UD = 4
+
+    def __str__(self) -> str:
+        return _NAMES[self]
+
+
+_NAMES = {
+    Form.HUNG: "Hung (1984)",
+    Form.HUNG_SECOND_GAIN: "Hung (1984), second gain",
+    Form.INNOVATION: "innovation",
+    Form.JOSEPH: "Joseph",
+    Form.UD: "UD",
+}

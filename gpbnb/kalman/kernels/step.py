@@ -1,0 +1,297 @@
+"""Compiled: one step of the filter in each form, and a run of many steps.
+
+Each function serves every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar` and releases the interpreter's lock.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.matrices import (
+    copy,
+    difference,
+    factor_ud,
+    inverse,
+    is_zero,
+    product,
+    product_by_sparse,
+    total,
+    transpose,
+)
+from gpbnb.arithmetic.kernels.scalar import (
+    add,
+    compare,
+    divide,
+    load,
+    multiply,
+    negative,
+    one,
+    put,
+    store,
+    subtract,
+    zero,
+)
+from gpbnb.kalman.forms import Form
+
+_HUNG, _HUNG_SECOND_GAIN, _INNOVATION, _JOSEPH, _UD = (int(each) for each in Form)
+
+#: Entries of the status of a run: steps done, the next checkpoint, the first step with a variance or pivot that is
+#: not positive, and the step that a division by zero ended.
+DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
+
+
+@njit(nogil=True)
+def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: Any) -> Any:
+    """Thornton's modified weighted Gram-Schmidt: the factors of Phi U D U' Phi' + UQ DQ UQ', in place of U."""
+    n = U.shape[0]
+    definite = True
+    for i in range(n):
+        for j in range(n):
+            put(fmt, T, (i, j), load(fmt, U, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
+            put(fmt, W, (i, n + j), load(fmt, UQ, (i, j)) if i < j else one(fmt) if i == j else zero(fmt))
+        put(fmt, D, (i, 0), load(fmt, U, (i, i)))
+        put(fmt, D, (n + i, 0), load(fmt, UQ, (i, i)))
+    product(fmt, Phi, T, W[:, :n])
+    for j in range(n - 1, -1, -1):
+        d = zero(fmt)
+        for k in range(2 * n):
+            w = load(fmt, W, (j, k))
+            if is_zero(fmt, w):
+                put(fmt, C, (k, 0), zero(fmt))
+            else:
+                c = multiply(fmt, load(fmt, D, (k, 0)), w)
+                put(fmt, C, (k, 0), c)
+                d = add(fmt, d, multiply(fmt, w, c))
+        store(fmt, U, (j, j), d)
+        sign = compare(fmt, d, zero(fmt))
+        definite = definite and sign > 0
+        for i in range(j):
+            put(fmt, U, (j, i), zero(fmt))
+            s = zero(fmt)
+            if sign != 0:
+                for k in range(2 * n):
+                    c = load(fmt, C, (k, 0))
+                    if not is_zero(fmt, c):
+                        s = add(fmt, s, multiply(fmt, load(fmt, W, (i, k)), c))
+                s = divide(fmt, s, d)
+            store(fmt, U, (i, j), s)
+            if not is_zero(fmt, s):
+                for k in range(2 * n):
+                    w = load(fmt, W, (j, k))
+                    if not is_zero(fmt, w):
+                        w = multiply(fmt, s, w)
+                        store(fmt, W, (i, k), subtract(fmt, load(fmt, W, (i, k)), w))
+    return definite
+
+
+@njit(nogil=True)
+def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any, F: Any, G: Any) -> Any:
+    """Bierman's update by one measurement z of h' x with variance r; its gain becomes column i of K.
+
+    Returns 1 if all variances are positive, -1 if one is not, 0 if a division by zero ended it.
+    """
+    n = x.shape[0]
+    answer = 1
+    y = z
+    for j in range(n):
+        c = load(fmt, h, j)
+        if not is_zero(fmt, c):
+            y = subtract(fmt, y, multiply(fmt, c, load(fmt, x, (j, 0))))
+    for j in range(n):
+        s = zero(fmt)
+        for k in range(j):
+            c = load(fmt, h, k)
+            if not is_zero(fmt, c):
+                s = add(fmt, s, multiply(fmt, load(fmt, U, (k, j)), c))
+        s = add(fmt, s, load(fmt, h, j))
+        put(fmt, F, (j, 0), s)
+        store(fmt, G, (j, 0), multiply(fmt, load(fmt, U, (j, j)), s))
+    a = r
+    for j in range(n):
+        f, g = load(fmt, F, (j, 0)), load(fmt, G, (j, 0))
+        before = a
+        if not is_zero(fmt, g):
+            a = add(fmt, before, multiply(fmt, f, g))
+            sign = compare(fmt, a, zero(fmt))
+            if sign == 0:
+                return 0
+            if sign < 0:
+                answer = -1
+            store(fmt, U, (j, j), divide(fmt, multiply(fmt, load(fmt, U, (j, j)), before), a))
+            factor = negative(fmt, divide(fmt, f, before))
+            for k in range(j):
+                u, c = load(fmt, U, (k, j)), load(fmt, K, (k, i))
+                if not is_zero(fmt, c):
+                    store(fmt, U, (k, j), add(fmt, u, multiply(fmt, factor, c)))
+                store(fmt, K, (k, i), add(fmt, c, multiply(fmt, g, u)))
+        if compare(fmt, load(fmt, U, (j, j)), zero(fmt)) < 0:
+            answer = -1
+        put(fmt, K, (j, i), g)
+    for j in range(n):
+        g = divide(fmt, load(fmt, K, (j, i)), a)
+        store(fmt, K, (j, i), g)
+        store(fmt, x, (j, 0), add(fmt, load(fmt, x, (j, 0)), multiply(fmt, g, y)))
+    return answer
+
+
+@njit(nogil=True)
+def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
+    """c = the inverse of U times a, by back substitution, U being that of R = U D U'."""
+    for j in range(a.shape[1]):
+        for i in range(a.shape[0] - 1, -1, -1):
+            s = load(fmt, a, (i, j))
+            for k in range(i + 1, a.shape[0]):
+                u = load(fmt, UR, (i, k))
+                if not is_zero(fmt, u):
+                    s = subtract(fmt, s, multiply(fmt, u, load(fmt, c, (k, j))))
+            store(fmt, c, (i, j), s)
+
+
+@compiled
+def prepare(fmt: Any, form: int, Q: Any, R: Any, P: Any, RI: Any, UQ: Any, UR: Any) -> Any:
+    """What a form needs beside the model, computed in its arithmetic: the inverses of R, the factors of Q, R and P."""
+    T, S = np.empty_like(P), np.empty_like(R[0])
+    definite = True
+    if form == _HUNG_SECOND_GAIN:
+        for k in range(R.shape[0]):
+            copy(fmt, R[k], S)
+            definite = inverse(fmt, S, RI[k]) > 0 and definite
+    if form == _UD:
+        for k in range(Q.shape[0]):
+            copy(fmt, Q[k], T)
+            definite = factor_ud(fmt, T, UQ[k]) and definite
+        for k in range(R.shape[0]):
+            copy(fmt, R[k], S)
+            definite = factor_ud(fmt, S, UR[k]) and definite
+        copy(fmt, P, T)
+        definite = factor_ud(fmt, T, P) and definite
+    return definite
+
+
+@njit(nogil=True)
+def workspace(x: Any, P: Any, K: Any, KT: Any, R: Any, y: Any) -> Any:
+    """Matrices for what a step computes on its way."""
+    square = np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P)
+    tall = np.empty_like(K), np.empty_like(K), np.empty_like(K)
+    small = np.empty_like(R), np.empty_like(R), np.empty_like(R)
+    stacked = np.concatenate((P, P), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
+    columns = np.empty_like(y), np.empty_like(y), np.empty_like(x), np.empty_like(x)
+    return square, tall, (np.empty_like(KT), np.empty_like(KT)), small, columns, stacked
+
+
+@njit(nogil=True)
+def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
+    """Take step k + 1, from x and P to x and P, with the measurement z; the gain is left in the workspace.
+
+    Returns 1 if all variances and pivots are positive, -1 if one is not, 0 if one is zero: x is then void.
+    """
+    Phi, PhiT, H, HT, Q, R, RI, UQ, UR, identity = model
+    (V, T, W, F, WT), (K, PHt, B), (KT, HD), (S, SI, pivots), (y, g, u, v), stacked = work
+    phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
+    phiT, hT = PhiT[k % Phi.shape[0]], HT[k % H.shape[0]]
+    answer = 1
+    if form == _UD:
+        if not _predict_ud(fmt, phi, UQ[k % Q.shape[0]], P, stacked[0], stacked[1], stacked[2], T):
+            answer = -1
+        product(fmt, phi, x, u)
+        copy(fmt, u, x)
+        ur = UR[k % R.shape[0]]
+        decorrelate(fmt, ur, h, HD)
+        decorrelate(fmt, ur, z, y)
+        for i in range(z.shape[0]):
+            found = _observe_ud(fmt, i, HD[i], load(fmt, y, (i, 0)), load(fmt, ur, (i, i)), x, P, K, u, v)
+            if found == 0:
+                return 0
+            answer = min(answer, found)
+        return answer
+    product(fmt, phi, P, T)
+    product_by_sparse(fmt, T, phiT, V)
+    total(fmt, V, Q[k % Q.shape[0]], V)
+    product_by_sparse(fmt, V, hT, PHt)
+    product(fmt, h, PHt, S)
+    total(fmt, S, r, S)
+    copy(fmt, S, pivots)
+    answer = inverse(fmt, pivots, SI)
+    if answer == 0:
+        return 0
+    product(fmt, PHt, SI, K)
+    product_by_sparse(fmt, K, h, T)
+    difference(fmt, identity, T, W)
+    if form == _JOSEPH:
+        transpose(fmt, W, WT)
+        product(fmt, W, V, T)
+        product(fmt, T, WT, F)
+        transpose(fmt, K, KT)
+        product_by_sparse(fmt, K, r, B)
+        product(fmt, B, KT, T)
+        total(fmt, F, T, P)
+    else:
+        product(fmt, W, V, P)
+    if form == _HUNG_SECOND_GAIN:
+        product_by_sparse(fmt, P, hT, B)
+        product(fmt, B, RI[k % R.shape[0]], K)
+        product_by_sparse(fmt, K, h, T)
+        difference(fmt, identity, T, W)
+    if form in (_HUNG, _HUNG_SECOND_GAIN):
+        product_by_sparse(fmt, W, phi, F)
+        product(fmt, F, x, u)
+        product(fmt, K, z, v)
+    else:
+        product(fmt, phi, x, u)
+        product(fmt, h, u, y)
+        difference(fmt, z, y, g)
+        product(fmt, K, g, v)
+    total(fmt, u, v, x)
+    for i in range(x.shape[0]):
+        if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
+            answer = -1
+    return answer
+
+
+@njit(nogil=True)
+def record_step(
+    fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, checkpoint_steps: Any, X: Any, G: Any, C: Any, notes: Any
+) -> Any:
+    """Record the result of step k + 1 if it is a checkpoint step; return whether the run continues."""
+    if answer == 0:
+        notes[STOPPED] = k + 1
+        return False
+    if answer < 0 and notes[INDEFINITE] == 0:
+        notes[INDEFINITE] = k + 1
+    notes[DONE] = k + 1
+    at = notes[NEXT_CHECKPOINT]
+    if at < checkpoint_steps.shape[0] and checkpoint_steps[at] == k + 1:
+        copy(fmt, x, X[at])
+        copy(fmt, K, G[at])
+        copy(fmt, P, C[at])
+        notes[NEXT_CHECKPOINT] += 1
+    return True
+
+
+@compiled
+def advance(
+    fmt: Any,
+    form: int,
+    model: Any,
+    z: Any,
+    first: int,
+    x: Any,
+    P: Any,
+    checkpoint_steps: Any,
+    X: Any,
+    G: Any,
+    C: Any,
+    notes: Any,
+) -> None:
+    """Take one step per row of z, from the step `first`; save x, gain and P in X, G and C at the checkpoint steps."""
+    if z.shape[0] == 0:
+        return
+    work = workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
+    for step in range(z.shape[0]):
+        answer = filter_step(fmt, form, model, first + step, z[step], x, P, work)
+        if not record_step(fmt, first + step, answer, x, work[1][0], P, checkpoint_steps, X, G, C, notes):
+            return

@@ -1,0 +1,79 @@
+"""One filter for many measurement records at once.
+
+Covariance and gain do not depend on the measurements. They are computed once per step, and the estimates of all
+records are the columns of one matrix. Each record gets the same digits as in a run of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.records import advance_records
+from gpbnb.kalman.kernels.step import STOPPED
+from gpbnb.kalman.model import LinearModel
+
+
+class Records(Run):
+    """A filter whose gain serves the estimates of many records.
+
+    Parameters
+    ----------
+    model, fmt, form : as of :class:`~gpbnb.kalman.filter_run.Run`; not the UD form, which computes gain and estimate
+        together.
+    records : how many.
+
+    Raises
+    ------
+    ValueError : the UD form, or no records.
+    """
+
+    def __init__(self, model: LinearModel, fmt: FloatFormat | None, form: Form, records: int) -> None:
+        if form is Form.UD or records < 1:
+            raise ValueError(
+                f"got the {form} form and {records} records; needed at least one record, and a form whose gain does "
+                "not depend on the measurements: any but UD"
+            )
+        super().__init__(model, fmt, form, ())
+        self.records = records
+        self.x = np.ascontiguousarray(np.repeat(self.x, records, axis=1))
+        self.X = np.zeros((0, *self.x.shape), self.x.dtype)
+
+    def use_measurement_matrices(self, H: NDArray[np.float64]) -> None:
+        """Replace the cycle of measurement matrices, (p, m, n), whose entries are rounded into the format."""
+        if np.shape(H)[1:] != (self.model.m, self.model.n):
+            raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
+        packed = self._packed(H)
+        transposed = np.ascontiguousarray(np.swapaxes(packed, 1, 2))
+        self._matrices = (*self._matrices[:2], packed, transposed, *self._matrices[4:])
+
+    def carry(self, z: NDArray[np.float64], states: int) -> NDArray[np.float64]:
+        """Take the next measurements of all records.
+
+        Parameters
+        ----------
+        z : (steps, m, records).
+        states : how many of the first states to return.
+
+        Returns
+        -------
+        estimates : (steps, states, records), the nearest float64; NaN from the step on at which the filter stopped.
+        """
+        if np.ndim(z) != 3 or np.shape(z)[1:] != (self.model.m, self.records):
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m}, {self.records})")
+        out = np.full((len(z), states, self.records), np.nan)
+        if self.stopped or not len(z):
+            return out
+        before = self.steps
+        kept = (self.checkpoint_steps, (self.X, self.G, self.C), self.notes)
+        try:
+            advance_records(
+                self.tag, int(self.form), self._matrices, self._packed(z), before, self.x, self.P, *kept, out
+            )
+        except (OverflowError, ZeroDivisionError):
+            self.notes[STOPPED] = self.steps + 1
+        out[self.steps - before :] = np.nan
+        return out

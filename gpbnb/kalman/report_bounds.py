@@ -1,0 +1,221 @@
+r"""The rounding error bounds of hung1984, ch. II, section 12, and its closing example.
+
+:func:`coefficients` gives (125) as printed and with each of its faults corrected. All functions are exact: ints and
+Fractions in, Fractions out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from graphlib import CycleError, TopologicalSorter
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+
+# -- the counts of the report -----------------------------------------------------------------------------------------
+
+
+def prediction_count(n: int) -> int:
+    """Roundings of the predicted covariance, 2n + 1; hung1984, ch. II, (103)."""
+    return 2 * n + 1
+
+
+def covariance_count(n: int, m: int) -> int:
+    """Roundings of the covariance, 3n + m + 2; hung1984, ch. II, (105)."""
+    return 3 * n + m + 2
+
+
+def gain_count(n: int, m: int) -> int:
+    """Roundings of the gain, 4n + 2m + 3; hung1984, ch. II, (108)."""
+    return 4 * n + 2 * m + 3
+
+
+def transition_count(n: int, m: int) -> int:
+    """Roundings of the closed loop in a step, its product with the state among them, 6n + 3m + 5; (115)."""
+    return 6 * n + 3 * m + 5
+
+
+def input_count(n: int, m: int) -> int:
+    """Roundings of what a step adds, its addition among them, 4n + 3m + 4; hung1984, ch. II, (116)."""
+    return 4 * n + 3 * m + 4
+
+
+def printed_covariance_bound(P: Any, m: int, beta: Fraction) -> NDArray[Any]:
+    r"""Bound entry by entry, :math:`(3n+m+2)\beta\,|P_k|`; hung1984, ch. II, (105).
+
+    Parameters
+    ----------
+    P : (n, n), the exact covariance after the step.
+    m : number of measurements.
+    beta : unit roundoff β.
+    """
+    entries: Any = exact(P)
+    return np.asarray(covariance_count(entries.shape[0], m) * beta * abs(entries))
+
+
+def printed_gain_bound(K: Any, beta: Fraction) -> NDArray[Any]:
+    r"""Bound entry by entry, :math:`(4n+2m+3)\beta\,|K_k|`; hung1984, ch. II, (108). K : (n, m), the exact gain."""
+    entries: Any = exact(K)
+    n, m = entries.shape
+    return np.asarray(gain_count(n, m) * beta * abs(entries))
+
+
+class Coefficients(NamedTuple):
+    r"""What multiplies :math:`\beta\|x_k\|` and :math:`\beta B` in a bound like (125)."""
+
+    first: int
+    second: int
+
+
+def coefficients(
+    k: int, n: int, m: int, once: bool = False, free_signs: bool = False, carried: bool = False
+) -> Coefficients:
+    r"""Return the coefficients of (125), as printed or with faults corrected.
+
+    With :math:`c_j` roundings of the closed loop of step j and :math:`d_j` of its input, the report bounds
+    :math:`\|\tilde x_k\|` by :math:`\beta\{a_0\|x_k\| + \sum_{i=1}^k (a_0 - a_i)B\}`,
+    :math:`a_i = \sum_{j=i+1}^k c_j + d_i`, :math:`a_0 = \sum_{j=1}^k c_j`.
+
+    Parameters
+    ----------
+    k : steps. n, m : dimensions of the state and of the measurement.
+    once : do not count the product with the state and the last addition again, that (114)-(116) have counted already.
+    free_signs : let each term have an error of its own sign, :math:`a_0 + a_i` for :math:`a_0 - a_i`.
+    carried : let the errors of P from the steps before go on into P, K and F, as the report's own algebra does with
+        every other error: 3n + m + 2 more roundings at each step.
+
+    Raises
+    ------
+    ValueError : k, n or m below 1.
+
+    References
+    ----------
+    hung1984, ch. II, (112)-(125).
+    """
+    if min(k, n, m) < 1:
+        raise ValueError(f"got k = {k}, n = {n}, m = {m}; needed each at least 1")
+    c, d, more = transition_count(n, m), input_count(n, m), covariance_count(n, m) if carried else 0
+    if not once:
+        c, d = c + n + 1, d + 1
+    first = c * k + more * k * (k - 1) // 2
+    loops = c * k * (k + 1) // 2 + more * (k + 1) * k * (k - 1) // 6  # sum over i of c_1 + ... + c_i
+    inputs = d * k + more * k * (k - 1) // 2
+    return Coefficients(first, 2 * k * first - loops + inputs if free_signs else loops - inputs)
+
+
+CORRECTIONS: dict[str, dict[str, bool]] = {
+    "as printed": {},
+    "counted once": {"once": True},
+    "and signs free": {"once": True, "free_signs": True},
+    "and errors carried on": {"once": True, "free_signs": True, "carried": True},
+}
+"""Arguments of :func:`coefficients`, one more fault of (125) corrected on each line."""
+
+
+def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fraction:
+    r"""Return the least B of (122), :math:`F^i u \le B` for i = 0 … k - 1, in the norms (21) and (22).
+
+    Parameters
+    ----------
+    transitions : F_1 … F_k of (109). inputs : u_1 … u_k of (110).
+
+    Raises
+    ------
+    ValueError : none, or not as many of one as of the other.
+    """
+    if not transitions or len(transitions) != len(inputs):
+        raise ValueError(f"got {len(transitions)} transitions and {len(inputs)} inputs; needed as many, at least one")
+    F, u = max(map(column_sum_norm, transitions)), max(map(max_norm, inputs))
+    return u * max(Fraction(1), F ** (len(inputs) - 1))
+
+
+def state_bound(
+    x_norm: Fraction,
+    B: Fraction,
+    beta: Fraction,
+    counts: Coefficients,
+) -> Fraction:
+    r"""Return :math:`\beta\{a\|x_k\| + bB\}`, (a, b) from :func:`coefficients`; as printed, hung1984, ch. II, (125)."""
+    return beta * (counts.first * x_norm + counts.second * B)
+
+
+def precision_for_coefficient(
+    coefficient: int | Fraction, tolerance: Fraction | int = 1, base: int = 10, rounding: Rounding = Rounding.NEAREST
+) -> int:
+    r"""Smallest t with :math:`\text{coefficient}\cdot\beta(t) \le \text{tolerance}`.
+
+    Parameters
+    ----------
+    coefficient : what multiplies β. tolerance : the error that is granted, in the same units.
+    base, rounding : of the format.
+
+    Raises
+    ------
+    ValueError : coefficient or tolerance not positive.
+
+    References
+    ----------
+    hung1984, ch. II, (8), (13) and the example of section 12.
+    """
+    if coefficient <= 0 or tolerance <= 0:
+        raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
+    precision = 1
+    while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > tolerance:
+        precision += 1
+    return precision
+
+
+# -- the closing example ----------------------------------------------------------------------------------------------
+
+EXAMPLE = (3_153_600, 10, 2)
+"""The k, n and m of the closing example, a year of steps of 10 s; hung1984, ch. II, section 12."""
+
+PRINTED = {
+    "first coefficient": "2.6490e8",
+    "second coefficient": "1.2949e16",
+    "first beta": ".3775e-8",
+    "first digits": "9",
+    "second beta": ".7723e-16",
+    "second digits": "17",
+}
+"""Numbers of the closing example as hung1982 prints them; hung1984 loses a minus sign."""
+
+
+def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
+    """The second coefficient with its plus sign read as times, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
+
+    Parameters
+    ----------
+    k, n, m : as in :func:`coefficients`. loop : another value of 7n + 3m + 6.
+    """
+    return Fraction(k * (3 * n + 1) * (k - 1), 2) * (7 * n + 3 * m + 6 if loop is None else loop)
+
+
+def one_digit_misprints(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
+    """Every (a, b, c) that differs from (7, 3, 6) in one figure and for which k(an + bm + c) comes out as `printed`."""
+    right = (7, 3, 6)
+    changed = [(*right[:i], figure, *right[i + 1 :]) for i in range(3) for figure in range(10) if figure != right[i]]
+    return [(a, b, c) for a, b, c in changed if prints_as(k * (a * n + b * m + c), printed)]
+
+
+def dependencies(second: bool) -> dict[str, set[str]]:
+    """Which of (98)-(101) needs which, with the first or the second form of (99)."""
+    return {
+        "(100)": set(),
+        "(99)": {"(101)"} if second else {"(100)"},
+        "(101)": {"(99)", "(100)"},
+        "(98)": {"(99)"},
+    }
+
+
+def order(second: bool) -> tuple[str, ...] | None:
+    """In which order (98)-(101) can be computed; None if in none."""
+    try:
+        return tuple(TopologicalSorter(dependencies(second)).static_order())
+    except CycleError:
+        return None

@@ -1,0 +1,78 @@
+"""Simulated measurements of a model, block by block and the same on every machine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.kalman.kernels.simulation import measured
+from gpbnb.kalman.model import LinearModel, factor
+
+#: Steps whose noise one seeded generator draws, so that a run may begin again at any block.
+BLOCK = 4096
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """Measurements of a simulated truth, block by block, the same on every run.
+
+    Parameters
+    ----------
+    model : says how the truth moves and is measured.
+    start : (n,), the truth at step 0.
+    seed : of the noise; block b is drawn by ``default_rng([seed, b])``.
+    resolution : measurements are rounded to its multiples, as by an analogue-to-digital converter.
+    """
+
+    model: LinearModel
+    start: tuple[float, ...]
+    seed: int
+    resolution: float
+
+    def __post_init__(self) -> None:
+        if len(self.start) != self.model.n:
+            raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one a state")
+        if not 0 < self.resolution < math.inf:
+            raise ValueError(f"got resolution {self.resolution}; needed a number above 0")
+
+    @cached_property
+    def _given(self) -> tuple[NDArray[np.float64], ...]:
+        given = self.model.to_float()
+        roots = (np.array([_root(each) for each in covariances]) for covariances in (self.model.Q, self.model.R))
+        return given["Phi"], given["H"], *roots
+
+    def block(
+        self, number: int, truth: NDArray[np.float64], steps: int = BLOCK
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Measurements of at most 4096 steps after `number` blocks, given the truth there.
+
+        Returns
+        -------
+        z : (steps, m), multiples of the resolution.
+        truth : (n,), after these steps.
+        """
+        rng = np.random.default_rng([self.seed, number])
+        w = rng.standard_normal((BLOCK, self.model.n))
+        v = rng.standard_normal((BLOCK, self.model.m))
+        x, z = np.array(truth, dtype=np.float64), np.empty((min(steps, BLOCK), self.model.m))
+        measured(*self._given, number * BLOCK, w, v, x, z)
+        return np.rint(z / self.resolution) * self.resolution, x
+
+    def measurements(self, steps: int) -> NDArray[np.float64]:
+        """The first measurements, (steps, m)."""
+        truth, blocks = np.array(self.start, dtype=np.float64), [np.empty((0, self.model.m))]
+        for number in range(-(-steps // BLOCK)):
+            z, truth = self.block(number, truth, steps - number * BLOCK)
+            blocks.append(z)
+        return np.concatenate(blocks)
+
+
+def _root(covariance: NDArray[Any]) -> NDArray[np.float64]:
+    """A square root, by plain float64 operations that are the same everywhere."""
+    lower, d = factor(covariance)
+    return lower.astype(np.float64) * np.sqrt(d.astype(np.float64))

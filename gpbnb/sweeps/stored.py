@@ -1,0 +1,57 @@
+"""What ``python -m gpbnb.sweeps`` does with the stored sweeps that it is given."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from gpbnb.sweeps.sweep import Sweep
+
+
+def verify(sweeps: Sequence[Sweep[Any]], count: int, seed: int, progress: bool = False) -> list[str]:
+    """Read every sweep, compute a sample of its cells again, and describe each difference.
+
+    Raises
+    ------
+    DamagedFileError : a file is not as it was written.
+    """
+    found = []
+    for sweep in sweeps:
+        for cell, stored, computed in sweep.verify(count, seed, progress):
+            found.append(f"{sweep.name}, {cell}: stored {stored or 'nothing'}, computed {computed}")
+    return found
+
+
+def run(sweeps: Sequence[Sweep[Any]], arguments: Sequence[str] | None = None) -> int:
+    """The command; returns its exit status: 1 if a file is damaged or a value differs."""
+    parser = argparse.ArgumentParser(prog="python -m gpbnb.sweeps", description="The stored sweeps of the package.")
+    commands = parser.add_subparsers(dest="command", required=True)
+    commands.add_parser("list", help="name, command and provenance of each stored sweep")
+    check = commands.add_parser("verify", help="compute a sample of each stored sweep again and compare")
+    check.add_argument("names", nargs="*", help="such as kalman/year; all by default")
+    check.add_argument("--sample", type=int, default=1, help="cells of each sweep; 1 by default")
+    check.add_argument("--seed", type=int, default=1, help="chooses the cells; 1 by default")
+    given = parser.parse_args(arguments)
+    known = {sweep.name: sweep for sweep in sweeps}
+    try:
+        if given.command == "list":
+            for sweep in sweeps:
+                table = sweep.load()
+                about = "; ".join(f"{key} {value}" for key, value in table.provenance.items() if key != "sha256")
+                print(f"{sweep.name}: {about}")
+            return 0
+        if unknown := set(given.names) - set(known):
+            parser.error(f"got {', '.join(sorted(unknown))}; needed some of {', '.join(known)}")
+        if given.sample < 1:
+            parser.error(f"got --sample {given.sample}; needed at least 1")
+        chosen = [known[name] for name in given.names] or list(sweeps)
+        differences = verify(chosen, given.sample, given.seed, progress=True)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
+    for each in differences:
+        print(each)
+    print(f"{len(chosen)} sweeps, {given.sample} cells of each: {len(differences) or 'no'} differences")
+    return 1 if differences else 0

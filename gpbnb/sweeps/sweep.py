@@ -1,0 +1,272 @@
+"""A sweep: cells computed one by one or on an executor, kept until all are done, then stored as one table.
+
+A cell is a small picklable value, such as a named tuple of a model, a format and a seed, from which its result follows
+on any machine. Finished cells survive an interruption. The same class recomputes a sample of what is stored.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.sweeps.table import Column, Row, Table, read, write
+
+C = TypeVar("C")
+
+ATTEMPTS = 10
+"""How often a chunk is sent again when its worker dies."""
+
+
+class Difference(NamedTuple):
+    """A row that was computed again and does not stand in the stored table: the stored row with its key, if any."""
+
+    cell: str
+    stored: Row | None
+    computed: Row
+
+
+@dataclass(frozen=True)
+class Sweep(Generic[C]):
+    """One stored sweep.
+
+    Parameters
+    ----------
+    name : as in "kalman/year".
+    file : where the table is stored.
+    columns : of the table; the first `key` of them identify a row.
+    key : how many columns identify a row.
+    cells : all cells, in the order of the table.
+    compute : result of a cell, made of lists, dictionaries, texts and numbers; a function that can be pickled. It gets
+        a directory in which a long cell may save its progress, or None.
+    rows : the rows of a cell, from its result.
+    command : computes the sweep again.
+    seed : of all that is drawn.
+    version : changes when results change, so that saved cells of an older version are not used.
+    summary : further rows, from the results of all cells.
+    sample : rows of a cell, or some of them, computed again as a check; by default all of them; the generator
+        may choose.
+    packages : whose versions the provenance names.
+    """
+
+    name: str
+    file: Path
+    columns: tuple[Column, ...]
+    key: int
+    cells: Callable[[], Sequence[C]]
+    compute: Callable[[C, Path | None], Any]
+    rows: Callable[[C, Any], list[Row]]
+    command: str
+    seed: int
+    version: str = "1"
+    summary: Callable[[Sequence[tuple[C, Any]]], list[Row]] | None = None
+    sample: Callable[[C, np.random.Generator], list[Row]] | None = None
+    packages: tuple[str, ...] = ("numpy", "numba", "llvmlite")
+
+    # -- computing --------------------------------------------------------------------------------------
+
+    def run(
+        self,
+        directory: Path,
+        executor: Executor | None = None,
+        *,
+        chunk: int = 1,
+        cells: Sequence[C] | None = None,
+        progress: bool = True,
+    ) -> list[tuple[C, Any]]:
+        """Compute the cells that are not yet saved in a directory; return all, in their order.
+
+        Parameters
+        ----------
+        directory : where finished cells are saved; the same call goes on after an interruption.
+        executor : any of concurrent.futures, or ``Client.get_executor()`` of Dask; by default this process.
+        chunk : how many cells are sent at once.
+        cells : a part of the cells; all by default.
+
+        Raises
+        ------
+        RuntimeError : workers died under one chunk ten times.
+        """
+        if chunk < 1:
+            raise ValueError(f"got chunks of {chunk} cells; needed at least 1")
+        directory.mkdir(parents=True, exist_ok=True)
+        wanted = tuple(self.cells() if cells is None else cells)
+        found = {cell: self._saved(cell, directory) for cell in wanted}
+        missing = [cell for cell in wanted if found[cell] is None]
+        chunks = [tuple(missing[start : start + chunk]) for start in range(0, len(missing), chunk)]
+        done = len(wanted) - len(missing)
+        with tqdm(total=len(wanted), initial=done, desc=self.name, unit="cell", disable=not progress) as bar:
+            for part, results in self._computed(chunks, executor, directory):
+                for cell, (result, seconds) in zip(part, results, strict=True):
+                    found[cell] = self._save(cell, result, seconds, directory)
+                bar.update(len(part))
+        return [(cell, found[cell]["result"]) for cell in wanted]  # type: ignore[index]
+
+    def finished(self, directory: Path) -> list[tuple[C, Any]]:
+        """The cells that are saved in a directory, with their results."""
+        saved = ((cell, self._saved(cell, directory)) for cell in self.cells())
+        return [(cell, each["result"]) for cell, each in saved if each is not None]
+
+    def store(self, results: Sequence[tuple[C, Any]], seconds: float | None = None, file: Path | None = None) -> None:
+        """Write the table of results, with its provenance."""
+        lines = [row for cell, result in results for row in self.rows(cell, result)]
+        if self.summary is not None:
+            lines += self.summary(results)
+        write(file or self.file, self.columns, lines, self.provenance(len(results), seconds))
+
+    def provenance(self, cells: int, seconds: float | None = None) -> dict[str, str]:
+        """Command, seed, machine, versions, and the commit if there is one."""
+        found = {
+            "command": self.command,
+            "seed": str(self.seed),
+            "cells": f"{cells} of {len(self.cells())}",
+            **machine(self.packages),
+        }
+        return found if seconds is None else {**found, "processor seconds": f"{seconds:.0f}"}
+
+    def seconds(self, directory: Path) -> float:
+        """Processor time of all saved cells."""
+        saved = (self._saved(cell, directory) for cell in self.cells())
+        return float(sum(each["seconds"] for each in saved if each is not None))
+
+    # -- reading ----------------------------------------------------------------------------------------
+
+    def load(self, file: Path | None = None) -> Table:
+        """Read the stored table.
+
+        Raises
+        ------
+        DamagedFileError : the file is not as it was written; the message names the line and the cure.
+        """
+        return read(file or self.file, self.columns, self.command)
+
+    def verify(self, count: int, seed: int, progress: bool = False) -> list[Difference]:
+        """Compute a seeded sample of the stored cells again, and compare digit by digit.
+
+        Parameters
+        ----------
+        count : how many cells, all if there are no more.
+        """
+        stored = {row[: self.key]: row for row in self.load().rows}
+        if len(stored) < len(self.load().rows):
+            raise ValueError(f"{self.name}: got rows with one key; needed a key that identifies each row")
+        rng = np.random.default_rng([seed, int.from_bytes(hashlib.sha256(self.name.encode()).digest()[:4])])
+        cells = [cell for cell in self.cells() if self._is_stored(cell, stored)]
+        chosen = [cells[i] for i in sorted(rng.choice(len(cells), min(count, len(cells)), replace=False))]
+        differences = []
+        for cell in tqdm(chosen, desc=self.name, unit="cell", disable=not progress):
+            again = self.rows(cell, self.compute(cell, None)) if self.sample is None else self.sample(cell, rng)
+            if not again:
+                raise ValueError(f"{self.name}: got no rows from {cell}; needed at least one to compare")
+            differences += [
+                Difference(str(cell), stored.get(row[: self.key]), row)
+                for row in again
+                if stored.get(row[: self.key]) != row
+            ]
+        return differences
+
+    def _is_stored(self, cell: C, stored: Mapping[Row, Row]) -> bool:
+        """Whether rows of a cell are stored; a sweep may be stored before all its cells are computed."""
+        names = cell_key(cell)
+        return any(key[: len(names)] == names for key in stored)
+
+    # -- saved cells ------------------------------------------------------------------------------------
+
+    def _path(self, cell: C, directory: Path) -> Path:
+        return directory / f"{hashlib.sha256(repr(cell).encode()).hexdigest()[:20]}.json"
+
+    def _saved(self, cell: C, directory: Path) -> dict[str, Any] | None:
+        file = self._path(cell, directory)
+        if not file.exists():
+            return None
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return found if found["cell"] == repr(cell) and found["version"] == self.version else None
+
+    def _save(self, cell: C, result: Any, seconds: float, directory: Path) -> dict[str, Any]:
+        file = self._path(cell, directory)
+        draft = file.with_suffix(f".{os.getpid()}")
+        made = {"cell": repr(cell), "version": self.version, "seconds": seconds, "result": result}
+        draft.write_text(json.dumps(made), encoding="utf-8")
+        draft.replace(file)
+        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        return found
+
+    # -- executors --------------------------------------------------------------------------------------
+
+    def _computed(
+        self, chunks: Sequence[tuple[C, ...]], executor: Executor | None, directory: Path
+    ) -> Iterator[tuple[tuple[C, ...], list[tuple[Any, float]]]]:
+        if executor is None:
+            for chunk in chunks:
+                yield chunk, _some(self.compute, chunk, directory)
+            return
+        tries = dict.fromkeys(range(len(chunks)), 1)
+        pending: dict[Future[list[tuple[Any, float]]], int] = {
+            executor.submit(_some, self.compute, chunk, directory): number for number, chunk in enumerate(chunks)
+        }
+        while pending:
+            for future in wait(pending, return_when=FIRST_COMPLETED).done:
+                number = pending.pop(future)
+                try:
+                    results = future.result()
+                except Exception as error:
+                    if not _is_of_the_worker(error):
+                        raise
+                    if tries[number] >= ATTEMPTS:
+                        raise RuntimeError(
+                            f"{self.name}: got {ATTEMPTS} workers that died under one chunk of {len(chunks[number])} "
+                            "cells; needed one that lives; give workers more memory, or send smaller chunks"
+                        ) from error
+                    tries[number] += 1
+                    pending[executor.submit(_some, self.compute, chunks[number], directory)] = number
+                else:
+                    yield chunks[number], results
+
+
+def cell_key(cell: Any) -> Row:
+    """The first columns of a cell's rows: its `key`, or nothing."""
+    return tuple(getattr(cell, "key", ()))
+
+
+def _some(compute: Callable[[C, Path | None], Any], chunk: Sequence[C], directory: Path) -> list[tuple[Any, float]]:
+    found = []
+    for cell in chunk:
+        start = time.process_time()
+        result = compute(cell, directory)
+        found.append((result, time.process_time() - start))
+    return found
+
+
+def _is_of_the_worker(error: BaseException) -> bool:
+    """Whether a chunk failed because of where it ran: Dask has its own exceptions, which are not imported for this."""
+    if isinstance(error, BrokenExecutor):
+        return False  # the executor takes nothing more
+    return isinstance(error, CancelledError) or type(error).__module__.partition(".")[0] in ("distributed", "dask")
+
+
+def machine(packages: Sequence[str] = ("numpy", "numba", "llvmlite")) -> dict[str, str]:
+    """System, versions, and the commit if there is one."""
+    here = Path(__file__).parent
+    try:
+        found = subprocess.run(
+            ["git", "-C", str(here), "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=False
+        ).stdout.strip()
+    except OSError:
+        found = ""
+    return {
+        "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+        "versions": ", ".join(f"{name} {metadata.version(name)}" for name in packages),
+        "commit": found or "none",
+    }

@@ -1,0 +1,191 @@
+"""A stored table: a CSV file with its provenance, row count and checksums, checked line by line when it is read.
+
+The file starts with lines ``# key: value``. The last column, ``crc32``, is the checksum of the row number and the row,
+so that damage is found at its line: a changed digit, a lost row and rows in another order alike. ``# sha256`` covers
+everything else.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import math
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+CHECK = "crc32"
+"""Name of the last column."""
+
+Row = tuple[str, ...]
+
+
+class DamagedFileError(ValueError):
+    """A stored file that is not as it was written."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table, and the values that it accepts.
+
+    Parameters
+    ----------
+    name : as in the header.
+    kind : "text", "integer" or "number".
+    low, high : smallest and largest number accepted; NaN never is.
+    choices : the texts accepted; any if empty.
+    optional : whether a cell may be empty.
+    """
+
+    name: str
+    kind: Literal["text", "integer", "number"] = "number"
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    optional: bool = False
+
+    def fault(self, text: str) -> str | None:
+        """Describe what is wrong with a value, or return None."""
+        if not text and self.optional:
+            return None
+        if self.kind == "text":
+            return f"needed one of {', '.join(self.choices)}" if self.choices and text not in self.choices else None
+        try:
+            value = int(text) if self.kind == "integer" else float(text)
+        except ValueError:
+            return "needed an integer" if self.kind == "integer" else "needed a number"
+        return None if self.low <= value <= self.high else f"needed {self.low:g} to {self.high:g}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of text with their columns and their provenance."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    provenance: Mapping[str, str]
+
+    def records(self, **where: str) -> list[dict[str, str]]:
+        """The rows whose columns have these values, each by column name."""
+        names = [column.name for column in self.columns]
+        found = (dict(zip(names, row, strict=True)) for row in self.rows)
+        return [each for each in found if all(each[name] == value for name, value in where.items())]
+
+
+def write(file: Path, columns: Sequence[Column], rows: Iterable[Row], provenance: Mapping[str, str]) -> None:
+    """Write a table; all of it, or nothing.
+
+    Raises
+    ------
+    ValueError : a row that the columns do not accept, or a provenance of several lines.
+    """
+    lines, count = [], 0
+    for number, row in enumerate(rows):
+        fault = _fault(columns, row)
+        if fault:
+            raise ValueError(f"{file.name}, row {number + 1}: {fault}")
+        lines.append(_line((*row, _check(number, row))))
+        count += 1
+    head = {**provenance, "rows": str(count)}
+    for key, value in head.items():
+        if ":" in key or any(ord(c) < 32 for c in key + value) or value != value.strip():
+            raise ValueError(f"got {key!r}: {value!r} as provenance; needed one line of text, and no colon in its name")
+    body = "".join(f"# {key}: {value}\n" for key, value in head.items())
+    body += _line((*(column.name for column in columns), CHECK)) + "".join(lines)
+    digest = hashlib.sha256(body.encode()).hexdigest()
+    draft = file.with_suffix(".draft")
+    draft.write_text(f"# sha256: {digest}\n{body}", encoding="utf-8", newline="")
+    draft.replace(file)
+
+
+def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
+    """Read a table and check all of it.
+
+    Parameters
+    ----------
+    columns : those that the file must have.
+    cure : the command that computes the file again; part of every message.
+
+    Raises
+    ------
+    DamagedFileError : the file is not as it was written; the message names the line and the cure.
+    """
+
+    def damaged(line: int, problem: str) -> DamagedFileError:
+        return DamagedFileError(
+            f"{file.parent.name}/{file.name}, line {line}: {problem}. Restore the file from the repository, or compute "
+            f"it again: {cure}"
+        )
+
+    try:
+        text = file.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise damaged(1, "the file is missing") from None
+    except UnicodeDecodeError as error:
+        raise damaged(1, f"the file is not UTF-8: {error}") from None
+    lines = text.split("\n")
+    provenance: dict[str, str] = {}
+    for number, line in enumerate(lines, 1):
+        if not line.startswith("# "):
+            break
+        key, colon, value = line[2:].partition(": ")
+        if not colon or key in provenance:
+            raise damaged(number, f"got {line!r}; needed '# key: value', each key once")
+        provenance[key] = value
+    start = len(provenance)
+    for key in ("sha256", "rows"):
+        if key not in provenance:
+            raise damaged(start + 1, f"the line '# {key}: …' is missing")
+    header = tuple(column.name for column in columns)
+    if start >= len(lines) or tuple(lines[start].split(",")) != (*header, CHECK):
+        got = lines[start] if start < len(lines) else ""
+        raise damaged(start + 1, f"got the columns {got!r}; needed {','.join((*header, CHECK))!r}")
+    if not provenance["rows"].isdigit():
+        raise damaged(start, f"got {provenance['rows']!r} rows; needed a number")
+    rows, expected = [], int(provenance["rows"])
+    for index, line in enumerate(lines[start + 1 :]):
+        number = start + 2 + index
+        if index == expected:
+            if line or number != len(lines):
+                raise damaged(number, f"the file has more than the {expected} rows that it announces")
+            break
+        if number == len(lines):
+            raise damaged(number, f"the file ends after {index} of {expected} rows")
+        fields = next(csv.reader([line]), [])
+        if len(fields) != len(columns) + 1:
+            raise damaged(number, f"got {len(fields)} fields; needed {len(columns) + 1}")
+        *row, check = fields
+        fault = _fault(columns, row)
+        if fault:
+            raise damaged(number, fault)
+        if check != _check(index, row) or _line(fields) != line + "\n":
+            raise damaged(number, f"the checksum of the row is {_check(index, row)}, not {check}")
+        rows.append(tuple(row))
+    body = text.replace(f"# sha256: {provenance['sha256']}\n", "", 1)
+    digest = hashlib.sha256(body.encode()).hexdigest()
+    if digest != provenance["sha256"]:
+        raise damaged(1, f"the checksum of the file is {digest}, not {provenance['sha256']}: its first lines differ")
+    return Table(tuple(columns), tuple(rows), provenance)
+
+
+def _fault(columns: Sequence[Column], row: Sequence[str]) -> str | None:
+    if len(row) != len(columns):
+        return f"got {len(row)} values; needed {len(columns)}"
+    for column, text in zip(columns, row, strict=True):
+        fault = column.fault(text)
+        if fault:
+            return f"got {column.name} = {text!r}; {fault}"
+    return None
+
+
+def _line(fields: Sequence[str]) -> str:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerow(fields)
+    return text.getvalue()
+
+
+def _check(number: int, row: Sequence[str]) -> str:
+    return f"{zlib.crc32(_line((str(number), *row)).encode()):08x}"

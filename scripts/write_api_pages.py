@@ -1,0 +1,42 @@
+"""Write one page of the API reference for each public module, and remove pages whose module is gone."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = ROOT / "book" / "api"
+
+
+def public_modules() -> dict[str, str]:
+    """Dotted name → first line of the docstring, of each module without an underscore in its name."""
+    found = {}
+    for path in sorted((ROOT / "gpbnb").rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        defines = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in tree.body)
+        if defines and not any(part.startswith("_") for part in parts) and "checks" not in parts:
+            found[".".join(parts)] = (ast.get_docstring(tree) or "").splitlines()[0]
+    return found
+
+
+def page(module: str) -> str:
+    title = module.removeprefix("gpbnb.")
+    return f"# `{title}`\n\n```{{eval-rst}}\n.. automodule:: {module}\n   :members:\n```\n"
+
+
+def main() -> None:
+    PAGES.mkdir(exist_ok=True)
+    modules = public_modules()
+    for old in PAGES.glob("*.md"):
+        if old.stem not in modules:
+            old.unlink()
+    for module in modules:
+        (PAGES / f"{module}.md").write_text(page(module), encoding="utf-8")
+    print(f"{len(modules)} pages in {PAGES.relative_to(ROOT)}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

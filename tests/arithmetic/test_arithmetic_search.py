@@ -1,0 +1,67 @@
+"""gpbnb.arithmetic.search: the smallest precision that qualifies, and what was tried on the way to it."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.search import smallest_precision
+
+
+def among(good, calls=None):
+    """A requirement that the given precisions meet; `calls` lists what was tried."""
+
+    def meets(fmt):
+        if calls is not None:
+            calls.append(fmt.precision)
+        return fmt.precision in good
+
+    return meets
+
+
+@pytest.mark.parametrize("least", [1, 2, 5])
+@pytest.mark.parametrize("largest", [5, 8, 13])
+@pytest.mark.parametrize("monotone", [True, False])
+def test_a_monotone_requirement_is_found_in_every_range(least, largest, monotone):
+    for first in range(least, largest + 2):
+        calls: list[int] = []
+        found = smallest_precision(among(range(first, 99), calls), 2, least=least, largest=largest, monotone=monotone)
+        assert found == (FloatFormat(2, first) if first <= largest else None)
+        assert len(calls) == len(set(calls))
+        assert set(calls) <= set(range(least, largest + 1))
+
+
+def test_a_precision_qualifies_only_if_the_next_one_does_too():
+    assert smallest_precision(among({6, 8, *range(9, 20)}), largest=19).precision == 8
+    assert smallest_precision(among({7, *range(9, 20)}), largest=19).precision == 9
+    assert smallest_precision(among({19}), largest=19).precision == 19  # there is no higher one to try
+    assert smallest_precision(among({10}), largest=19) is None
+
+
+def test_the_neighbours_of_the_answer_are_tried():
+    calls: list[int] = []
+    assert smallest_precision(among(range(11, 99), calls), largest=53).precision == 11
+    assert {10, 11, 12} <= set(calls)
+
+
+def test_the_format_is_passed_on_and_returned():
+    seen = []
+    found = smallest_precision(lambda fmt: seen.append(fmt) or True, 10, Rounding.CHOP, largest=4)
+    assert found == FloatFormat(10, 1, Rounding.CHOP)
+    assert {(f.base, f.rounding) for f in seen} == {(10, Rounding.CHOP)}
+
+
+@pytest.mark.parametrize("base", [2, 3, 10, 16])
+@pytest.mark.parametrize("power", [1, 7, 40, 300])
+def test_without_a_largest_the_range_grows(base, power):
+    bound = Fraction(1, 7**power)
+    found = smallest_precision(lambda fmt: fmt.unit_roundoff <= bound, base, monotone=True)
+    below = Fraction(1) if found.precision == 1 else FloatFormat(base, found.precision - 1).unit_roundoff
+    assert found.unit_roundoff <= bound < below
+
+
+def test_an_empty_range_is_refused():
+    with pytest.raises(ValueError, match="got precisions from 3 to 2"):
+        smallest_precision(lambda fmt: True, least=3, largest=2)

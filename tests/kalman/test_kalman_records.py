@@ -1,0 +1,168 @@
+"""gpbnb.kalman.records: many records through one gain get the digits of single runs, each in its own."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.kalman import threshold
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.records import update_largest
+from gpbnb.kalman.records import Records
+from gpbnb.kalman.threshold import CELLS, FORMS, REFERENCE, STATES, Cell, Years, compute, rows, sample, simulation
+from gpbnb.kalman.year_cases import MODELS, model
+from gpbnb.kalman.year_cases import simulation as year_simulation
+
+STEPS, COUNT = 300, 5
+MEASURED = np.stack([simulation("absolute", record).measurements(STEPS) for record in range(COUNT)], axis=-1)
+
+
+@pytest.mark.parametrize("form", [form for form in Form if form is not Form.UD], ids=str)
+@pytest.mark.parametrize(
+    "fmt",
+    [
+        FloatFormat(2, 24),
+        FloatFormat(2, 33, Rounding.CHOP),
+        FloatFormat(2, 53),
+        FloatFormat(10, 8),
+        FloatFormat(10, 11),
+        None,
+    ],
+    ids=str,
+)
+def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form):
+    told = model(MODELS[0], 10 if fmt is not None and fmt.base == 10 else 2)
+    many = Records(told, fmt, form, COUNT)
+    estimates = np.concatenate([many.carry(MEASURED[:170], 4), many.carry(MEASURED[170:], 4)])
+    for record in range(COUNT):
+        one = Run(told, fmt, form, (1, STEPS))
+        one.take(MEASURED[:, :, record])
+        assert (many.x[:, record] == one.x[:, 0]).all()
+        assert (many.P == one.P).all()
+        first, last = one.checkpoints().x[:, :4].astype(float)
+        # The conversion of a decimal number has an error of one rounding.
+        np.testing.assert_allclose(estimates[[0, -1], :, record], [first, last], rtol=3e-16, atol=0)
+    assert many.steps == STEPS
+    assert len({tuple(each) for each in many.x.reshape(10, COUNT, -1)[:, :, 0].T.tolist()}) == COUNT
+
+
+def test_a_filter_that_stops_leaves_no_numbers():
+    told = model(MODELS[0], 2)
+    many = Records(told, FloatFormat(2, 24), Form.HUNG, 2)
+    measured = MEASURED[:20, :, :2].copy()
+    measured[7, 0, 1] = 2.0**1000
+    before = many.carry(measured[:7], 4)
+    assert np.isfinite(before).all()
+    after = many.carry(measured[7:], 4) if np.isfinite(measured).all() else None
+    assert after is not None
+    largest = np.zeros((4, 2))
+    update_largest(after, np.zeros_like(after), largest)
+    assert (np.isinf(largest) == np.isnan(after).any(axis=0)).all()
+
+
+def test_what_does_not_fit_is_refused():
+    told = model(MODELS[0], 2)
+    with pytest.raises(ValueError, match="any but UD"):
+        Records(told, REFERENCE, Form.UD, 2)
+    with pytest.raises(ValueError, match="at least one record"):
+        Records(told, REFERENCE, Form.HUNG, 0)
+    many = Records(told, REFERENCE, Form.HUNG, 2)
+    with pytest.raises(ValueError, match=r"needed \(steps, 2, 2\)"):
+        many.carry(MEASURED, 4)
+    with pytest.raises(ValueError, match=r"needed \(p, 2, 10\)"):
+        many.use_measurement_matrices(np.zeros((3, 2, 9)))
+
+
+def test_measurement_matrices_may_be_replaced():
+    told = model(MODELS[0], 2)
+    H = told.to_float()["H"]
+    many, other = (Records(told, FloatFormat(2, 30), Form.INNOVATION, COUNT) for _ in range(2))
+    expected = many.carry(MEASURED, 4)
+    assert (len(H) > STEPS) is True
+    other.use_measurement_matrices(H[:STEPS])
+    assert (other.carry(MEASURED, 4) == expected).all()
+    changed = Records(told, FloatFormat(2, 30), Form.INNOVATION, COUNT)
+    changed.use_measurement_matrices(np.zeros_like(H[:1]))  # nothing is measured
+    assert (changed.carry(MEASURED, 4) == 0).all()
+
+
+# -- the sweep ------------------------------------------------------------------------------------
+
+
+def test_record_0_is_the_year_of_one_record():
+    assert (MEASURED[:, :, 0] == year_simulation(MODELS[0]).measurements(STEPS)).all()
+    assert simulation("deviation", 0).start[2:4] == threshold.DEVIATION
+    with pytest.raises(ValueError, match="needed one of absolute, deviation"):
+        simulation("other", 0)
+
+
+SMALL = Cell("deviation", 2, "nearest", "hung", (20, 24), 3, 2)
+
+
+def test_errors_are_those_of_every_step():
+    steps = 5000
+    found = compute(SMALL, steps=steps)
+    for i, precision in enumerate(SMALL.precisions):
+        for j in range(2):
+            z = simulation("deviation", 3 + j).measurements(steps)
+            estimates = []
+            for fmt, form in ((FloatFormat(2, precision), FORMS["hung"]), (REFERENCE, Form.INNOVATION)):
+                run = Run(model(MODELS[0], 2), fmt, form, range(1, steps + 1))
+                run.take(z)
+                estimates.append(run.X[:, :4, 0])
+            error = np.abs(estimates[0] - estimates[1])
+            assert np.array(found["largest"])[i, :, j].tolist() == error.max(axis=0).tolist()
+            assert np.abs(found["end"])[i, :, j].tolist() == error[-1].tolist()
+    assert found["indefinite"] == [0, 0]
+    lines = rows(SMALL, found)
+    assert [line[:6] for line in lines] == [
+        ("deviation", "2", "nearest", "hung", str(t), str(r)) for t in (20, 24) for r in (3, 4)
+    ]
+    assert lines[0][:6] == SMALL.key
+    one = found["largest"][1][2][1], found["largest"][1][3][1]
+    assert lines[3][7] == f"{max(one):.6g}"
+
+
+def test_an_interrupted_cell_goes_on(tmp_path):
+    expected = compute(SMALL, steps=10_000)
+    whole = Years(SMALL, 10_000)
+    whole.go_on()
+    whole.save(tmp_path / "some.npz")
+    again = Years(SMALL, 10_000)
+    again.restore(tmp_path / "some.npz")
+    assert again.block == 1
+    while not again.finished:
+        again.go_on()
+    result = again.result()
+    assert {name: result[name] for name in ("largest", "end")} == {name: expected[name] for name in ("largest", "end")}
+    other = Years(SMALL, 20_000)
+    other.restore(tmp_path / "some.npz")
+    other.restore(tmp_path / "none.npz")
+    assert other.block == 0
+
+
+def test_a_sample_is_one_record_computed_alone(monkeypatch):
+    lines = rows(SMALL, compute(SMALL, steps=3000))
+    monkeypatch.setattr(threshold, "compute", lambda cell: compute(cell, steps=3000))
+    found = {sample(SMALL, np.random.default_rng(seed))[0] for seed in range(20)}
+    assert found == set(lines)
+
+
+def test_the_cells_are_distinct_and_cover_the_threshold():
+    heads = [(*head, cell.first) for cell in CELLS for head in cell.heads()]
+    assert len(set(heads)) == len(heads)
+    nearest = {
+        (states, base): {t for cell in CELLS if (cell.states, cell.base) == (states, base) for t in cell.precisions}
+        for states in STATES
+        for base in (2, 10)
+    }
+    assert nearest["absolute", 2] >= set(range(28, 37))
+    assert nearest["deviation", 2] >= set(range(22, 31))
+    assert nearest["absolute", 10] == nearest["deviation", 10] == {8, 9, 10, 11}
+    assert {cell.rounding for cell in CELLS} == {"nearest", "chop"}
+    assert all(cell.count >= 100 for cell in CELLS)
+    assert dataclasses.replace(SMALL, first=5).key[-1] == "5"

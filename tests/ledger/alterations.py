@@ -1,0 +1,115 @@
+"""Alter the machine-readable form of a statement: each result says something else than the document."""
+
+from __future__ import annotations
+
+import ast
+import copy
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+
+from gpbnb.ledger.formula import Number, Part, Relation, Words
+from gpbnb.ledger.statements import Statement
+
+_OPPOSITE = {ast.LtE: ast.GtE, ast.GtE: ast.LtE, ast.Lt: ast.GtE, ast.Gt: ast.LtE}
+
+
+def altered(statement: Statement) -> Iterator[tuple[str, Statement]]:
+    """Name every alteration of a statement, and make it."""
+    forms = [part.text for part in statement.parts]
+    for i, part in enumerate(statement.parts):
+        for name, text in _of_part(part):
+            yield f"{i + 1} {name}", replace(statement, form="; ".join([*forms[:i], text, *forms[i + 1 :]]))
+
+
+def _of_part(part: Part) -> Iterator[tuple[str, str]]:
+    match part:
+        case Words():
+            for other in part.others:
+                yield f"says {other!r}", f"{part.label}: {other} | {part.printed}"
+        case Number():
+            for name, literal in _of_literal(part.literal):
+                yield name, replace(part, literal=literal).text
+        case Relation():
+            if not any(isinstance(node, ast.Constant) and node.value is Ellipsis for node in ast.walk(part.tree)):
+                yield from _of_relation(part)
+
+
+def _of_literal(literal: str) -> Iterator[tuple[str, str]]:
+    if "/" in literal:
+        value = Fraction(literal)
+        yield "numerator", f"{value.numerator + 1}/{value.denominator}"
+        yield "denominator", f"{value.numerator}/{value.denominator + 1}"
+        yield "sign", f"{-value.numerator}/{value.denominator}"
+        return
+    digits, mark, exponent = literal.lower().partition("e")
+    last = max(i for i, character in enumerate(digits) if character.isdigit())
+    changed = str((int(digits[last]) + 1) % 10)
+    yield "last digit", digits[:last] + changed + digits[last + 1 :] + mark + exponent
+    yield "power of ten", f"{digits}e{int(exponent or 0) + 1}"
+    yield "sign", literal[1:] if literal.startswith("-") else f"-{literal.lstrip('+')}"
+
+
+def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
+    """Signs, coefficients, exponents, indices, dropped terms, digits, and the direction of an inequality."""
+    tree = relation.tree
+    nodes = list(ast.walk(tree))
+    seen = {ast.unparse(tree)}
+    for k, node in enumerate(nodes):
+        for name, change in _of_node(node):
+            new = copy.deepcopy(tree)
+            place = list(ast.walk(new))[k]
+            _substitute(new, place, change)
+            text = ast.unparse(new)
+            if text not in seen:
+                seen.add(text)
+                yield f"{name} at {k}", text
+    if isinstance(tree, ast.Compare) and ast.unparse(tree.comparators[-1]) != "0":
+        new = copy.deepcopy(tree)
+        new.comparators[-1] = ast.BinOp(ast.Constant(2), ast.Mult(), new.comparators[-1])
+        yield "twice the last side", ast.unparse(new)
+
+
+def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
+    match node:
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            yield "sign", ast.BinOp(left, ast.Sub(), right)
+            yield "dropped term", left
+        case ast.BinOp(left=left, op=ast.Sub(), right=right):
+            yield "sign", ast.BinOp(left, ast.Add(), right)
+            yield "dropped term", left
+        case ast.BinOp(left=left, op=ast.Pow(), right=right):
+            yield "exponent", ast.BinOp(left, ast.Pow(), ast.BinOp(right, ast.Add(), ast.Constant(1)))
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            yield "sign", operand
+        case ast.Constant(value=int() | float()):
+            literal = getattr(node, "literal", None) or repr(node.value)
+            name, text = next(_of_literal(literal))
+            yield f"coefficient, {name}", ast.parse(text, mode="eval").body
+        case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Tuple):
+            yield "index", ast.Subscript(value, ast.BinOp(index, ast.Add(), ast.Constant(1)), ast.Load())
+        case ast.Subscript(value=value, slice=ast.Tuple(elts=indices)):
+            for i, index in enumerate(indices):
+                moved = [*indices[:i], ast.BinOp(index, ast.Add(), ast.Constant(1)), *indices[i + 1 :]]
+                yield f"index {i + 1}", ast.Subscript(value, ast.Tuple(moved, ast.Load()), ast.Load())
+        case ast.Compare(left=left, ops=ops, comparators=rights):
+            for i, op in enumerate(ops):
+                if type(op) in _OPPOSITE:
+                    name = "direction" if i == 0 else f"direction {i + 1}"
+                    yield name, ast.Compare(left, [*ops[:i], _OPPOSITE[type(op)](), *ops[i + 1 :]], rights)
+
+
+def _substitute(tree: ast.AST, place: ast.AST, new: ast.AST) -> None:
+    if tree is place:
+        for field in tree._fields:
+            if field in new._fields:
+                setattr(tree, field, getattr(new, field))
+        return
+    for parent in ast.walk(tree):
+        for field, value in ast.iter_fields(parent):
+            if value is place:
+                setattr(parent, field, new)
+                return
+            if isinstance(value, list) and any(item is place for item in value):
+                setattr(parent, field, [new if item is place else item for item in value])
+                return

@@ -1,0 +1,190 @@
+"""gpbnb.ledger.formula: read, evaluate and typeset the machine-readable form of a statement."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+import sympy as sp
+
+from gpbnb.ledger.formula import Link, Number, Relation, Words, read
+
+
+def exact(value):
+    return value
+
+
+def latex(form):
+    (part,) = read(form)
+    return part.latex()
+
+
+def links(form, **names):
+    return Relation(form).links(names, exact)
+
+
+# -- reading --------------------------------------------------------------------------------------
+
+
+def test_a_form_has_relations_numbers_and_words():
+    parts = read("x == 2*y; total: 1.250 mas; ratio: -3/4; verb: grows | shrinks | stays")
+    assert parts == (
+        Relation("x == 2*y"),
+        Number("total", "1.250", "mas"),
+        Number("ratio", "-3/4"),
+        Words("verb", "grows", ("shrinks", "stays")),
+    )
+    assert [part.text for part in parts] == [
+        "x == 2*y",
+        "total: 1.250 mas",
+        "ratio: -3/4",
+        "verb: grows | shrinks | stays",
+    ]
+    assert parts[1].value == Fraction("1.25")
+    assert parts[2].value == Fraction(-3, 4)
+    assert read(" ") == ()
+
+
+@pytest.mark.parametrize(
+    ("form", "message"),
+    [
+        ("verb: grows |", "different phrases"),
+        ("verb: grows | grows", "different phrases"),
+        ("verb: grows", "not a number"),
+        ("x == ", "not a relation"),
+        ("x == {1}", "not a relation"),
+        ("x == (lambda y)", "not a relation"),
+    ],
+)
+def test_a_malformed_part_is_rejected(form, message):
+    with pytest.raises(ValueError, match=message):
+        read(form)
+
+
+# -- evaluation -----------------------------------------------------------------------------------
+
+
+def test_a_chain_has_a_link_for_each_comparison():
+    assert links("a <= b + 1 < 2*c", a=1, b=2, c=5) == (Link(1, "<=", 3), Link(3, "<", 10))
+    assert links("a + b", a=1, b=2) == ()
+
+
+def test_a_missing_name_is_a_symbol():
+    (link,) = Relation("a[i,j](k) == f(x[2]) + 1/2").links({"a": lambda i, j, k: i + j + k})
+    assert link.left == sp.Symbol("i") + sp.Symbol("j") + sp.Symbol("k")
+    assert link.right == sp.Function("f")(sp.Symbol("x[2]")) + sp.Rational(1, 2)
+
+
+def test_numbers_keep_their_printed_digits():
+    (link,) = links("x == .7654e3 + 0.1", x=0)
+    assert link.right == Fraction("765.5")
+    assert isinstance(link.right, Fraction)
+
+
+def test_sums_products_and_largest_values_run_over_their_index():
+    x = {1: 3, 2: -5, 3: 7}
+    assert Relation("Sum(x[j],(j,1,n))").value({"x": x, "n": 3}, exact) == 5
+    assert Relation("Sum(x[j],(j,2,1))").value({"x": x}, exact) == 0
+    assert Relation("Prod(x[j],(j,1,3))").value({"x": x}, exact) == -105
+    assert Relation("Max(abs(x[j]),(j,1,2))").value({"x": x}, exact) == 5
+    assert Relation("Largest(x[j],(j,1,2))").value({"x": x}, exact) == 3
+    n = sp.Symbol("n")
+    assert sp.expand(Relation("Sum(j,(j,1,n))").value() - n * (n + 1) / 2) == 0
+    with pytest.raises(ValueError, match="range of numbers"):
+        Relation("Max(j,(j,1,n))").value()
+    with pytest.raises(ValueError, match="index, first, last"):
+        Relation("Sum(j,n)").value()
+
+
+def test_transposes_inverses_and_matrix_products():
+    a = sp.Matrix([[1, 2], [3, 4]])
+    (link,) = Relation("B == A.T*A.inv").links({"A": a, "B": a.T * a.inv()})
+    assert link.holds
+    assert Relation("A.T").value({"A": 3, "T": lambda inner: inner + 1}) == 4
+
+
+@pytest.mark.parametrize(("v", "value"), [(-2, -1), (0, 0), (2, 1)])
+def test_cases_take_the_only_case_that_holds(v, value):
+    assert Relation("x == cases((0, -1 < v < 1), (1, v >= 1), (-1, v <= -1))").value({"v": v}, exact) == value
+
+
+def test_cases_that_overlap_or_leave_a_gap_are_rejected():
+    with pytest.raises(ValueError, match="2 cases hold"):
+        Relation("cases((0, v < 1), (1, v <= 0))").value({"v": 0}, exact)
+    with pytest.raises(ValueError, match="0 cases hold"):
+        Relation("cases((0, v < 0), (1, v > 0))").value({"v": 0}, exact)
+
+
+def test_the_terms_of_the_last_side():
+    assert Relation("x == a - (b - c) + 2*d").terms({"a": 1, "b": 10, "c": 100, "d": 7}, exact) == (1, -10, 100, 14)
+    assert Relation(".5e1").terms({}, exact) == (5,)
+
+
+def test_the_sides_of_a_chain():
+    assert [side.text for side in Relation("a == .50e1 ≈ c + d").sides] == ["a", ".50e1", "c + d"]
+    assert [side.text for side in Relation("a + b").sides] == ["a + b"]
+
+
+@pytest.mark.parametrize(
+    ("link", "holds"),
+    [
+        (Link(1, "<=", 1), True),
+        (Link(1, "<", 1), False),
+        (Link(2, ">=", 3), False),
+        (Link(sp.Symbol("x") * 2, "==", sp.Symbol("x") + sp.Symbol("x")), True),
+        (Link(sp.Symbol("x"), "==", sp.Symbol("y")), False),
+        (Link(sp.Matrix([1, 2]), "==", sp.Matrix([1, 2])), True),
+        (Link(sp.Matrix([1, 2]), "==", sp.Matrix([1, 3])), False),
+        (Link(sp.sin(sp.Symbol("x")) ** 2, "==", 1 - sp.cos(sp.Symbol("x")) ** 2), True),
+    ],
+)
+def test_whether_a_link_holds(link, holds):
+    assert link.holds is holds
+
+
+def test_the_check_decides_what_is_approximately_equal():
+    (link,) = links("x ≈ y", x=1, y=2)
+    assert link.symbol == "≈"
+    with pytest.raises(ValueError, match="in the check"):
+        _ = link.holds
+
+
+def test_dots_have_no_value():
+    with pytest.raises(ValueError, match="cannot be evaluated"):
+        Relation("a + ... + b").value()
+
+
+# -- typesetting ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("form", "typeset"),
+    [
+        ("x_hat == x*(1+epsilon)", r"\hat x=x\left(1+\epsilon\right)"),
+        ("abs(Q_tilde/Q) <= (n+m-1)*beta", r"\left|\frac{\tilde Q}{Q}\right|\le \left(n+m-1\right)\beta"),
+        ("lamda_max < Deltaphi_2", r"\lambda_{\text{max}}<\Delta \phi_{2}"),
+        ("x == .7654e3 + (-.56e-5)", r"x=.7654\times10^{3}+\left(-.56\times10^{-5}\right)"),
+        ("x[i,j] == P[k-1].inv", r"x_{ij}=P_{k-1}^{-1}"),
+        ("a - (b - c)", r"a-\left(b-c\right)"),
+        ("s == Sum(x[j],(j,1,n))", r"s=\sum_{j=1}^{n}x_{j}"),
+        (
+            "norm(A) == Max(Sum(abs(a[i,j]),(i,1,m)),(j,1,n))",
+            r"\left\|A\right\|=\max_{j}\sum_{i=1}^{m}\left|a_{ij}\right|",
+        ),
+        ("Largest(abs(x[j]/s),(j,1,n))", r"\left|\frac{x_{j}}{s}\right|_{\max}"),
+        ("a ≈ b", r"a\approx b"),
+        ("s == group(a + b) + c", r"s=\left(a+b\right)+c"),
+        ("bracket(C) <= D", r"\left[C\right]\le D"),
+        ("fl(op(x, y))", r"fl\left(x*y\right)"),
+        ("x == cases((u, v < 1), (w, v >= 1))", r"x=\begin{cases}u & \text{if }v<1\\ w & \text{if }v\ge 1\end{cases}"),
+        ("M[1]*...*M[n]", r"M_{1}\cdots\,M_{n}"),
+    ],
+)
+def test_a_relation_is_typeset(form, typeset):
+    assert latex(form).replace(" ", "") == typeset.replace(" ", "")
+
+
+def test_numbers_and_words_are_shown_as_printed():
+    number, words = read("total: .1250e-3 mas; verb: $a$ grows | shrinks")
+    assert number.markdown() == r"$.1250\times10^{-3}\ \text{mas}$"
+    assert words.markdown() == "$a$ grows"

@@ -1,0 +1,186 @@
+"""gpbnb.sweeps.sweep: a sweep gives the same on every executor, goes on after an interruption and verifies itself."""
+
+from __future__ import annotations
+
+import dataclasses
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from distributed import Client, KilledWorker, LocalCluster
+
+from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
+from gpbnb.sweeps.stored import run, verify
+from gpbnb.sweeps.sweep import ATTEMPTS
+
+
+class Cell(NamedTuple):
+    name: str
+    seed: int
+
+    @property
+    def key(self):
+        return self.name, str(self.seed)
+
+
+CELLS = tuple(Cell(name, seed) for name in ("first", "second") for seed in range(5))
+COLUMNS = (Column("name", "text"), Column("seed", "integer"), Column("part", "text"), Column("value"))
+
+
+def compute(cell, directory):
+    return np.random.default_rng([cell.seed, len(cell.name)]).standard_normal(3).tolist()
+
+
+def rows(cell, result):
+    return [(*cell.key, str(part), f"{value:.6g}") for part, value in enumerate(result)]
+
+
+def total(results):
+    return [("all", "0", "all", f"{sum(sum(result) for _, result in results):.6g}")]
+
+
+@pytest.fixture
+def sweep(tmp_path):
+    return Sweep("tests/normal", tmp_path / "normal.csv", COLUMNS, 3, lambda: CELLS, compute, rows, "make it", 7)
+
+
+EXPECTED = [(cell, compute(cell, None)) for cell in CELLS]
+
+
+@pytest.mark.parametrize("chunk", [1, 3, 100])
+def test_the_result_does_not_depend_on_the_executor(sweep, tmp_path, chunk):
+    assert sweep.run(tmp_path / "serial", chunk=chunk, progress=False) == EXPECTED
+    with ThreadPoolExecutor(2) as pool:
+        assert sweep.run(tmp_path / "threads", pool, chunk=chunk, progress=False) == EXPECTED
+
+
+def test_processes_give_the_same(sweep, tmp_path):
+    # A forked process may inherit locks that threads of this one hold.
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        assert sweep.run(tmp_path / "processes", pool, chunk=5, progress=False) == EXPECTED
+
+
+def test_dask_gives_the_same(sweep, tmp_path):
+    with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster, Client(cluster) as client:
+        assert sweep.run(tmp_path / "dask", client.get_executor(), chunk=4, progress=False) == EXPECTED
+
+
+def test_finished_cells_are_not_computed_again(sweep, tmp_path):
+    seen = []
+
+    def interrupted(cell, directory):
+        if len(seen) == 4:
+            raise KeyboardInterrupt
+        seen.append(cell)
+        return compute(cell, directory)
+
+    with pytest.raises(KeyboardInterrupt):
+        dataclasses.replace(sweep, compute=interrupted).run(tmp_path / "some", progress=False)
+    assert sweep.finished(tmp_path / "some") == EXPECTED[:4]
+    assert sweep.seconds(tmp_path / "some") >= 0
+
+    def rest(cell, directory):
+        seen.append(cell)
+        return compute(cell, directory)
+
+    assert dataclasses.replace(sweep, compute=rest).run(tmp_path / "some", progress=False) == EXPECTED
+    assert tuple(seen) == CELLS
+    newer = dataclasses.replace(sweep, version="2")
+    assert newer.finished(tmp_path / "some") == []
+
+
+class Failing(Executor):
+    """Fails with given exceptions first, then works."""
+
+    def __init__(self, *errors):
+        self.errors, self.sent = list(errors), 0
+
+    def submit(self, function, /, *arguments):
+        self.sent += 1
+        future = Future()
+        if self.errors:
+            future.set_exception(self.errors.pop(0))
+        else:
+            future.set_result(function(*arguments))
+        return future
+
+
+def test_chunks_of_dead_workers_are_sent_again(sweep, tmp_path):
+    failing = Failing(*[KilledWorker("some", None, 3)] * 3)
+    assert sweep.run(tmp_path / "some", failing, chunk=5, progress=False) == EXPECTED
+    assert failing.sent == 5
+    with pytest.raises(RuntimeError, match=f"got {ATTEMPTS} workers that died under one chunk of 10 cells"):
+        sweep.run(tmp_path / "none", Failing(*[KilledWorker("some", None, 3)] * 20), chunk=10, progress=False)
+    for error in (BrokenProcessPool(), ValueError("of the computation")):
+        with pytest.raises(type(error)):
+            sweep.run(tmp_path / "none", Failing(error), chunk=10, progress=False)
+    with pytest.raises(ValueError, match="got chunks of 0 cells"):
+        sweep.run(tmp_path / "none", chunk=0)
+
+
+def test_what_is_stored_has_its_provenance(sweep):
+    whole = dataclasses.replace(sweep, summary=total)
+    whole.store(EXPECTED, 12.3)
+    table = whole.load()
+    assert len(table.rows) == 31
+    assert table.rows[-1] == total(EXPECTED)[0]
+    assert table.provenance["command"] == "make it"
+    assert table.provenance["seed"] == "7"
+    assert table.provenance["cells"] == "10 of 10"
+    assert table.provenance["processor seconds"] == "12"
+    assert table.provenance["versions"].startswith("numpy ")
+    assert {"machine", "commit", "sha256"} < set(table.provenance)
+
+
+def test_a_sample_of_what_is_stored_is_verified(sweep):
+    sweep.store(EXPECTED)
+    assert sweep.verify(4, seed=1) == []
+    assert sweep.verify(100, seed=1) == []
+    table = read(sweep.file, COLUMNS, "")
+    # A careless rewrite: a wrong digit under a right checksum.
+    for place in (0, 14, 29):
+        changed = list(table.rows)
+        changed[place] = (*changed[place][:3], "0.123")
+        write(sweep.file, COLUMNS, changed, {"command": "make it"})
+        (difference,) = sweep.verify(10, seed=1)
+        assert difference.stored == changed[place]
+        assert difference.computed == table.rows[place]
+        found = [bool(sweep.verify(4, seed)) for seed in range(8)]
+        assert True in found
+        assert False in found  # not all cells are computed
+        assert len(verify([sweep, sweep], 10, 1)) == 2
+
+
+def test_a_part_of_the_cells_may_be_stored(sweep):
+    sweep.store(EXPECTED[3:5])
+    assert sweep.load().provenance["cells"] == "2 of 10"
+    assert sweep.verify(10, seed=1) == []
+    with pytest.raises(ValueError, match="needed a key that identifies each row"):
+        dataclasses.replace(sweep, key=2).verify(1, seed=1)
+    with pytest.raises(ValueError, match="got no rows"):
+        dataclasses.replace(sweep, sample=lambda cell, rng: []).verify(1, seed=1)
+
+
+def test_the_command_reports(sweep, capsys):
+    sweep.store(EXPECTED)
+    assert run([sweep], ["verify", "--sample", "2", "--seed", "5"]) == 0
+    assert "1 sweeps, 2 cells of each: no differences" in capsys.readouterr().out
+    assert run([sweep], ["list"]) == 0
+    assert "tests/normal: command make it; seed 7; cells 10 of 10" in capsys.readouterr().out
+    with pytest.raises(SystemExit):
+        run([sweep], ["verify", "tests/other"])
+    with pytest.raises(SystemExit):
+        run([sweep], ["verify", "--sample", "0"])
+    capsys.readouterr()
+    changed = [(*row[:3], "0.5") for row in sweep.load().rows]
+    write(sweep.file, COLUMNS, changed, {})
+    assert run([sweep], ["verify"]) == 1
+    assert "computed ('" in capsys.readouterr().out
+    sweep.file.write_bytes(sweep.file.read_bytes()[:-20])
+    assert run([sweep], ["verify"]) == 1
+    assert "rows" in capsys.readouterr().err
+    with pytest.raises(DamagedFileError):
+        sweep.load()

@@ -1,0 +1,122 @@
+"""gpbnb.sweeps.table: what is written is read again, and damage is reported with its line and its cure."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from gpbnb.sweeps import Column, DamagedFileError, read, write
+
+COLUMNS = (
+    Column("kind", "text", choices=("a", "b, c")),
+    Column("seed", "integer", 0, 99),
+    Column("error", low=0, high=1e6),
+    Column("note", "text", optional=True),
+    Column("limit", low=0, optional=True),
+)
+ROWS = tuple(("a" if i % 2 else "b, c", str(i), f"{i / 7:.6g}", "", "inf" if i == 3 else "") for i in range(45))
+CURE = "python -m something"
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "year.csv"
+    write(path, COLUMNS, ROWS, {"command": CURE, "seed": "3"})
+    return path
+
+
+def test_what_is_written_is_read(file):
+    table = read(file, COLUMNS, CURE)
+    assert table.rows == ROWS
+    assert {key: table.provenance[key] for key in ("command", "seed", "rows")} == {
+        "command": CURE,
+        "seed": "3",
+        "rows": "45",
+    }
+    assert table.records(seed="3") == [{"kind": "a", "seed": "3", "error": "0.428571", "note": "", "limit": "inf"}]
+    assert len(table.records(kind="a")) == 22
+
+
+def test_every_changed_character_is_found_at_its_line(file):
+    text = file.read_bytes()
+    for place in range(len(text)):
+        changed = bytearray(text)
+        changed[place] = ord("7") if changed[place] != ord("7") else ord("8")
+        file.write_bytes(changed)
+        with pytest.raises(DamagedFileError) as found:
+            read(file, COLUMNS, CURE)
+        message = str(found.value)
+        assert message.endswith(f"compute it again: {CURE}")
+        line = text[:place].count(b"\n") + 1
+        # A line break that is gone joins two lines; what the first five lines announce may fail anywhere.
+        if line > 5:
+            assert f"line {line}:" in message or f"line {line + 1}:" in message, message
+
+
+def test_every_lost_end_is_found(file):
+    text = file.read_bytes()
+    for length in range(len(text)):
+        file.write_bytes(text[:length])
+        with pytest.raises(DamagedFileError):
+            read(file, COLUMNS, CURE)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda lines: [*lines[:28], ""], "line 29: the file ends after 23 of 45 rows"),
+        (lambda lines: lines[:9] + lines[10:], "line 10: the checksum of the row is"),
+        (lambda lines: [*lines[:9], lines[10], lines[9], *lines[11:]], "line 10: the checksum"),
+        (lambda lines: [*lines[:-1], lines[-2], ""], "line 51: the file has more than the 45 rows"),
+        (lambda lines: [*lines[:7], lines[7].replace(",", ";"), *lines[8:]], "line 8: got 1 fields; needed 6"),
+        (lambda lines: [line for line in lines if "sha256" not in line], "the line '# sha256: …' is missing"),
+        (lambda lines: [line for line in lines if "rows" not in line], "the line '# rows: …' is missing"),
+        (lambda lines: [lines[0], lines[0], *lines[1:]], "line 2: .* each key once"),
+        (lambda lines: [line.replace("# seed: 3", "# seed: 4") for line in lines], "line 1: the checksum of the file"),
+        (lambda lines: [line.replace("kind,seed", "seed,kind") for line in lines], "line 5: got the columns"),
+        (lambda lines: [], "line 1: the line '# sha256: …' is missing"),
+    ],
+)
+def test_damage_is_described(file, change, message):
+    file.write_bytes("\n".join(change(file.read_text(encoding="utf-8").split("\n"))).encode())
+    with pytest.raises(DamagedFileError, match=message):
+        read(file, COLUMNS, CURE)
+
+
+def test_a_missing_and_a_foreign_file_are_reported(tmp_path):
+    with pytest.raises(DamagedFileError, match=r"csv, line 1: the file is missing. Restore .* python -m something"):
+        read(tmp_path / "year.csv", COLUMNS, CURE)
+    (tmp_path / "year.csv").write_bytes(b"\xff\xfe")
+    with pytest.raises(DamagedFileError, match="not UTF-8"):
+        read(tmp_path / "year.csv", COLUMNS, CURE)
+
+
+@pytest.mark.parametrize(
+    ("column", "text", "fault"),
+    [
+        (COLUMNS[0], "c", "needed one of a, b, c"),
+        (COLUMNS[1], "100", "needed 0 to 99"),
+        (COLUMNS[1], "1.0", "needed an integer"),
+        (COLUMNS[2], "-0.1", "needed 0 to 1e"),
+        (COLUMNS[2], "nan", "needed 0 to 1e"),
+        (COLUMNS[2], "", "needed a number"),
+        (COLUMNS[2], "one", "needed a number"),
+    ],
+)
+def test_values_out_of_range_are_neither_written_nor_read(tmp_path, column, text, fault):
+    path = tmp_path / "year.csv"
+    write(path, [Column(column.name, "text")], [(text,)], {})
+    with pytest.raises(DamagedFileError, match=rf"line 4: got {column.name} = .*{fault}"):
+        read(path, [column], CURE)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=f"row 1: got {column.name} = .*{fault}"):
+        write(path, [column], [(text,)], {})
+    assert path.read_bytes() == before
+
+
+def test_provenance_is_one_line_each(tmp_path):
+    for bad in ({"a": "1\n2"}, {"a: b": "1"}, {"a": " 1"}):
+        with pytest.raises(ValueError, match="needed one line of text"):
+            write(tmp_path / "year.csv", COLUMNS, ROWS, bad)
+    assert math.isinf(Column("any").high)

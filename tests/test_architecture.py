@@ -1,0 +1,122 @@
+"""The structure of the package: imports point down, names stay private, files stay short."""
+
+import ast
+import graphlib
+from pathlib import Path
+
+import grimp
+import pytest
+
+import gpbnb
+
+ROOT = Path(gpbnb.__file__).parent
+LONGEST_FILE = 500
+TOPICS = ("rounding", "inversion", "kalman", "rolling", "integration", "budget", "geometry")
+LAYERS = (
+    ("arithmetic",),
+    ("display", "measurement", "sweeps"),
+    TOPICS,
+    ("wordlength", "calculators"),
+    ("ledger",),
+)
+LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
+FILES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in sorted(ROOT.rglob("*.py"))}
+TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
+
+
+def room(module):
+    """The sub-package or module of gpbnb that a module belongs to; empty for the package itself."""
+    return module.split(".")[1] if "." in module else ""
+
+
+@pytest.fixture(scope="module")
+def imports():
+    """The modules that each module imports, at its top or within its functions; imports for types alone left out."""
+    graph = grimp.build_graph("gpbnb", exclude_type_checking_imports=True, cache_dir=None)
+    return {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+
+
+def test_every_room_has_its_level():
+    assert {room(name) for name in FILES} - {"__init__", "__main__"} <= set(LEVEL)
+
+
+def test_imports_point_down(imports):
+    up = [
+        (module, imported)
+        for module, found in imports.items()
+        for imported in found
+        if room(module) in LEVEL and LEVEL[room(imported)] > LEVEL[room(module)]
+    ]
+    assert up == []
+
+
+def test_topics_do_not_import_each_other(imports):
+    across = [
+        (module, imported)
+        for module, found in imports.items()
+        for imported in found
+        if room(module) in TOPICS and room(imported) in TOPICS and room(module) != room(imported)
+    ]
+    assert across == []
+
+
+def test_no_module_imports_itself_over_others(imports):
+    try:
+        graphlib.TopologicalSorter(imports).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(f"import cycle: {' <- '.join(error.args[1])}")
+
+
+def test_theory_does_not_know_the_experiment(imports):
+    assert [m for m, found in imports.items() if m.endswith(".theory") and any("experiment" in i for i in found)] == []
+
+
+def names_used(tree):
+    """Private names that a module takes from somewhere: attributes and imports."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            yield node.attr
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gpbnb"):
+            yield from (alias.name for alias in node.names)
+
+
+def names_defined(tree):
+    """Names that a module defines, at its top, in its classes, or on ``self``."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.id if isinstance(node, ast.Name) else node.attr
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield node.value  # __slots__
+
+
+EXTERNAL = {"_asdict", "_fields", "_make", "_mpf_", "_print", "_replace", "_repr_html_", "_repr_markdown_"}
+"""Protocols of other libraries whose names begin with an underscore."""
+
+
+def test_private_names_stay_in_their_module():
+    outside = {
+        module: found
+        for module, tree in TREES.items()
+        if (
+            found := {name for name in names_used(tree) if name.startswith("_") and not name.endswith("__")}
+            - set(names_defined(tree))
+            - EXTERNAL
+        )
+    }
+    assert outside == {}
+
+
+def test_nothing_is_imported_by_string():
+    called = {
+        module: {ast.unparse(node.func).split(".")[-1] for node in ast.walk(tree) if isinstance(node, ast.Call)}
+        for module, tree in TREES.items()
+    }
+    forbidden = {"import_module", "__import__", "exec", "eval"}
+    assert [module for module, names in called.items() if names & forbidden] == ["gpbnb.__init__"]
+
+
+def test_files_are_as_long_as_their_subject():
+    lengths = {module: len(path.read_text(encoding="utf-8").splitlines()) for module, path in FILES.items()}
+    assert {module: length for module, length in lengths.items() if length > LONGEST_FILE} == {}
