@@ -18,10 +18,10 @@ from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
-from gpbnb.kalman.experiment import _widened as widened
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
 from gpbnb.kalman.guarantee.gains import Schedule, pack
 from gpbnb.kalman.guarantee.program import execute
+from gpbnb.kalman.kernels.bounded import widened
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.experiment import Form
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.envelope import (
     GAIN,
     LOOP,
@@ -110,7 +110,7 @@ def guarantee(
     model: LinearModel,
     fmt: FloatFormat,
     within: Limits,
-    form: Form = Form.USUAL,
+    form: Form = Form.INNOVATION,
     most: int = 20_000,
     horizon: int = 1_000,
 ) -> Guarantee:
@@ -184,6 +184,11 @@ def _disturbances(
     )
 
 
+def disturbances_of(found: Guarantee) -> Disturbances:
+    """Closed loops and disturbances behind a guarantee that holds for ever."""
+    return _disturbances(found.schedule, found.limits, found.bound)
+
+
 def _parts_of(given: Schedule) -> NDArray[np.int64]:
     """Which part of a bound each column of the disturbances belongs to."""
     n, m, groups = given.program.n, given.program.m, len(given.program.roots)
@@ -246,7 +251,7 @@ def _sums(
     early = given.first + lags if given.first else 0  # without a beginning of its own, sums of fewer terms
     history, parts, _ = transient(*arrays, given.first, early, most, _gap(given, early, lags), scale, small)
     largest = np.maximum(b, history.max(axis=0, initial=0.0))
-    rows, row_parts = [], []
+    rows, row_parts = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _ in range(200):  # the error of the last steps is carried on: raise the bound until it bounds itself
         rows, row_parts = [], []
         for certificate in sums:

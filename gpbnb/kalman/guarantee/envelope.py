@@ -84,7 +84,9 @@ def _is_power(units: Any, high: float, low: float) -> bool:
         return True
     sign = 1.0 if high > 0 else -1.0
     at = np.searchsorted(units.exact[:, 0], sign * high)
-    return at < len(units.exact) and units.exact[at, 0] == sign * high and units.exact[at, 1] == sign * low
+    if at >= len(units.exact):
+        return False
+    return bool(units.exact[at, 0] == sign * high and units.exact[at, 1] == sign * low)
 
 
 class Limits(NamedTuple):

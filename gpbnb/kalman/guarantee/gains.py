@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product, product_by_sparse
+from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
-from gpbnb.kalman.experiment import Followed, Form, Run
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.program import Program, innovation_program, loop_program, sequential_program
 from gpbnb.kalman.model import LinearModel
 
@@ -95,7 +97,8 @@ def schedule(model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_00
 
     Parameters
     ----------
-    model, fmt, form : as for a run of the filter; the exact filter has model and measurements as the format stores them.
+    model, fmt, form : as for a run of the filter. The exact filter has model and measurements as the format stores
+        them.
     most : steps to try.
 
     Raises
@@ -174,7 +177,7 @@ def packed_coefficients(
         """Entries of the matrix of each step, a row a step."""
         return matrices[rows].reshape(len(rows), -1, *tail)
 
-    if form in (Form.REPORT, Form.SECOND):
+    if form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
         F = np.empty((last, n, n, *tail), K.dtype)
         _stored_loops(run.tag, K, H, Phi, identity, F)
         return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
@@ -263,8 +266,8 @@ def _exact_gains(
     return K, run.bounds[1], False, len(K)
 
 
-def _followed(stored: LinearModel, steps: int) -> Followed:
-    run = Followed(stored, None, Form.USUAL, range(1, steps + 1))
+def _followed(stored: LinearModel, steps: int) -> BoundedRun:
+    run = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     run.take(np.zeros((steps, stored.m)))
     if run.stopped:
         raise ArithmeticError(f"{stored.name}: the exact filter stopped at step {run.stopped}; scale the model")
@@ -272,11 +275,11 @@ def _followed(stored: LinearModel, steps: int) -> Followed:
 
 
 def _closes(
-    stored: LinearModel, run: Followed, first: int, period: int, larger: float, most: int
-) -> tuple[Followed, NDArray[np.float64]] | None:
+    stored: LinearModel, run: BoundedRun, first: int, period: int, larger: float, most: int
+) -> tuple[BoundedRun, NDArray[np.float64]] | None:
     """Follow one more period from a distance that is to be invariant; the longer run and its bounds, or None."""
     steps = run.steps + period
-    longer = Followed(stored, None, Form.USUAL, range(1, steps + 1))
+    longer = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     longer.take(np.zeros((run.steps, stored.m)))
     begin, P_begin = longer.bound, _symmetric(longer)
     weights = arb_mat([[arb(float(a)) for a in row] for row in begin.L])
@@ -295,12 +298,12 @@ def _closes(
     return (longer, longer.bounds[1]) if total <= arb(float(trial)) else None
 
 
-def _symmetric(run: Followed) -> NDArray[Any]:
+def _symmetric(run: BoundedRun) -> NDArray[Any]:
     P = run.exactly(run.P)
     return np.asarray((P + P.T) / 2)
 
 
-def _symmetric_of(run: Followed, row: int) -> NDArray[Any]:
+def _symmetric_of(run: BoundedRun, row: int) -> NDArray[Any]:
     P = run.exactly(run.C[row])
     return np.asarray((P + P.T) / 2)
 

@@ -1,8 +1,8 @@
 r"""Linear filters and controllers with fixed coefficients: the case without a covariance.
 
-A filter :math:`x_k = Ax_{k-1} + Bz_k,\ y_k = Cx_{k-1} + Dz_k` has its coefficients from the start, so that the guarantee
-needs no emulation of a gain. Its outputs become states that nothing else uses. The exact filter has the same stored
-coefficients: the bound is on what rounding in the computation does.
+A filter :math:`x_k = Ax_{k-1} + Bz_k,\ y_k = Cx_{k-1} + Dz_k` has its coefficients from the start, so that the
+guarantee needs no emulation of a gain. Its outputs become states that nothing else uses. The exact filter has the same
+stored coefficients: the bound is on what rounding in the computation does.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.bounds import exact
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.guarantee.gains import Schedule, pack, widened_array
 from gpbnb.kalman.guarantee.program import (
     Program,
