@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +13,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee import derivation
 from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import disturbances_of, from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
@@ -28,6 +27,7 @@ from gpbnb.kalman.guarantee.program import (
     sequential_program,
     steps_in_python,
 )
+from gpbnb.kalman.guarantee.published import fixif_longitudinal
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 
@@ -313,7 +313,7 @@ def test_a_second_order_section(fmt: FloatFormat) -> None:
 
 def test_published_error_coefficients() -> None:
     """All printed digits of FixIF's example."""
-    models = json.loads((Path(__file__).parent.parent / "models" / "fixif_longitudinal.json").read_text())
+    models = fixif_longitudinal()
     found = error_coefficients(models["A"], models["B"], models["C"], models["D"], models["input_bound"])
     assert [round(float(e), 6) for e in found] == models["published_E"]
 
@@ -339,7 +339,7 @@ def test_the_smallest_precision_by_guarantee_and_by_probable_error() -> None:
 
 
 def test_the_probable_error_is_that_of_independent_roundings() -> None:
-    """Against a simulation of the same noise: within four standard errors of a variance of 4000 steps, correlated 20."""
+    """Against a simulation of the same noise: to four standard errors, with noise correlated over 20 steps."""
     found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
     each, rng = disturbances_of(found), np.random.default_rng(6)
     program = found.schedule.program
@@ -351,3 +351,9 @@ def test_the_probable_error_is_that_of_independent_roundings() -> None:
         e = F @ e + G @ (h[:, None] / count[:, None] * noise)
         total += (e**2).mean(axis=1) / steps if k >= steps else 0
     assert np.allclose(np.sqrt(total), probable_error(found), rtol=4 * np.sqrt(2 * 20 / (200 * steps)))
+
+
+@pytest.mark.parametrize("name", ["recursion", "telescope", "induction"])
+def test_the_algebra(name: str) -> None:
+    for step in getattr(derivation, name)().steps:
+        assert step.holds, step.name

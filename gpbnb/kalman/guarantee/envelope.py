@@ -23,6 +23,7 @@ Everything is float64. Each sum of terms of one sign is enlarged by more than it
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -54,6 +55,7 @@ class Units(NamedTuple):
     exact: NDArray[np.float64]
 
 
+@lru_cache(maxsize=64)
 def units(fmt: FloatFormat) -> Units:
     """Tables of :class:`Units` for a format."""
     most = int(850 / np.log2(fmt.base))

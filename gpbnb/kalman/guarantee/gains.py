@@ -7,6 +7,7 @@ repeats as well: a proof by exhaustion.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -116,7 +117,9 @@ def schedule(model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_00
         why = f"the computed gain did not settle within {run.steps} steps"
     else:
         why = ""
-    end = (bad - 1) if bad else run.steps if repeat is None or period is None else repeat + period
+    end = max(bad - bool(run.stopped), 0) if bad else run.steps if repeat is None or period is None else repeat + period
+    if end == 0:
+        raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed: {why}")
     if repeat is None or period is None or why:
         K, dK, settled, first = _exact_gains(stored, end, None, most, fmt)[:4]
         repeat = period = None
@@ -312,12 +315,17 @@ def _distance(inverse: Any, change: NDArray[Any]) -> float:
     """Upper bound of the norm of a change of the covariance in the units of the weights, float64."""
     D = arb_mat([[arb(a.numerator) / arb(a.denominator) for a in row] for row in change])
     X = inverse * D * inverse.transpose()
-    return _upper(sum((x * x for x in X.entries()), arb(0)).sqrt())
+    return _upper(_norm(X.entries()))
 
 
 def _frobenius_to_identity(X: Any) -> Any:
     n = X.nrows()
-    return sum(((X[i, j] - int(i == j)) ** 2 for i in range(n) for j in range(n)), arb(0)).sqrt()
+    return _norm(X[i, j] - int(i == j) for i in range(n) for j in range(n))
+
+
+def _norm(balls: Iterable[Any]) -> Any:
+    """Upper bound of the root of the sum of squares; a ball around zero has no square root of its own."""
+    return sum((arb(x.abs_upper()) ** 2 for x in balls), arb(0)).sqrt()
 
 
 def _upper(x: Any) -> float:
