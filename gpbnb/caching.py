@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import IO
+
+try:
+    import fcntl
+except ImportError:  # Windows: processes do not wait for each other there
+    fcntl = None  # type: ignore[assignment]
 
 PACKAGE = Path(__file__).resolve().parent
 """The folder of the package."""
+
+_NO_DATA = (".py", ".pyc", ".tmp", ".lock")
+_IMPORTED = time.time()
+_KEPT = 30 * 24 * 3600.0  # seconds after the last use
 
 _IMPORT = re.compile(
     rb"""^[ \t]*(?: from [ \t]+ (?P<module>[\w.]+) [ \t]+ import [ \t]* (?P<names>\([^)]*\)|[^\n]*)
@@ -79,6 +91,66 @@ def _user() -> str:
     return str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
 
 
+def remove_unused(folder: Path) -> None:
+    """Remove the files of a folder that nobody has used for a month; who uses one, touches it."""
+    with contextlib.suppress(OSError):
+        for file in folder.iterdir():
+            if file.is_file() and time.time() - file.stat().st_mtime > _KEPT:
+                file.unlink(missing_ok=True)
+
+
+def lock(path: Path, longest_wait: float) -> IO[bytes] | None:
+    """Wait until no other process holds the lock of a file, and hold it; :func:`unlock` gives it back.
+
+    Parameters
+    ----------
+    path : the file; the lock is a file beside it.
+    longest_wait : seconds, after which to go on without the lock.
+
+    Returns
+    -------
+    held : None where there are no locks, or where the wait was too long.
+    """
+    if fcntl is None:
+        return None
+    try:
+        held = _beside(path).open("wb")
+    except OSError:
+        return None
+    began = time.monotonic()
+    while True:
+        try:
+            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            if time.monotonic() - began > longest_wait:
+                held.close()
+                return None
+            time.sleep(0.05)
+        else:
+            return held
+
+
+def unlock(path: Path, held: IO[bytes] | None) -> None:
+    """Give back a lock of a file."""
+    if held is not None:
+        _beside(path).unlink(missing_ok=True)
+        held.close()
+
+
+@contextlib.contextmanager
+def locked(path: Path, longest_wait: float) -> Iterator[None]:
+    """Hold the lock of a file, as by :func:`lock`."""
+    held = lock(path, longest_wait)
+    try:
+        yield
+    finally:
+        unlock(path, held)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f"{path.name}.lock")
+
+
 def digest(paths: Iterable[Path]) -> str:
     """Digest the names and contents of files, in any order; names count from the package's folder where they can."""
     found = hashlib.sha256()
@@ -90,6 +162,11 @@ def digest(paths: Iterable[Path]) -> str:
     return found.hexdigest()
 
 
+def changed_since_import(paths: Iterable[Path]) -> bool:
+    """Tell whether a file was written after this process imported the package, and may run what it was before."""
+    return any(path.stat().st_mtime > _IMPORTED for path in paths)
+
+
 def imported(path: Path) -> frozenset[Path]:
     """List a source file of the package, and all files of the package that it imports, directly or through others."""
     found: set[Path] = set()
@@ -99,6 +176,14 @@ def imported(path: Path) -> frozenset[Path]:
         if file not in found:
             found.add(file)
             waiting += _named(file) - found
+    return frozenset(found)
+
+
+def with_data(sources: Iterable[Path]) -> frozenset[Path]:
+    """Add to source files the data files that stand beside them."""
+    found = set(sources)
+    for folder in {path.parent for path in found}:
+        found |= {path for path in folder.iterdir() if path.is_file() and path.suffix not in _NO_DATA}
     return frozenset(found)
 
 

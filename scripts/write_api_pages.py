@@ -11,13 +11,13 @@ PAGES = ROOT / "book" / "api"
 
 
 def public_modules() -> dict[str, str]:
-    """Dotted name → first line of the docstring, of each module without an underscore in its name."""
+    """Dotted name → first line of the docstring of each public module; checks and kernels are left out."""
     found = {}
     for path in sorted((ROOT / "gpbnb").rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
         tree = ast.parse(path.read_text(encoding="utf-8"))
         defines = any(isinstance(node, ast.FunctionDef | ast.ClassDef) for node in tree.body)
-        if defines and not any(part.startswith("_") for part in parts) and "checks" not in parts:
+        if defines and not any(part.startswith("_") for part in parts) and not {"checks", "kernels"} & set(parts):
             found[".".join(parts)] = (ast.get_docstring(tree) or "").splitlines()[0]
     return found
 

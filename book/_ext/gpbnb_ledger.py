@@ -31,6 +31,7 @@ class Ledger(SphinxDirective):
 
     required_arguments = 1
     optional_arguments = 1
+    final_argument_whitespace = True
 
     def run(self) -> list[nodes.Node]:
         package = Path(gpbnb.__file__).parent

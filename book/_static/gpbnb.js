@@ -109,3 +109,14 @@ window.addEventListener("load", async () => {
   });
   for (const article of document.querySelectorAll("article")) marked.observe(article);
 });
+
+// A collapsed derivation has no width to break its formulas at until it is opened. On paper all of them are open.
+document.addEventListener(
+  "toggle",
+  ({ target }) => {
+    breakFormulas(target.querySelectorAll("mjx-container"));
+    markScrolling();
+  },
+  true,
+);
+window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((each) => (each.open = true)));

@@ -72,7 +72,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Derivation:
-    """Steps in order; shown as a list with typeset formulas."""
+    """Steps in order; a notebook shows them as a collapsed list, and fails to show a step that does not hold."""
 
     steps: tuple[Step, ...]
 
@@ -89,7 +89,18 @@ class Derivation:
         return "\n".join(f"{_mark(step)} {step}" for step in self.steps)
 
     def _repr_markdown_(self) -> str:
-        return "\n".join(f"- {_mark(step)} {step.name}\n\n  $$\n  {step.latex()}\n  $$" for step in self.steps)
+        """A collapsed list of the steps.
+
+        Raises
+        ------
+        ValueError : a step does not hold.
+        """
+        failed = [step.name for step in self.steps if not step.holds]
+        if failed:
+            raise ValueError(f"SymPy does not confirm {len(failed)} of {len(self.steps)} steps: {'; '.join(failed)}")
+        count = "the step" if len(self.steps) == 1 else f"all {len(self.steps)} steps"
+        steps = "\n".join(f"- {step.name}\n\n  $$\n  {step.latex()}\n  $$" for step in self.steps)
+        return f'<details class="derivation"><summary>SymPy confirms {count}</summary>\n\n{steps}\n\n</details>'
 
 
 @cache  # a chapter, its checks and its tests ask again and again

@@ -8,7 +8,6 @@ is called a factor has the units of the input and of T divided out. Arrays of :m
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,6 +21,7 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import erf
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.search import smallest_precision
 
 Floats = NDArray[np.float64]
 
@@ -818,16 +818,17 @@ def needed_precision(
     if not 0 < share < math.inf:
         raise ValueError(f"got share = {share}; needed a positive number, as 0.1 for a tenth")
 
-    def enough(precision: int) -> bool:
-        errors = two_errors(1.0, omega_bw, f_c, duration, FloatFormat(base, precision, rounding))
+    def enough(fmt: FloatFormat) -> bool:
+        errors = two_errors(1.0, omega_bw, f_c, duration, fmt)
         return errors.rounding <= share * errors.discretization
 
     most = math.ceil(400 / math.log2(base))
-    if not enough(most):
+    found = smallest_precision(enough, base, rounding, largest=most, monotone=True)
+    if found is None:
         raise ValueError(
             f"got share = {share}, {f_c:g} Hz, {duration:g} s; needed at most {most} digits; allow a larger share"
         )
-    return 1 + bisect_left(range(1, most), True, key=enough)
+    return found.precision
 
 
 def stall_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:

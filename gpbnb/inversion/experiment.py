@@ -5,14 +5,13 @@ True errors are exact rationals, by python-flint; a violation is one, however sm
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property, partial
-from importlib import resources
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.inversion import bounds, procedure, theory
+from gpbnb.sweeps import Column, read
 
 # -- one inverse beside its bounds ----------------------------------------------------------------
 
@@ -312,6 +312,13 @@ _FIELDS = ("family", "format", "pivot", "n", "bound")
 _COUNTS = ("trials", "failed", "exact", "absent", "violations", "regular", "violations_regular", "tight")
 _RATIOS = ("smallest", "smallest_regular", "median", "largest")
 
+#: Columns of the stored sweeps; a ratio is empty if no inverse had an error.
+COLUMNS = (
+    *(Column(name, "text") for name in _FIELDS),
+    *(Column(name, "integer", 0) for name in _COUNTS),
+    *(Column(name, low=0, optional=True) for name in _RATIOS),
+)
+
 #: A bound is tight if it is at most so many times the error.
 TIGHT = 1.1
 
@@ -383,13 +390,11 @@ class Sample:
         return result
 
 
-def cell_sample(cell: Cell, names: Sequence[str], done: Callable[[], Any] | None = None) -> Sample:
-    """Compute a cell; `done` is called after each trial."""
+def cell_sample(cell: Cell, names: Sequence[str]) -> Sample:
+    """Compute a cell."""
     sample = Sample(names)
     for one in cell.trials(names):
         sample.add(one)
-        if done:
-            done()
     return sample
 
 
@@ -405,20 +410,22 @@ def _where(cell: Cell) -> dict[str, str]:
     return dict(zip(_FIELDS, texts, strict=False))
 
 
-def sweep_rows(
-    cells: Iterable[Cell], names: Sequence[str], done: Callable[[], Any] | None = None
-) -> list[dict[str, str]]:
-    """Compute cells: the rows of each, of each family together, and of all together."""
+def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> list[dict[str, str]]:
+    """The rows of each family together, if there are several, and of all together."""
     rows, whole, families = [], Sample(names), dict[str, Sample]()
-    for cell in cells:
-        sample = cell_sample(cell, names, done)
-        rows += cell_rows(cell, sample)
+    for cell, sample in samples:
         families.setdefault(cell.family, Sample(names)).merge(sample)
         whole.merge(sample)
     if len(families) > 1:
         for family, sample in families.items():
             rows += sample.rows(family, "all", "all", "all")
     return rows + whole.rows("all", "all", "all", "all")
+
+
+def sweep_rows(cells: Iterable[Cell], names: Sequence[str]) -> list[dict[str, str]]:
+    """Compute cells: the rows of each, of each family together, and of all together."""
+    samples = [(cell, cell_sample(cell, names)) for cell in cells]
+    return [row for each in samples for row in cell_rows(*each)] + sum_rows(samples, names)
 
 
 def worst(bound: str, sweep: str = "variants") -> Trial:
@@ -468,8 +475,5 @@ def frozen(sweep: str) -> Frozen:
     """
     if sweep not in SWEEPS:
         raise ValueError(f"got sweep {sweep!r}; needed one of {', '.join(SWEEPS)}")
-    text = resources.files(__package__).joinpath(f"{sweep}.csv").read_text(encoding="utf-8")
-    lines = text.splitlines()
-    head = [line[1:].split(":", 1) for line in lines if line.startswith("#")]
-    body = csv.DictReader(line for line in lines if not line.startswith("#"))
-    return Frozen({key.strip(): value.strip() for key, value in head}, tuple(body))
+    table = read(Path(__file__).with_name(f"{sweep}.csv"), COLUMNS, f"python -m gpbnb.inversion {sweep}")
+    return Frozen(table.provenance, tuple(table.records()))

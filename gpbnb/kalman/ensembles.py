@@ -7,7 +7,6 @@ kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
 import sys
@@ -24,12 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb import sweeps
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import report_bounds
 from gpbnb.kalman.bounded_run import BoundedHistory, emulate_with_bound
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year import machine
+from gpbnb.sweeps import Column
 
 #: The kinds of random models, see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
@@ -38,7 +39,7 @@ KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
 FORMATS = tuple(
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 11), (2, 24), (2, 53), (10, 4), (10, 8), (16, 6))
-    for rounding in Rounding
+    for rounding in Rounding.documented()
 )
 
 #: How often the command repeats each, 34 x 5 x 12 x 5 = 10,200 trials.
@@ -358,15 +359,23 @@ def lines(seed: int, outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
 
 
 HEADER = ("seed", *Summary._fields)
+COMMAND = "python -m gpbnb.kalman.ensembles"
+
+
+def _column(name: str, kind: type) -> Column:
+    if kind is str:
+        return Column(name, "text")
+    return Column(name, "integer" if kind is int else "number", low=0)
+
+
+#: Columns of ``ensembles.csv``.
+COLUMNS = (Column("seed", "integer", 0), *(_column(*each) for each in get_type_hints(Summary).items()))
 
 
 @cache
 def load(directory: Path = _HERE) -> tuple[Summary, ...]:
     """The sweep that the package brings, of all seeds together."""
-    with (directory / "ensembles.csv").open(encoding="utf-8", newline="") as file:
-        header, *body = list(csv.reader(file))
-    if tuple(header) != HEADER:
-        raise ValueError(f"got ensembles.csv with the columns {header}; make it anew with this version")
+    body = sweeps.read(directory / "ensembles.csv", COLUMNS, COMMAND).rows
     types = get_type_hints(Summary).values()
     return merged([Summary(*(kind(cell) for kind, cell in zip(types, line[1:], strict=True))) for line in body])
 
@@ -378,22 +387,17 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.kalman.ensembles", description="Random filters by thousands."
-    )
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Random filters by thousands.")
     parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
     parser.add_argument("--output", type=Path, default=_HERE, help="where ensembles.csv and ensembles.json go")
     given = parser.parse_args(arguments)
     todo, start = tasks(given.repeats), time.perf_counter()
     outcomes = sweep(todo, progress=True)
     given.output.mkdir(parents=True, exist_ok=True)
-    with (given.output / "ensembles.csv").open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(HEADER)
-        for seed in range(given.repeats):
-            writer.writerows(lines(seed, outcomes))
+    rows = [line for seed in range(given.repeats) for line in lines(seed, outcomes)]
+    sweeps.write(given.output / "ensembles.csv", COLUMNS, rows, {"command": COMMAND, **sweeps.machine()})
     made = {
-        "command": "python -m gpbnb.kalman.ensembles",
+        "command": COMMAND,
         "trials": len(todo),
         "steps": todo[0].steps,
         "formats": [str(fmt) for fmt in FORMATS],

@@ -111,7 +111,7 @@ def year_end(
     answers : name and numbers of digits, open markers on the tolerance; the last is drawn upright, through it.
     """
     artists: list[Artist] = []
-    for form, rounding in [(form, rounding) for rounding in Rounding for form in Form]:
+    for form, rounding in [(form, rounding) for rounding in Rounding.documented() for form in Form]:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
         if points := _points(group):
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]

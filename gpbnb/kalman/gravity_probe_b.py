@@ -32,6 +32,9 @@ _COLUMNS = ("phi2", "phi3", "phi2_rate", "phi3_rate", "alpha2", "alpha3", "beta2
 #: Steps of 10 s in 365 days; hung1984, ch. II, section 12, example.
 YEAR = 3_153_600
 
+#: Seed of the noise of the simulated year.
+SEED = 1984
+
 #: The truth at the start of a simulated year, with the drift rates that relativity predicts, 6606 and 39 mas/yr.
 TRUTH = (30.0, -20.0, 6606.0, 39.0, 0.0, 0.0, 60.0, -80.0, 0.0, 4.0)
 
@@ -88,7 +91,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
 
 def gravity_probe_b_year(model: LinearModel) -> Simulation:
     """Measurements in whole milliarcseconds, for a :func:`gpbnb.kalman.gravity_probe_b.gravity_probe_b`."""
-    return Simulation(model, TRUTH, seed=1984, resolution=1.0)
+    return Simulation(model, TRUTH, seed=SEED, resolution=1.0)
 
 
 def _diagonal(entries: str) -> NDArray[Any]:

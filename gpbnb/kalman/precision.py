@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
@@ -14,6 +13,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -111,25 +111,19 @@ def required_precision(
         z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
-    most, tried, why = LARGEST_PRECISION[base], dict[int, float](), dict[int, str]()
+    tried, why = dict[int, float](), dict[int, str]()
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
 
-        def meets(precision: int) -> bool:
-            if precision not in tried:
-                fmt = FloatFormat(base, precision, rounding)
-                if within is not None and for_ever:
-                    tried[precision], why[precision] = _guaranteed(model, fmt, form, within, tolerances, basis)
-                else:
-                    tried[precision], why[precision] = _error_over_tolerance(
-                        model, measured, fmt, form, checkpoint_steps, true, tolerances
-                    )
-                bar.update()
-            return tried[precision] <= 1
+        def meets(fmt: FloatFormat) -> bool:
+            if within is not None and for_ever:
+                ratio, reason = _guaranteed(model, fmt, form, within, tolerances, basis)
+            else:
+                ratio, reason = _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)
+            tried[fmt.precision], why[fmt.precision] = ratio, reason
+            bar.update()
+            return ratio <= 1
 
-        answer = 2 + bisect_left(range(2, most), True, key=meets)
-        while answer < most and not (meets(answer) and meets(answer + 1)):
-            answer += 1
-        found = FloatFormat(base, answer, rounding) if meets(answer) else None
+        found = smallest_precision(meets, base, rounding, least=2, largest=LARGEST_PRECISION[base])
     reasons = [f"in {digits} digits {reason}" for digits, reason in sorted(why.items()) if reason]
     return Requirement(found, basis, int(steps), tuple(sorted(tried.items())), reasons[-1] if reasons else "")
 

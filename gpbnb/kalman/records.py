@@ -42,11 +42,20 @@ class Records(Run):
         self.x = np.ascontiguousarray(np.repeat(self.x, records, axis=1))
         self.X = np.zeros((0, *self.x.shape), self.x.dtype)
 
-    def use_measurement_matrices(self, H: NDArray[np.float64]) -> None:
-        """Replace the cycle of measurement matrices, (p, m, n), whose entries are rounded into the format."""
+    def use_measurement_matrices(self, H: NDArray[np.float64], decimals: int | None = None) -> None:
+        """Replace the cycle of measurement matrices, (p, m, n), whose entries are rounded into the format.
+
+        Parameters
+        ----------
+        decimals : if given, entries are rounded to so many decimals first; that is exact in base 10, and fast.
+        """
         if np.shape(H)[1:] != (self.model.m, self.model.n):
             raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
-        packed = self._packed(H)
+        if decimals is not None and self.fmt is not None and self.fmt.base == 10:
+            packed = self._packed(np.rint(H * 10.0**decimals))
+            packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
+        else:
+            packed = self._packed(H)
         transposed = np.ascontiguousarray(np.swapaxes(packed, 1, 2))
         self._matrices = (*self._matrices[:2], packed, transposed, *self._matrices[4:])
 

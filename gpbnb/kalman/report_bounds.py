@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.formats import Rounding, prints_as
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+from gpbnb.arithmetic.search import smallest_precision
 
 # -- the counts of the report -----------------------------------------------------------------------------------------
 
@@ -164,10 +165,10 @@ def precision_for_coefficient(
     """
     if coefficient <= 0 or tolerance <= 0:
         raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
-    precision = 1
-    while coefficient * FloatFormat(base, precision, rounding).unit_roundoff > tolerance:
-        precision += 1
-    return precision
+    found = smallest_precision(lambda fmt: coefficient * fmt.unit_roundoff <= tolerance, base, rounding, monotone=True)
+    if found is None:
+        raise ArithmeticError("the unit roundoff falls without limit: some precision must be enough")
+    return found.precision
 
 
 # -- the closing example ----------------------------------------------------------------------------------------------

@@ -10,23 +10,21 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
-from gpbnb.kalman.kernels.records import update_largest
-from gpbnb.kalman.records import Records
-from gpbnb.kalman.simulation import BLOCK, Simulation
+from gpbnb.kalman.lockstep import Lockstep, error_rows, run_lockstep
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import Simulation
 from gpbnb.kalman.year_cases import MODELS, model
 from gpbnb.sweeps import Column, Sweep
 
@@ -39,14 +37,9 @@ FORMS = {"hung": Form.HUNG, "innovation": Form.INNOVATION}
 #: True drift rates less the predicted ones, mas/yr: 6606.1 - 6601.8 and 39.2 - 37.2, the measured differences.
 DEVIATION = (4.3, 2.0)
 
-#: The reference: the innovation form in float64.
-REFERENCE = FloatFormat(2, 53)
-
 SEED = 1984
 RECORDS = 100
 _HERE = Path(__file__).parent
-_ANGLES = 4  # two drift angles, two rates
-_SAVED_EACH = 16  # blocks
 
 
 @dataclass(frozen=True)
@@ -101,132 +94,59 @@ def _cells() -> tuple[Cell, ...]:
 CELLS = _cells()
 
 
-def simulation(states: str, record: int) -> Simulation:
-    """Measurements of one record; for deviations, the predicted drift has been subtracted from the truth."""
-    if states not in STATES:
-        raise ValueError(f"got states {states!r}; needed one of {', '.join(STATES)}")
-    start = TRUTH if states == "absolute" else (*TRUTH[:2], *DEVIATION, *TRUTH[4:])
-    return Simulation(model(MODELS[0], 2), start, SEED + record, resolution=1.0)
+@dataclass(frozen=True)
+class SimpleYear:
+    """Measurements of the simple model; for deviations, the predicted drift has been subtracted from the truth."""
 
+    states: str
 
-class Years:
-    """Years of a cell on their way, in lockstep: measurements and reference are computed once for all formats.
-
-    Parameters
-    ----------
-    steps : fewer than a year for a trial.
-    """
-
-    def __init__(self, cell: Cell, steps: int = YEAR) -> None:
-        self.cell, self.steps, self.block = cell, steps, 0
-        told = model(MODELS[0], cell.base)
-        self.sources = [simulation(cell.states, record) for record in range(cell.first, cell.first + cell.count)]
-        self.truth = np.array([source.start for source in self.sources])
-        self.reference = Records(told, REFERENCE, Form.INNOVATION, cell.count)
-        self.runs = [
-            Records(told, FloatFormat(cell.base, t, Rounding(cell.rounding)), FORMS[cell.form], cell.count)
-            for t in cell.precisions
-        ]
-        count = len(cell.precisions)
-        self.largest = np.zeros((count, _ANGLES, cell.count))
-        self.end = np.zeros((count, _ANGLES, cell.count))
-        self.seconds = np.zeros(count + 2)  # of the measurements, the reference and each format
+    def __post_init__(self) -> None:
+        if self.states not in STATES:
+            raise ValueError(f"got states {self.states!r}; needed one of {', '.join(STATES)}")
 
     @property
-    def finished(self) -> bool:
-        return self.block * BLOCK >= self.steps
+    def start(self) -> tuple[float, ...]:
+        """The truth at step 0."""
+        return TRUTH if self.states == "absolute" else (*TRUTH[:2], *DEVIATION, *TRUTH[4:])
 
-    def go_on(self) -> None:
-        """Take one block of measurements."""
-        start = time.process_time()
-        done = self.block * BLOCK
-        length = min(BLOCK, self.steps - done)
-        z = np.empty((length, self.reference.model.m, self.cell.count))
-        for i, source in enumerate(self.sources):
-            z[:, :, i], self.truth[i] = source.block(self.block, self.truth[i], length)
-        start = self._timed(0, start)
-        true = self.reference.carry(z, _ANGLES)
-        start = self._timed(1, start)
-        for i, run in enumerate(self.runs):
-            computed = run.carry(z, _ANGLES)
-            update_largest(computed, true, self.largest[i])
-            self.end[i] = computed[-1] - true[-1]
-            start = self._timed(i + 2, start)
-        self.block += 1
+    def model(self, base: int) -> LinearModel:
+        """The filter's model, as stored in a base."""
+        return model(MODELS[0], base)
 
-    def _timed(self, place: int, start: float) -> float:
-        now = time.process_time()
-        self.seconds[place] += now - start
-        return now
+    def matrices(self, block: int, base: int) -> None:
+        """Nothing: the model has them."""
 
-    def _arrays(self) -> dict[str, NDArray[Any]]:
-        arrays = {"truth": self.truth, "largest": self.largest, "end": self.end, "seconds": self.seconds}
-        for i, run in enumerate((self.reference, *self.runs)):
-            arrays |= {f"{name}_{i}": getattr(run, name) for name in ("x", "P", "notes")}
-        return arrays
+    def simulation(self, record: int) -> Simulation:
+        """The measurements of one record."""
+        return _simulation(self.states, record)
 
-    def save(self, file: Path) -> None:
-        """Write all of it, or nothing."""
-        draft = file.with_suffix(".draft.npz")
-        told = {"cell": np.array(repr(self.cell)), "block": np.array(self.block), "steps": np.array(self.steps)}
-        np.savez(draft, allow_pickle=False, **self._arrays(), **told)
-        draft.replace(file)
+    def measurements(
+        self, record: int, block: int, truth: NDArray[np.float64], H: NDArray[np.float64] | None, steps: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Measurements of a block, (steps, 2), and the truth after them."""
+        return self.simulation(record).block(block, truth, steps)
 
-    def restore(self, file: Path) -> None:
-        """Go back to where a cell was saved, if it was."""
-        if not file.exists():
-            return
-        with np.load(file) as saved:
-            if str(saved["cell"]) == repr(self.cell) and int(saved["steps"]) == self.steps:
-                for name, array in self._arrays().items():
-                    array[...] = saved[name]
-                self.block = int(saved["block"])
 
-    def result(self) -> dict[str, Any]:
-        """Largest errors of the year and errors at its end, of each format and record."""
-        return {
-            "largest": self.largest.tolist(),
-            "end": self.end.tolist(),
-            "indefinite": [run.indefinite or 0 for run in self.runs],
-            "seconds": self.seconds.tolist(),
-        }
+@cache
+def _simulation(states: str, record: int) -> Simulation:
+    return Simulation(model(MODELS[0], 2), SimpleYear(states).start, SEED + record, resolution=1.0)
+
+
+def lockstep(cell: Cell, steps: int = YEAR) -> Lockstep:
+    """All filters of a cell, before their first step."""
+    formats = [FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions]
+    records = range(cell.first, cell.first + cell.count)
+    return Lockstep(repr(cell), SimpleYear(cell.states), formats, FORMS[cell.form], records, steps)
 
 
 def compute(cell: Cell, directory: Path | None = None, steps: int = YEAR) -> dict[str, Any]:
     """Run the years of a cell, and save them on the way if there is a directory."""
-    file = None if directory is None else directory / f"{hash_of(cell):08x}.npz"
-    years = Years(cell, steps)
-    if file is not None:
-        years.restore(file)
-    total = -(-steps // BLOCK)
-    name = f"{cell.states} {cell.base} {cell.form} {cell.precisions}"
-    for number in tqdm(range(years.block, total), desc=name, initial=years.block, total=total, disable=file is None):
-        years.go_on()
-        if file is not None and number % _SAVED_EACH == _SAVED_EACH - 1:
-            years.save(file)
-    if file is not None:
-        file.unlink(missing_ok=True)
-    return years.result()
-
-
-def hash_of(cell: Cell) -> int:
-    """The same number for the same cell in every process."""
-    return zlib.crc32(repr(cell).encode())
+    return run_lockstep(lockstep(cell, steps), directory)
 
 
 def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
     """Rows of the table: for each format and record, largest error of the year and error at its end."""
-    lines = []
-    for head, largest, end in zip(cell.heads(), np.array(result["largest"]), np.array(result["end"]), strict=True):
-        # NaN or infinity: the filter stopped.
-        numbers = np.nan_to_num(
-            np.stack([largest[:2].max(0), largest[2:].max(0), np.abs(end[:2]).max(0), np.abs(end[2:]).max(0)], axis=1),
-            nan=np.inf,
-        )
-        lines += [
-            (*head, str(cell.first + i), *(f"{value:.6g}" for value in line)) for i, line in enumerate(numbers.tolist())
-        ]
-    return lines
+    return error_rows(cell.heads(), cell.first, result)
 
 
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
@@ -239,7 +159,7 @@ def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
 COLUMNS = (
     Column("states", "text", choices=STATES),
     Column("base", "integer", 2, 16),
-    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding)),
+    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding.documented())),
     Column("form", "text", choices=tuple(FORMS)),
     Column("precision", "integer", 1, 53),
     Column("record", "integer", 0, 9999),

@@ -7,7 +7,6 @@ The command continues where it was interrupted. Its results are stored beside th
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import platform
 import sys
@@ -21,13 +20,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb import sweeps
 from gpbnb.arithmetic.formats import Rounding
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import History, relative
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import YEAR
-from gpbnb.kalman.year_cases import CASES, Case
+from gpbnb.kalman.gravity_probe_b import SEED, YEAR
+from gpbnb.kalman.year_cases import CASES, MODELS, Case
 from gpbnb.kalman.year_runs import ResumableRun, history, reference_checkpoints, run_cases
+from gpbnb.sweeps import Column
 
 _HERE = Path(__file__).parent
 _COLUMNS = ("drift_2", "drift_3", "rate_2", "rate_3", "state", "gain", "covariance", "least_eigenvalue")
@@ -108,6 +109,28 @@ def _name(case: Case) -> tuple[str, ...]:
 
 HEADER = ("model", "base", "precision", "rounding", "form", "step", *_COLUMNS)
 
+_KEY_COLUMNS = (
+    Column("model", "text", choices=MODELS),
+    Column("base", "integer", 2, 16),
+    Column("precision", "integer", 0, 53),
+    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding)),
+    Column("form", "text", choices=tuple(form.name.lower() for form in Form)),
+    Column("step", "integer", 1, YEAR),
+)
+
+#: Columns of ``year.csv``. Errors have a sign; a covariance that is lost has eigenvalues below zero.
+COLUMNS = (
+    *_KEY_COLUMNS,
+    *(Column(name) for name in _COLUMNS[:4]),
+    *(Column(name, low=0) for name in _COLUMNS[4:7]),
+    Column(_COLUMNS[7]),
+)
+
+#: Columns of ``bounds.csv``, which are not negative.
+BOUND_COLUMNS = (*_KEY_COLUMNS, *(Column(name, low=0) for name in _COLUMNS[:7]))
+
+_COMMAND = "python -m gpbnb.kalman.year"
+
 
 def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = _HERE) -> None:
     """Collect the finished runs in ``year.csv``, ``bounds.csv`` and ``year.json``."""
@@ -130,11 +153,11 @@ def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = 
         if case.reference.name not in references:
             references[case.reference.name] = _of_reference(case.reference, directory, steps)
             bounded += bound_rows(case.reference, directory, steps)
-    for name, header, body in (("year", HEADER, lines), ("bounds", HEADER[:-1], bounded)):
-        with (to / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerows([header, *body])
+    origin = {"command": _COMMAND, "seed": str(SEED), **sweeps.machine()}
+    sweeps.write(to / "year.csv", COLUMNS, lines, {**origin, "cells": f"{len(about)} of {len(CASES)}"})
+    sweeps.write(to / "bounds.csv", BOUND_COLUMNS, bounded, {**origin, "cells": f"{len(references)} references"})
     made = {
-        "command": "python -m gpbnb.kalman.year",
+        "command": _COMMAND,
         "steps": steps,
         **machine(),
         "references": references,
@@ -170,7 +193,7 @@ def load(directory: Path = _HERE) -> tuple[Year, ...]:
     """The years that the package brings, in the order of :data:`CASES`."""
     about = provenance(directory)["cases"]
     result = []
-    for case, numbers in _read(directory / "year.csv", HEADER).items():
+    for case, numbers in _read(directory / "year.csv", COLUMNS).items():
         result.append(
             Year(
                 case,
@@ -196,21 +219,15 @@ def bounds(directory: Path = _HERE) -> dict[Case, Bounds]:
         case: Bounds(
             case, numbers[:, 0].astype(np.int64), numbers[:, 1:3], numbers[:, 3:5], *(numbers[:, i] for i in (5, 6, 7))
         )
-        for case, numbers in _read(directory / "bounds.csv", HEADER[:-1]).items()
+        for case, numbers in _read(directory / "bounds.csv", BOUND_COLUMNS).items()
     }
 
 
-def _read(file: Path, columns: tuple[str, ...]) -> dict[Case, NDArray[np.float64]]:
-    with file.open(encoding="utf-8", newline="") as lines:
-        header, *body = list(csv.reader(lines))
-    if tuple(header) != columns:
-        raise ValueError(
-            f"got {file.name} with the columns {header}; needed {list(columns)}; make it anew with this version"
-        )
-    groups: dict[Case, list[list[str]]] = {}
-    for line in body:
-        case = Case(line[0], int(line[1]), int(line[2]), Rounding(line[3]), Form[line[4].upper()])
-        groups.setdefault(case, []).append(line[5:])
+def _read(file: Path, columns: tuple[Column, ...]) -> dict[Case, NDArray[np.float64]]:
+    groups: dict[Case, list[tuple[str, ...]]] = {}
+    for row in sweeps.read(file, columns, _COMMAND).rows:
+        case = Case(row[0], int(row[1]), int(row[2]), Rounding(row[3]), Form[row[4].upper()])
+        groups.setdefault(case, []).append(row[5:])
     return {case: np.array(group, dtype=np.float64) for case, group in groups.items()}
 
 
@@ -221,9 +238,7 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.kalman.year", description="A year in many formats and forms."
-    )
+    parser = argparse.ArgumentParser(prog=_COMMAND, description="A year in many formats and forms.")
     parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="where runs are saved on the way")
     parser.add_argument("--steps", type=int, default=YEAR, help="fewer, for a trial")
     parser.add_argument("--cases", type=int, default=len(CASES), help="only so many of the cases")

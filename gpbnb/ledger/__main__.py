@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, examine, owners
+from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, examine, examine_once, owners
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.render import FORMATS, describe
 from gpbnb.ledger.statements import Statement, load_statements, select
@@ -38,6 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--chapter", help="as numbered in the document, as in II; default: all")
     parser.add_argument("--section", nargs="+", metavar="S", help="one or more; 9 takes 9.1 and 9.2 too; default: all")
     parser.add_argument("--output", type=Path, metavar="FILE", help="a file, replaced as a whole; default: stdout")
+    parser.add_argument("--fresh", action="store_true", help="run every check, also where nothing has changed since")
     arguments = parser.parse_args(argv)
     try:
         inventory = load_statements()
@@ -46,7 +47,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         owners(inventory, TOPICS)
     except (OSError, ValueError) as error:
         parser.error(str(error))
-    rows = examine(chosen, TOPICS, _progress)
+    run = examine if arguments.fresh else examine_once
+    rows = run(chosen, TOPICS, _progress)
     content = FORMATS[arguments.format](rows).encode()
     try:
         if arguments.output is not None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
+from gpbnb.caching import PACKAGE
+from gpbnb.ledger import cache
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.finding import Finding, Verdict
 from gpbnb.ledger.registry import Check, Checks, takes_statement
@@ -106,6 +110,51 @@ def examine(
     return tuple(rows)
 
 
+def examine_once(
+    statements: Iterable[Statement],
+    topics: Mapping[str, Checks] = TOPICS,
+    progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter,
+) -> tuple[Row, ...]:
+    """As :func:`examine`, but a check is not run again until a source or a datum changes that its finding depends on.
+
+    Checks that are not part of the package are run each time.
+    """
+    chosen = tuple(statements)
+    by_module: dict[Path | None, list[Statement]] = {}
+    for statement in chosen:
+        by_module.setdefault(_module(statement, topics), []).append(statement)
+    found: dict[Statement, Row] = {}
+    for module, inside in by_module.items():
+        if module is not None:
+            found |= _known(inside, cache.known(module))
+    for module, inside in by_module.items():
+        missing = [each for each in inside if each not in found]
+        if module is None:
+            found |= {row.statement: row for row in examine(missing, topics, progress)}
+        elif missing:
+            with cache.shared(module) as findings:
+                found |= _known(missing, findings)  # another process may have run some meanwhile
+                for row in examine([each for each in missing if each not in found], topics, progress):
+                    found[row.statement] = row
+                    if row.finding is not None:
+                        findings.put(row.statement, row.finding)
+    return tuple(found[statement] for statement in chosen)
+
+
+def _known(statements: Iterable[Statement], findings: cache.Findings) -> dict[Statement, Row]:
+    pairs = ((each, findings.get(each)) for each in statements)
+    return {each: Row(each, finding) for each, finding in pairs if finding is not None}
+
+
+def _module(statement: Statement, topics: Mapping[str, Checks]) -> Path | None:
+    """The file of the package that has the check of a statement, if one has."""
+    check = next((checks[statement.id] for checks in topics.values() if statement.id in checks), None)
+    if check is None:
+        return None
+    path = Path(inspect.getfile(inspect.unwrap(check))).resolve()
+    return path if path.is_relative_to(PACKAGE) else None
+
+
 def rows(
     entries: Iterable[Statement] | None = None,
     document: str | None = None,
@@ -133,7 +182,7 @@ def rows(
     inventory = load_statements() if entries is None else tuple(entries)
     chosen = select(inventory, document, chapter, sections)
     owners(inventory, topics)
-    examined = examine(chosen, topics)
+    examined = examine_once(chosen, topics)
     errors: list[Exception] = []
     for row in examined:
         if row.error is not None:

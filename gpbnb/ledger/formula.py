@@ -2,15 +2,16 @@ r"""The machine-readable form of a printed statement: read, evaluated and typese
 
 A form is one or more parts, separated by semicolons. Each part is one of:
 
-relation : a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``.
-number : ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional.
-words : ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others are
-    what it could have said instead.
+- a relation: a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``;
+- a number: ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional;
+- words: ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others
+  are what it could have said instead.
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` and ``approx(a, b)`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
-printed sequence; a part that contains it can be typeset but not evaluated.
+printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that
+a printed series leaves out; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
@@ -368,6 +369,8 @@ def _base(word: str) -> str:
         return rf"\{_GREEK[word]}"
     if word.lower().startswith("delta") and len(word) > len("delta"):
         return rf"\{word[: len('delta')]} {_base(word[len('delta') :])}"
+    if word == "dots":
+        return r"\cdots"
     if word == "inf":
         return r"\infty"
     return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word

@@ -24,6 +24,7 @@ from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
 from gpbnb.rolling.flicker import flicker, record
 from gpbnb.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
+from gpbnb.sweeps import Column, read
 
 YEAR_SAMPLES = round(YEAR / INTERVAL)
 
@@ -353,20 +354,29 @@ def survey_rng() -> np.random.Generator:
     return np.random.default_rng(1984)
 
 
+#: Columns of the stored survey: errors of the drift rates of x and y, mas/yr, for each roll period.
+SURVEY_COLUMNS = (
+    Column("gyro", "integer", 0, SURVEY_GYROS - 1),
+    *(
+        Column(f"{'none' if period is None else format(period, 'g')} s {xy}", low=-1000, high=1000)
+        for period in SURVEY_PERIODS
+        for xy in "xy"
+    ),
+)
+
+
 def survey() -> DriftStudy:
     """Read the stored survey."""
-    table = np.loadtxt(SURVEY, delimiter=",", skiprows=1)
-    errors = table[:, 1:].reshape(len(table), len(SURVEY_PERIODS), 2).transpose(1, 0, 2)
+    rows = read(SURVEY, SURVEY_COLUMNS, "python -m gpbnb.rolling").rows
+    table = np.array([row[1:] for row in rows], dtype=np.float64)
+    errors = table.reshape(len(table), len(SURVEY_PERIODS), 2).transpose(1, 0, 2)
     return DriftStudy(SURVEY_PERIODS, LEVEL, YEAR_SAMPLES, INTERVAL, errors)
 
 
-def write_survey(study: DriftStudy) -> str:
-    """A study as the text of the stored file: a line a gyro, six digits."""
-    names = [f"{'none' if p is None else format(p, 'g')} s {xy}" for p in study.periods for xy in "xy"]
-    lines = [",".join(["gyro", *names])]
-    for gyro, row in enumerate(study.errors.transpose(1, 0, 2).reshape(study.errors.shape[1], -1)):
-        lines.append(",".join([str(gyro), *(f"{value:.5e}" for value in row)]))
-    return "\n".join(lines) + "\n"
+def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
+    """A study as rows of the stored file, one for each gyro, with six digits."""
+    table = study.errors.transpose(1, 0, 2).reshape(study.errors.shape[1], -1)
+    return [(str(gyro), *(f"{value:.5e}" for value in row)) for gyro, row in enumerate(table)]
 
 
 # -- filters -------------------------------------------------------------------------------------

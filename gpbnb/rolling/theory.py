@@ -21,6 +21,7 @@ from scipy import fft, special
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.measurement import YEAR
 
 DRIFTS = (6600.0, 40.0)
@@ -488,8 +489,11 @@ def rotation_bound(method: str, period: float, steps: int, interval: float = INT
 
 def digits_needed(bound: Callable[[Fraction], float], base: int, largest: float) -> int:
     """The least precision at which a bound, a function of the unit roundoff, is no larger than `largest`."""
-    for precision in range(2, 400):
-        beta = FloatFormat(base, precision).unit_roundoff
-        if 3 * beta < 1 and bound(beta) <= largest:
-            return precision
+
+    def meets(fmt: FloatFormat) -> bool:
+        return 3 * fmt.unit_roundoff < 1 and bound(fmt.unit_roundoff) <= largest
+
+    found = smallest_precision(meets, base, least=2, largest=399, monotone=True)
+    if found is not None:
+        return found.precision
     raise ValueError(f"got a bound above {largest:g} at 399 digits; needed one that falls with the unit roundoff")

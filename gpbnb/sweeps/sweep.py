@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import operator
 import os
 import platform
 import subprocess
@@ -58,6 +59,7 @@ class Sweep(Generic[C]):
     summary : further rows, from the results of all cells.
     sample : rows of a cell, or some of them, computed again as a check; by default all of them; the generator
         may choose.
+    same : whether a stored row and one computed again agree; by default if they are equal.
     packages : whose versions the provenance names.
     """
 
@@ -73,6 +75,7 @@ class Sweep(Generic[C]):
     version: str = "1"
     summary: Callable[[Sequence[tuple[C, Any]]], list[Row]] | None = None
     sample: Callable[[C, np.random.Generator], list[Row]] | None = None
+    same: Callable[[Row, Row], bool] = operator.eq
     packages: tuple[str, ...] = ("numpy", "numba", "llvmlite")
 
     # -- computing --------------------------------------------------------------------------------------
@@ -170,11 +173,10 @@ class Sweep(Generic[C]):
             again = self.rows(cell, self.compute(cell, None)) if self.sample is None else self.sample(cell, rng)
             if not again:
                 raise ValueError(f"{self.name}: got no rows from {cell}; needed at least one to compare")
-            differences += [
-                Difference(str(cell), stored.get(row[: self.key]), row)
-                for row in again
-                if stored.get(row[: self.key]) != row
-            ]
+            for row in again:
+                found = stored.get(row[: self.key])
+                if found is None or not self.same(found, row):
+                    differences.append(Difference(str(cell), found, row))
         return differences
 
     def _is_stored(self, cell: C, stored: Mapping[Row, Row]) -> bool:

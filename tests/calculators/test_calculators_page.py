@@ -7,37 +7,13 @@ import math
 import re
 from dataclasses import replace
 from fractions import Fraction
-from html.parser import HTMLParser
 
 import pytest
+from markup import Elements
 
 from gpbnb.calculators import forms, page
 
 CALCULATORS = pytest.mark.parametrize("calculator", forms.CALCULATORS, ids=lambda each: each.id)
-VOID = {"input"}
-
-
-class Elements(HTMLParser):
-    """Every element with its attributes, and whether all are closed in order."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-        self.open: list[str] = []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        assert len(dict(attrs)) == len(attrs)
-        self.found.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.found if name == tag]
 
 
 @CALCULATORS

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import signal
 import threading
@@ -19,6 +18,7 @@ from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
 from gpbnb.kalman.forms import Form
+from gpbnb.sweeps import read
 
 SINGLE = FloatFormat(2, 24)
 
@@ -109,9 +109,8 @@ def test_no_bound_was_violated_in_ten_thousand_trials():
 
 @pytest.mark.parametrize("seed", [0, 33])
 def test_a_part_of_the_sweep_comes_out_as_it_is_stored(seed):
-    with (ensembles._HERE / "ensembles.csv").open(encoding="utf-8", newline="") as file:
-        stored = [tuple(line) for line in csv.reader(file)]
-    assert stored[0] == ensembles.HEADER
+    stored = read(ensembles._HERE / "ensembles.csv", ensembles.COLUMNS, "").rows
+    assert tuple(column.name for column in ensembles.COLUMNS) == ensembles.HEADER
     todo = [task for task in tasks(1, first_seed=seed) if task.kind in ("one sign", "far scales")]
     expected = [line for line in stored if line[:2] in {(str(seed), "one sign"), (str(seed), "far scales")}]
     assert ensembles.lines(seed, sweep(todo, batch=len(todo))) == expected
@@ -134,7 +133,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
     assert ensembles.provenance(tmp_path / "new")["trials"] == 10
     (tmp_path / "new" / "ensembles.csv").write_text("kind\n", encoding="utf-8")
     ensembles.load.cache_clear()
-    with pytest.raises(ValueError, match="make it anew"):
+    with pytest.raises(ValueError, match=r"ensembles\.csv, line 1"):
         ensembles.load(tmp_path / "new")
 
 
@@ -154,7 +153,7 @@ def test_a_summary_counts():
             outcome(),
         ]
     )
-    assert [each.form for each in found] == ["ud", "usual"]
+    assert [each.form for each in found] == ["ud", "innovation"]
     ud, usual = found
     assert (ud.trials, usual.trials) == (4, 1)
     assert ud.contraction_violations == 3  # no number is no bound

@@ -420,7 +420,7 @@ def test_what_a_run_refuses():
     with pytest.raises(ValueError, match="needed a format with compiled loops"):
         Run(given, FloatFormat(3, 5), Form.HUNG, (1,))
     for checkpoint_steps in ((2, 1), (0, 1), (1, 1)):
-        with pytest.raises(ValueError, match="needed steps of 1 or more, each above the one before"):
+        with pytest.raises(ValueError, match="needed steps of 1 or more, each above the last"):
             Run(given, FloatFormat(2, 24), Form.HUNG, checkpoint_steps)
     for kind in (Run, BoundedRun):
         for z in (np.ones((3, 3)), np.ones(2)):
@@ -452,7 +452,7 @@ def test_checkpoint_steps():
 
 
 def test_the_names_of_the_forms():
-    assert [str(form) for form in Form] == ["report", "report, second gain", "innovation", "Joseph", "UD"]
+    assert [str(form) for form in Form] == ["Hung (1984)", "Hung (1984), second gain", "innovation", "Joseph", "UD"]
 
 
 # -- simulated measurements -----------------------------------------------------------------------

@@ -92,7 +92,7 @@ def test_year_end(ax, runs):
     assert all(set(mark.get_ydata()) == {1} for mark in checkpoint_steps)
     assert checkpoint_steps[0].get_markerfacecolor() == checkpoint_steps[1].get_markerfacecolor() == "none"
     assert checkpoint_steps[2].get_marker() == "|"
-    assert legend_of(ax)[:3] == ["report, nearest", "report, chop", "printed"]
+    assert legend_of(ax)[:3] == ["Hung (1984), nearest", "Hung (1984), chop", "printed"]
     assert legend_of(ax)[-3:] == ["print", "formula", "seen"]
 
 
@@ -119,12 +119,12 @@ def summary(**numbers):
 
 def test_violations(ax):
     found = [
-        summary(kind="a", form="report", trials=10, violations_105=10, violations_108=5, violations_125=0),
-        summary(kind="b", form="report", trials=30, violations_105=10, violations_108=5, violations_125=1),
+        summary(kind="a", form="hung", trials=10, violations_105=10, violations_108=5, violations_125=0),
+        summary(kind="b", form="hung", trials=30, violations_105=10, violations_108=5, violations_125=1),
         summary(kind="a", form="ud", trials=20, violations_105=5, violations_108=0, violations_125=2),
     ]
     bars = figures.violations(found, ax)
     assert [bar.get_height() for bar in bars] == pytest.approx([50, 25, 25, 0, 2.5, 10])
-    assert [label.get_text() for label in ax.get_xticklabels()] == ["report", "UD"]
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["Hung (1984)", "UD"]
     assert legend_of(ax) == ["(105)", "(108)", "(125)"]
     assert ax.get_ylabel() == "filters that violate it (%)"

@@ -12,13 +12,14 @@ from gpbnb.kalman import threshold
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.records import update_largest
+from gpbnb.kalman.lockstep import REFERENCE
 from gpbnb.kalman.records import Records
-from gpbnb.kalman.threshold import CELLS, FORMS, REFERENCE, STATES, Cell, Years, compute, rows, sample, simulation
+from gpbnb.kalman.threshold import CELLS, FORMS, STATES, Cell, SimpleYear, compute, lockstep, rows, sample
 from gpbnb.kalman.year_cases import MODELS, model
 from gpbnb.kalman.year_cases import simulation as year_simulation
 
 STEPS, COUNT = 300, 5
-MEASURED = np.stack([simulation("absolute", record).measurements(STEPS) for record in range(COUNT)], axis=-1)
+MEASURED = np.stack([SimpleYear("absolute").simulation(record).measurements(STEPS) for record in range(COUNT)], axis=-1)
 
 
 @pytest.mark.parametrize("form", [form for form in Form if form is not Form.UD], ids=str)
@@ -95,9 +96,9 @@ def test_measurement_matrices_may_be_replaced():
 
 def test_record_0_is_the_year_of_one_record():
     assert (MEASURED[:, :, 0] == year_simulation(MODELS[0]).measurements(STEPS)).all()
-    assert simulation("deviation", 0).start[2:4] == threshold.DEVIATION
+    assert SimpleYear("deviation").simulation(0).start[2:4] == threshold.DEVIATION
     with pytest.raises(ValueError, match="needed one of absolute, deviation"):
-        simulation("other", 0)
+        SimpleYear("other")
 
 
 SMALL = Cell("deviation", 2, "nearest", "hung", (20, 24), 3, 2)
@@ -108,7 +109,7 @@ def test_errors_are_those_of_every_step():
     found = compute(SMALL, steps=steps)
     for i, precision in enumerate(SMALL.precisions):
         for j in range(2):
-            z = simulation("deviation", 3 + j).measurements(steps)
+            z = SimpleYear("deviation").simulation(3 + j).measurements(steps)
             estimates = []
             for fmt, form in ((FloatFormat(2, precision), FORMS["hung"]), (REFERENCE, Form.INNOVATION)):
                 run = Run(model(MODELS[0], 2), fmt, form, range(1, steps + 1))
@@ -129,17 +130,17 @@ def test_errors_are_those_of_every_step():
 
 def test_an_interrupted_cell_goes_on(tmp_path):
     expected = compute(SMALL, steps=10_000)
-    whole = Years(SMALL, 10_000)
-    whole.go_on()
+    whole = lockstep(SMALL, 10_000)
+    whole.advance()
     whole.save(tmp_path / "some.npz")
-    again = Years(SMALL, 10_000)
+    again = lockstep(SMALL, 10_000)
     again.restore(tmp_path / "some.npz")
     assert again.block == 1
     while not again.finished:
-        again.go_on()
+        again.advance()
     result = again.result()
     assert {name: result[name] for name in ("largest", "end")} == {name: expected[name] for name in ("largest", "end")}
-    other = Years(SMALL, 20_000)
+    other = lockstep(SMALL, 20_000)
     other.restore(tmp_path / "some.npz")
     other.restore(tmp_path / "none.npz")
     assert other.block == 0

@@ -110,7 +110,7 @@ def test_year_ends():
     table = tables.year_ends([run(), run(indefinite=2)])
     assert table.header[:4] == ("arithmetic", "form", "drift (mas)", "rate (mas/yr)")
     rows = cells(table)
-    assert rows[0] == ["24 bits", "report", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
+    assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5, a variance lost at step 2"
     other = run(case=run().case._replace(model=year_cases.MODELS[1]))
     table = tables.year_ends([run(), other])

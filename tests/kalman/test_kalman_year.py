@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-
 import numpy as np
 import pytest
 
@@ -18,6 +16,7 @@ from gpbnb.kalman.simulation import BLOCK
 from gpbnb.kalman.year import HEADER
 from gpbnb.kalman.year_cases import BOUNDED_CASES, CASES, MODELS, Case
 from gpbnb.kalman.year_runs import ResumableRun, run_cases
+from gpbnb.sweeps import read
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 SINGLE = Case(MODELS[0], 2, 24, NEAREST, Form.HUNG)
@@ -25,8 +24,9 @@ MILLIARCSECOND = 1.0
 
 
 def stored(name):
-    with (year._HERE / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return [tuple(line) for line in csv.reader(file)]
+    columns = {"year": year.COLUMNS, "bounds": year.BOUND_COLUMNS}[name]
+    rows = read(year._HERE / f"{name}.csv", columns, "").rows
+    return [tuple(column.name for column in columns), *rows]
 
 
 # -- what is stored -------------------------------------------------------------------------------
@@ -185,7 +185,7 @@ def test_checkpoint_steps_are_at_equal_ratios():
 def test_cases_have_names_of_their_own():
     names = {case.name for case in CASES} | {case.reference.name for case in CASES}
     assert len(names) == len(CASES) + 4
-    assert SINGLE.name == "roll-600-s-2-24-nearest-report"
+    assert SINGLE.name == "roll-600-s-2-24-nearest-hung"
     assert SINGLE.fmt == FloatFormat(2, 24, NEAREST)
     assert SINGLE.reference.fmt is None
 
@@ -273,7 +273,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
     assert year.provenance(here)["steps"] == 100
     (here / "year.csv").write_text("step\n", encoding="utf-8")
     year.load.cache_clear()
-    with pytest.raises(ValueError, match=r"got year\.csv with the columns"):
+    with pytest.raises(ValueError, match=r"year\.csv, line 1: the line .* is missing"):
         year.load(here)
 
     def interrupted(*_):

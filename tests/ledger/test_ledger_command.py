@@ -153,7 +153,7 @@ def test_a_check_that_raises_is_named_and_hides_no_other(ledger, topic):
     assert [record["verdict"] for record in records(done.stdout)] == ["", *["verified"] * 4]
     first, *rest = done.stderr.decode().splitlines()
     assert first.startswith("the check of hung1984.I.two-tasks failed: ZeroDivisionError: division by zero (")
-    assert first.endswith("raising_topic.py:8)")
+    assert first.endswith("raising_topic.py:9)")
     assert rest == ["5 entries: 4 verified, 1 check failed", "0 lack their check"]
 
 

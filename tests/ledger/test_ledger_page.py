@@ -2,10 +2,10 @@
 
 import json
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from markup import Elements
 
 from gpbnb import ledger
 from gpbnb.ledger import Row, load_statements, page
@@ -25,39 +25,11 @@ ROWS = tuple(Row(statement, FINDINGS[place % len(FINDINGS)]) for place, statemen
 EVERY_PAGE = "".join(ledger.ledger_page(ROWS, each).html for each in ledger.PAGES)
 
 
-class Tags(HTMLParser):
-    """Reads HTML whose tags must nest; keeps each start tag with its attributes, and the texts of cells."""
-
-    def __init__(self, html):
-        super().__init__()
-        self.open, self.tags, self.cells = [], [], []
-        self.feed(html)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, dict(attrs)))
-        if tag not in ("br", "input"):
-            self.open.append(tag)
-        if tag in ("td", "th"):
-            self.cells.append("")
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if {"td", "th"} & set(self.open):
-            self.cells[-1] += data
-
-    def all(self, name):
-        return [attrs for tag, attrs in self.tags if tag == name]
-
-
 def test_every_statement_is_on_exactly_one_page():
     assert [[each.name for each in ledger.PAGES if each.holds(s)] for s in STATEMENTS] == [
         [page.address(s).partition(".html")[0]] for s in STATEMENTS
     ]
-    ids = [row["id"] for row in Tags(EVERY_PAGE).all("tr") if "id" in row]
+    ids = [row["id"] for row in Elements(EVERY_PAGE).all("tr") if "id" in row]
     assert sorted(ids) == sorted(statement.id for statement in STATEMENTS)
 
 
@@ -71,7 +43,7 @@ def test_a_page_of_the_ledger_is_a_page_of_the_book(each):
 
 def test_rows_carry_what_the_filters_need():
     owner = ledger.topics()
-    rows = {attrs["id"]: attrs for attrs in Tags(EVERY_PAGE).all("tr") if "id" in attrs}
+    rows = {attrs["id"]: attrs for attrs in Elements(EVERY_PAGE).all("tr") if "id" in attrs}
     for row in ROWS:
         attrs = rows[row.statement.id]
         assert attrs["data-kind"] == row.statement.kind
@@ -99,7 +71,7 @@ def test_a_row_without_a_check_is_shown_as_such():
     unchecked = Row(Statement("savage2016.x", "savage2016", "-", "-", "x", "claim", "a"), None)
     html = ledger.ledger_page([unchecked], ledger.PAGES[-1]).html
     assert 'data-verdict="no check" data-chapter=""' in html
-    assert Tags(html).cells[-2:] == ["no check", "a"]
+    assert Elements(html).cells[-2:] == ["no check", "a"]
 
 
 def test_the_options_of_each_filter_count_its_rows():
@@ -132,7 +104,7 @@ def test_the_error_table_lists_disagreements_with_the_most_serious_first():
     table = ledger.error_table(ROWS)
     found = re.findall(r'class="verdict verdict-([\w-]+)"', table.html)
     assert found == ["wrong"] * 131 + ["misprint"] * 131 == sorted(found, key=["wrong", "misprint"].index)
-    links = [a["href"] for a in Tags(table.html).all("a") if a["href"].startswith("ledger")]
+    links = [a["href"] for a in Elements(table.html).all("a") if a["href"].startswith("ledger")]
     by_address = {page.address(row.statement): row for row in ROWS}
     assert {by_address[link].finding.verdict for link in links} == {Verdict.WRONG, Verdict.MISPRINT}
 
@@ -143,8 +115,8 @@ def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
         pytest.skip("roots.csv is empty")
     spoiled = [Row(s, compare(False, "1", Verdict.WRONG, root=root)) for s in STATEMENTS[:3]]
     html = ledger.root_table([*spoiled, *ROWS[3:]]).html
-    assert [a["id"] for a in Tags(html).all("tr") if "id" in a] == [f"root-{root}"]
-    assert [a["href"] for a in Tags(html).all("a")] == [page.address(row.statement) for row in spoiled]
+    assert [a["id"] for a in Elements(html).all("tr") if "id" in a] == [f"root-{root}"]
+    assert [a["href"] for a in Elements(html).all("a")] == [page.address(row.statement) for row in spoiled]
     assert "<td>3</td>" in html
 
 
@@ -166,7 +138,7 @@ def test_every_verdict_that_a_claim_can_have_has_an_outcome():
 def test_note_table_labels_what_was_left_undone():
     table = ledger.note_table(ROWS[:6], left_undone=True)
     assert 'class="ledger-table ledger-undone"' in table.html
-    assert Tags(table.html).cells[:3] == ["Statement", "Verdict", "Evidence"]
+    assert Elements(table.html).cells[:3] == ["Statement", "Verdict", "Evidence"]
     assert repr(table) == "<6 statements>"
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from html.parser import HTMLParser
 from itertools import pairwise
 from urllib.parse import unquote, urljoin, urlsplit
 
 import pytest
+from markup import Elements
 
 from . import browser as tools
 
@@ -231,32 +231,17 @@ def test_the_search_button_leads_to_results(open_page):
         assert page.faults == []
 
 
-class Anchors(HTMLParser):
-    """Collects the addresses a page points to, and the names that can be pointed at."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.links: set[str] = set()
-        self.names: set[str] = {"", "top"}
-        self.feed(text)
-
-    def handle_starttag(self, tag, attrs):
-        values = dict(attrs)
-        self.names |= {values[k] for k in ("id", "name") if values.get(k)}
-        self.links |= {values[k] for k in ("href", "src") if values.get(k)}
-
-
 def test_every_link_within_the_book_leads_somewhere():
-    anchors = {a: Anchors((tools.HTML / a).read_text(encoding="utf-8")) for a in ["index.html", *PAGES]}
+    anchors = {a: Elements((tools.HTML / a).read_text(encoding="utf-8"), nested=False) for a in ["index.html", *PAGES]}
     dead = []
     for address, page in anchors.items():
-        for link in page.links:
+        for link in page.values("href", "src"):
             parts = urlsplit(urljoin(f"book://book/{address}", link))
             if parts.scheme != "book":
                 continue
             target = unquote(parts.path).lstrip("/")
             if not (tools.HTML / target).is_file() or (
-                target in anchors and unquote(parts.fragment) not in anchors[target].names
+                target in anchors and unquote(parts.fragment) not in {"", "top"} | anchors[target].values("id", "name")
             ):
                 dead.append(f"{address}: {link}")
     assert dead == []

@@ -116,7 +116,7 @@ def test_a_survey_visits_every_format_size_and_kind(sort):
     sizes = 4 if sort in ("sum", "product", "dot") else 3
     assert len(trials) == len(experiment.SURVEYED) * kinds * sizes * 2
     assert list(dict.fromkeys(trial.fmt for trial in trials)) == list(experiment.SURVEYED)
-    assert {fmt.rounding for fmt in experiment.SURVEYED} == set(Rounding)
+    assert {fmt.rounding for fmt in experiment.SURVEYED} == set(Rounding.documented())
     assert {2, 3, 10, 16} == {fmt.base for fmt in experiment.SURVEYED}
 
 
@@ -221,7 +221,7 @@ def test_significands_are_uniform():
     assert abs(counts - 1000).max() < 150  # five standard deviations, 30 each
 
 
-@pytest.mark.parametrize("rule", Rounding)
+@pytest.mark.parametrize("rule", Rounding.documented())
 def test_the_sawtooth_is_the_error_of_rounding(rule):
     fmt = FloatFormat(10, 2, rule)
     result = experiment.sawtooth(fmt, 2000)
@@ -240,7 +240,7 @@ def test_the_sawtooth_is_the_error_of_rounding(rule):
 
 
 @pytest.mark.parametrize("kind", [*experiment.KINDS, "constant"])
-@pytest.mark.parametrize("rule", Rounding)
+@pytest.mark.parametrize("rule", Rounding.documented())
 def test_growth_is_the_error_of_each_sum(kind, rule):
     fmt = FloatFormat(10, 3, rule)
     result = experiment.growth(fmt, kind, (7, 2, 4), 5, np.random.default_rng(6))
@@ -317,7 +317,9 @@ def test_ties_exceed_18_nearly_twice():
     assert 1.9 < trial.ratio("1984 (18)") < 2
 
 
-@pytest.mark.parametrize("fmt", [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 4), (16, 3)) for r in Rounding])
+@pytest.mark.parametrize(
+    "fmt", [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 4), (16, 3)) for r in Rounding.documented()]
+)
 def test_a_product_that_cancels_exceeds_31_by_the_base_to_the_digits(fmt):
     unit = Fraction(1, fmt.base ** (fmt.precision - 1))
     row, column = fmt.array([[1 + unit, -(1 + 2 * unit)]]), fmt.array([[1 + unit], [1]])

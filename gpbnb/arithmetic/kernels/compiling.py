@@ -13,7 +13,6 @@ import os
 import pickle
 import platform
 import sys
-import time
 from collections.abc import Callable
 from functools import cache, lru_cache
 from pathlib import Path
@@ -25,16 +24,10 @@ import numpy as np
 from numba import njit
 from numba.core import caching
 
-from gpbnb.caching import cache_folder, digest, imported, writable
-
-try:
-    import fcntl
-except ImportError:  # Windows: processes do not wait for each other there
-    fcntl = None  # type: ignore[assignment]
+from gpbnb.caching import cache_folder, changed_since_import, digest, imported, lock, remove_unused, unlock, writable
 
 _VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
 _LONGEST_WAIT = 240.0  # seconds, for another process that compiles the same
-_KEPT = 30 * 24 * 3600.0  # seconds after its last use
 _NOTICE = (
     "gpbnb: compiling for this processor. The first use of a function takes up to a minute; "
     "later runs load the result from {}.\n"
@@ -47,7 +40,8 @@ def compiled(function: Callable[..., Any]) -> Any:
     It releases the interpreter's lock.
     """
     dispatcher = njit(nogil=True)(function)
-    if _folder() is not None:
+    sources = imported(Path(function.__code__.co_filename).resolve())
+    if _folder() is not None and not changed_since_import(sources):
         dispatcher._cache = _Cache(function)
     return dispatcher
 
@@ -68,10 +62,7 @@ def _tell(folder: Path) -> None:
     if not os.environ.get("GPBNB_QUIET"):
         sys.stderr.write(_NOTICE.format(folder))
         sys.stderr.flush()
-    with contextlib.suppress(OSError):
-        for old in folder.glob("*.compiled"):
-            if time.time() - old.stat().st_mtime > _KEPT:
-                old.unlink()
+    remove_unused(folder)
 
 
 class _Locator(caching._CacheLocator):  # type: ignore[misc]
@@ -123,13 +114,14 @@ class _Files:
 
     def __init__(self, folder: Path, name: str, stamp: tuple[str, ...]) -> None:
         self._folder, self._name, self._stamp = folder, name, stamp
-        self._locks: dict[Path, IO[bytes]] = {}
+        self._locks: dict[Path, IO[bytes] | None] = {}
 
     def load(self, key: Any) -> Any:
         path = self._path(key)
         found = self._read(path, key)
         if found is None:
-            self._wait(path)
+            if path not in self._locks:  # held since a compilation that failed
+                self._locks[path] = lock(path, _LONGEST_WAIT)
             found = self._read(path, key)
             if found is None:
                 _tell(self._folder)
@@ -153,9 +145,7 @@ class _Files:
     def release(self) -> None:
         """Let the others that wait for this function read it."""
         while self._locks:
-            path, lock = self._locks.popitem()
-            path.unlink(missing_ok=True)
-            lock.close()
+            unlock(*self._locks.popitem())
 
     def _path(self, key: Any) -> Path:
         # The name need not tell all keys apart: the key stands in the file, too.
@@ -174,23 +164,3 @@ class _Files:
         with contextlib.suppress(OSError):
             os.utime(path)
         return data
-
-    def _wait(self, path: Path) -> None:
-        """Wait until no other process compiles the same, and keep others waiting until :meth:`release`."""
-        name = path.with_suffix(".lock")
-        if fcntl is None or name in self._locks:  # held since a compilation that failed
-            return
-        with contextlib.suppress(OSError):
-            lock = name.open("wb")
-            began = time.monotonic()
-            while True:
-                try:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    if time.monotonic() - began > _LONGEST_WAIT:
-                        lock.close()
-                        return
-                    time.sleep(0.05)
-                else:
-                    self._locks[name] = lock
-                    return

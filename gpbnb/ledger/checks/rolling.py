@@ -386,7 +386,7 @@ def one_degree() -> Finding:
 def cos_5() -> Finding:
     five, one = (1 - math.cos(math.radians(a)) ** 2 for a in (5, 1))
     return compare(
-        prints_as(five, ".0004", *Rounding),
+        prints_as(five, ".0004", *Rounding.documented()),
         f"$1-\\cos^25°={five:.4f}$; $1-\\cos^21°={one:.4f}$",
         Verdict.MISPRINT if one < 0.0004 < five else Verdict.WRONG,
         otherwise_note="5° for 1°, by the author or the scan: .9998 is the cosine of one degree",
@@ -398,7 +398,7 @@ def printed_cosine() -> Finding:
     value = 1 - 0.9998**2
     cosine = math.cos(math.radians(1))
     return compare(
-        prints_as(value, ".0004", *Rounding) and prints_as(cosine, ".9998", *Rounding),
+        prints_as(value, ".0004", *Rounding.documented()) and prints_as(cosine, ".9998", *Rounding.documented()),
         f"$1-.9998^2={value:.8f}$; $\\cos1°={cosine:.6f}$",
         note=f"from the full cosine, {1 - cosine**2:.4f}",
     )
@@ -473,13 +473,17 @@ def finite_wordlength() -> Finding:
 @CHECKS.add(entry("s4.sample-1-t"))
 def sample_period() -> Finding:
     rate = float(theory.roll_rate(600.0))
-    return compare(prints_as(rate, ".01047", *Rounding), f"$2\\pi/600={rate:.6f}$ rad/s, as printed next", note="given")
+    return compare(
+        prints_as(rate, ".01047", *Rounding.documented()),
+        f"$2\\pi/600={rate:.6f}$ rad/s, as printed next",
+        note="given",
+    )
 
 
 @CHECKS.add(entry("s4.sample-1-omega-r"))
 def omega_r() -> Finding:
     rate = float(theory.roll_rate(PERIOD))
-    return compare(prints_as(rate, ".01047", *Rounding), f"${rate * 10:.7f}\\times10^{{-1}}$")
+    return compare(prints_as(rate, ".01047", *Rounding.documented()), f"${rate * 10:.7f}\\times10^{{-1}}$")
 
 
 @CHECKS.add(entry("s4.sample-1-places"), entry("s4.sample-1-delta-omega"))
@@ -495,7 +499,7 @@ def six_places() -> Finding:
 @CHECKS.add(entry("s4.sample-1-period"))
 def period_1() -> Finding:
     period = 2 * math.pi / 0.5e-7
-    return compare(prints_as(period, "1.2566e8", *Rounding), f"{scientific(period, 5)} s")
+    return compare(prints_as(period, "1.2566e8", *Rounding.documented()), f"{scientific(period, 5)} s")
 
 
 @CHECKS.add(entry("s4.sample-1-4-years"))
@@ -567,7 +571,7 @@ def period_2() -> Finding:
     return compare(
         math.isclose(period, with_comma, rel_tol=1e-4),
         f"{scientific(period, 5)} s",
-        Verdict.MISPRINT if prints_as(period, "1.2566e12", *Rounding) else Verdict.WRONG,
+        Verdict.MISPRINT if prints_as(period, "1.2566e12", *Rounding.documented()) else Verdict.WRONG,
         otherwise_note="a comma for the decimal point, by the author or the scan",
     )
 
@@ -581,13 +585,15 @@ def forty_thousand() -> Finding:
 @CHECKS.add(entry("s4.sample-2-cosine"))
 def cosine_2() -> Finding:
     value = math.cos(2 * math.pi / 40000)
-    return compare(prints_as(value, ".999999987", *Rounding), f"{value:.11f}", note="chopped to nine digits in print")
+    return compare(
+        prints_as(value, ".999999987", *Rounding.documented()), f"{value:.11f}", note="chopped to nine digits in print"
+    )
 
 
 @CHECKS.add(entry("s4.sample-2-1-234e-6"))
 def percent_2() -> Finding:
     value = 100 * 2 * math.sin(math.pi / 40000) ** 2
-    return compare(prints_as(value, "1.234e-6", *Rounding), f"{scientific(value, 5)} %")
+    return compare(prints_as(value, "1.234e-6", *Rounding.documented()), f"{scientific(value, 5)} %")
 
 
 @CHECKS.add(entry("s4.sample-2-negligible"))

@@ -1,21 +1,23 @@
-"""gpbnb.ledger.checks.kalman: each entry of sections 12 and 13 has a check, and each check can come out otherwise."""
+"""gpbnb.ledger.checks.kalman: each entry of sections 12 to 14 has a check, and each check can come out otherwise."""
 
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace as changed
 from fractions import Fraction
 
 import faults
 import numpy as np
 import pytest
 import sympy as sp
-from faults import all_of, always, breaks, finding, replace
+from alterations import altered
+from faults import always, breaks, finding, replace
 
 from gpbnb import ledger
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.display.derivation import Derivation, Step
-from gpbnb.kalman import contraction, derivation, exact_step, report_bounds, smallest
+from gpbnb.kalman import contraction, derivation, report_bounds, smallest
 from gpbnb.ledger.checks import kalman as checks
+from gpbnb.ledger.checks.kalman import algebra, bounds, example, excess, filter_run, remarks, steps
 from gpbnb.ledger.finding import Verdict
 
 INVENTORY = faults.INVENTORY
@@ -23,7 +25,8 @@ ENTRIES = (
     *ledger.select(INVENTORY, "hung1984", "II", (12, 13, 14)),
     *ledger.select(INVENTORY, "hung1982", "III", (12, 13)),
 )
-FUNCTIONS = faults.functions(checks.CHECKS)
+BY_ID = {entry.id: entry for entry in ENTRIES}
+MODULES = (algebra, bounds, example, excess, filter_run, remarks, steps)
 
 
 @pytest.fixture(scope="module")
@@ -31,11 +34,33 @@ def rows():
     return faults.examined(ENTRIES)
 
 
+@pytest.fixture
+def patch(monkeypatch):
+    """Change the code, with nothing remembered; undone, and forgotten, afterwards."""
+    with faults.forgetting(monkeypatch, *MODULES):
+        yield monkeypatch
+
+
+def in_both(place):
+    return f"hung1984.II.{place}", f"hung1982.III.{place}"
+
+
+def judged(key, form=None):
+    entry = BY_ID[key]
+    return checks.CHECKS.run(entry if form is None else changed(entry, form=form))
+
+
+def corrected(key, old, new):
+    form = BY_ID[key].form
+    assert old in form
+    return judged(key, form.replace(old, new))
+
+
 # -- the present state ----------------------------------------------------------------------------
 
 
 def test_every_entry_of_the_sections_has_a_check_here_and_no_other_has():
-    assert set(checks.CHECKS) == {entry.id for entry in ENTRIES}
+    assert set(checks.CHECKS) == set(BY_ID)
     assert len(ENTRIES) == 114
 
 
@@ -46,28 +71,39 @@ def test_verdicts_by_document(rows):
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {
-        "verified": 20,
-        "misprint": 7,
-        "wrong": 29,
-        "inconsistent": 3,
-        "ocr": 1,
-        "unverifiable": 3,
+        "verified": 16, "misprint": 7, "wrong": 29, "inconsistent": 3, "ocr": 1, "unverifiable": 1, "given": 6,
         "answered": 2,
-    }
+    }  # fmt: skip
     assert counts["hung1982"] == {
-        "verified": 11,
-        "misprint": 1,
-        "wrong": 28,
-        "inconsistent": 1,
-        "ocr": 1,
-        "unverifiable": 2,
-        "answered": 2,
-        "open": 3,
+        "verified": 9, "misprint": 2, "wrong": 27, "inconsistent": 1, "ocr": 1, "unverifiable": 1, "given": 3,
+        "answered": 2, "open": 3,
+    }  # fmt: skip
+
+
+def test_every_printed_equation_and_number_is_machine_readable():
+    without = {entry.id for entry in ENTRIES if not entry.form and entry.kind != "open"}
+    assert without == {
+        "hung1984.II.s12.example-one-term",
+        "hung1982.III.s12.example-one-term",
+        "hung1984.II.s13.several-approaches",
+        "hung1982.III.s13.several-approaches",
+        "hung1984.II.s14.references",
+        "hung1982.III.s12.all-other-numbered-eqs-23-25-29-33-41-43-45-49-5",
     }
+    assert {judged(key).verdict for key in without} == {Verdict.GIVEN, Verdict.UNVERIFIABLE}
 
 
 def test_no_finding_is_without_a_note_where_it_differs(rows):
     faults.check_texts(rows)
+    assert all(row.finding.root for row in rows if row.finding.verdict is Verdict.WRONG)
+
+
+def test_twins_have_the_same_verdict(rows):
+    verdicts = {row.statement.id: row.finding.verdict for row in rows}
+    for key, verdict in verdicts.items():
+        twin = key.replace("hung1984.II.", "hung1982.III.")
+        if twin in verdicts and key not in ("hung1984.II.eq123",):  # whose last term is lost from the scan of 1982
+            assert verdicts[twin] is verdict, key
 
 
 def test_findings_quote_the_computed_numbers(rows):
@@ -76,6 +112,7 @@ def test_findings_quote_the_computed_numbers(rows):
         ("eq108", "222 times"),
         ("eq125", "125 times"),
         ("eq104", "2.14 times"),
+        ("s12.assumptions-before-122", "1.62"),
         ("s12.example-first-coefficient", "2.5860"),
         ("s12.example-second-coefficient", "4.0775"),
         ("s12.example-9-digits", "10; for the printed β 10"),
@@ -88,210 +125,111 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "7n+4m+6$ or $7n+3m+8" in finding(rows, "hung1984.II.s12.example-first-coefficient").note
 
 
-# -- each check can come out otherwise ------------------------------------------------------------
+# -- what is wrong could be right -----------------------------------------------------------------
+
+UNCOUNTED = "F_hat_3*F_hat_2*F_hat_1*x_0 + F_hat_3*F_hat_2*u_hat_1 + F_hat_3*u_hat_2 + u_hat_3"
+CORRECTIONS = [
+    *((key, "Q[k];" if "98-101" in key else "Q[k]", "Q[k-1];" if "98-101" in key else "Q[k-1]")
+      for key in ("hung1984.II.eq100", "hung1982.III.eq98-101")),
+    ("hung1984.II.eq101", "K_p*", "K[k]*"),
+    ("hung1984.II.eq115", "*F_k", "*F_k - (n+1)*epsilon*F_k - (4*n+3*m+3)*epsilon*phi[k-1]"),
+    ("hung1984.II.eq116", "4*n+3*m+4", "4*n+3*m+3"),
+    ("hung1982.III.eq123", "F[4]*u[3]", "F[4]*u[3] + u[4]"),
+    *((key, " - (", " + (") for key in in_both("eq121")),
+    *((key, "2.6490e8", "2.5860e8") for key in in_both("s12.example-first-coefficient")),
+    *((key, "1.2949e16", "4.0775e14") for key in in_both("s12.example-second-coefficient")),
+    ("hung1984.II.s12.example-beta-first-term", "0.3775e8", "0.3867e-8"),
+    ("hung1982.III.s12.example-beta-first", "0.3775e-8", "0.3867e-8"),
+    ("hung1984.II.s12.example-beta-second-term", ".7723e-16", ".2452e-14"),
+    ("hung1982.III.s12.example-beta-second", ".7723e-16", ".2452e-14"),
+    *((key, "9", "10") for key in in_both("s12.example-9-digits")),
+    *((key, "17", "16") for key in in_both("s12.example-17-digits")),
+    *((key, "== 1", "== 1/6606") for key in in_both("s12.example-criterion")),
+    *((key, "== 1", "== 1/6606") for key in in_both("s12.example-criterion-second")),
+]  # fmt: skip
 
 
-@pytest.fixture
-def patch(monkeypatch):
-    """Change the code, with nothing remembered; undone, and forgotten, afterwards."""
-    with faults.forgetting(monkeypatch, checks):
-        yield monkeypatch
+@pytest.mark.parametrize(("key", "old", "new"), CORRECTIONS)
+def test_a_corrected_statement_is_verified(key, old, new):
+    assert judged(key).verdict not in (Verdict.VERIFIED, Verdict.GIVEN)
+    assert corrected(key, old, new).verdict is Verdict.VERIFIED
 
 
-RIGHT = Derivation((Step("right", sp.Integer(1), sp.Integer(1)),) * 12)
+@pytest.mark.parametrize("key", ["hung1984.II.s12.unnumbered-x-3", "hung1982.III.eq114-117-and-rounded-x-3"])
+def test_without_the_second_count_the_rounded_state_is_verified(key):
+    assert judged(key, f"x_hat_3 == {UNCOUNTED}").verdict is Verdict.VERIFIED
 
 
-def fails(name):
-    return breaks(derivation, name)
+@pytest.mark.parametrize("key", in_both("s12.model-equations"))
+def test_a_model_with_its_transpose_is_given(key):
+    assert corrected(key, "w[k]*v[j]", "w[k]*v[j].T").verdict is Verdict.GIVEN
 
 
-STEP = exact_step.exact_step
-no_excess = replace(checks, "excess", always(0.5))
-mild = replace(smallest, "ratios", always(smallest.Ratios(0.5, 0.5, 0.5)))
+@pytest.mark.parametrize("key", ["hung1984.II.eq109", "hung1984.II.eq110"])
+def test_another_definition_would_be_wrong(key):
+    for name, other in altered(BY_ID[key]):
+        try:
+            verdict = checks.CHECKS.run(other).verdict
+        except LookupError:  # an index beyond the run
+            continue
+        assert verdict is Verdict.WRONG, name
 
 
-def other_step(**changed):
-    """An exact step that errs in some of its parts."""
+# -- the report's algebra, with no filter to exceed it --------------------------------------------
 
-    def step(*arguments):
-        found = STEP(*arguments)
-        return found._replace(**{name: getattr(found, name) * factor for name, factor in changed.items()})
-
-    return replace(exact_step, "exact_step", step)
-
-
-#: For each check that agrees, changes of the code under which it must not.
-DISAGREE = [
-    ("estimate", other_step(x=2)),
-    ("gains", other_step(gain=2)),
-    ("gains", fails("contraction")),
-    ("prediction_recalled", replace(checks, "variance", always(sp.Integer(0)))),
-    ("recalled", other_step(P=2)),
-    ("recalled", other_step(transition=2)),
-    ("recalled", replace(checks, "predicted", always(False))),
-    ("asterisk_1982", replace(checks, "loops_close", always(False))),
-    ("asterisk_1982", replace(checks, "asterisk", lambda: checks.compare(True, "the same"))),
-    ("inverse_of_r", replace(FloatFormat, "unit_roundoff", Fraction(1, 4000))),
-    ("closed_loop", other_step(transition=2)),
-    ("closed_loop", other_step(gain=2)),
-    ("rewritten", replace(derivation, "ONCE", derivation.TWICE)),
-    ("rewritten", fails("report")),
-    ("unrolled", other_step(transition=2)),
-    ("unrolled", replace(checks, "unfolds", always(False))),
-    ("unrolled", fails("propagated")),
-    ("pattern", fails("general")),
-    ("dependence", replace(report_bounds, "state_bound", lambda x, B, beta, counts: beta * counts.first * x)),
-    ("dependence", replace(report_bounds, "state_bound", lambda x, B, beta, counts: counts.first * x + B)),
-    ("formula_8", replace(FloatFormat, "unit_roundoff", Fraction(1, 2000))),
-    ("steps_of_a_year", replace(checks, "STEP", 20)),
-    ("steps_of_a_year", replace(report_bounds, "EXAMPLE", (3_153_601, 10, 2))),
-    ("one_term", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 10**9)))),
-    ("remark_1", replace(checks, "refined", always((240, 1, 20.0)))),
-    ("remark_1", replace(checks, "refined", always((240, 0, 2000.0)))),
-    ("remark_1", replace(contraction, "state_error_bound", lambda bound: np.zeros(2))),
-    ("remark_1", replace(contraction, "covariance_error_bound", lambda bound: np.full((2, 2), 1e9))),
-    ("remark_1", fails("contraction")),
-    ("remark_1", fails("recursion")),
-    ("remark_2", replace(checks, "year_again", always(False))),
-    ("remark_2", replace(checks, "GOAL", Fraction(1, 10**20))),
+ALGEBRA_IS_RIGHT = [
+    *in_both("eq102"), *in_both("eq103"), *in_both("eq106"), *in_both("eq107"), *in_both("eq108"),
+    *in_both("s12.unnumbered-p-k-before-107"), "hung1984.II.eq112", "hung1984.II.eq113", "hung1984.II.eq114",
+    "hung1982.III.eq120", *in_both("eq122"), "hung1984.II.eq124", "hung1984.II.eq125", "hung1982.III.eq124-125",
+]  # fmt: skip
+ALGEBRA_IS_MISPRINTED = [
+    *((key, "*P_kp*(1+n*epsilon) ==", "*P_hat_kp*(1+n*epsilon) ==") for key in in_both("eq104")),
+    *((key, "(I - K_k*P_k)*(2*n+1)*P_kp", "(I - K_k*H_k)*(2*n+1)*epsilon*P_kp") for key in in_both("eq105")),
+    ("hung1982.III.eq112", "(4*n+3*n+3)*epsilon*I", "(4*n+3*m+3)*epsilon*phi[k-1]"),
+    ("hung1982.III.eq113", "3*n+2*m+3", "4*n+2*m+3"),
+    *((key, "(3*m+1)", "(3*n+1)") for key in (*in_both("eq119"), "hung1984.II.eq120")),
 ]
 
-
-@pytest.mark.parametrize(("name", "change"), DISAGREE)
-def test_a_check_that_agrees_can_disagree(rows, patch, name, change):
-    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {True}
-    change(patch)
-    faults.check_disagrees(FUNCTIONS[name])
+#: In 1982 the first line is an inequality as well, so that dropping its negative term is the report's own step.
+STILL_FOLLOWS = {"hung1982.III.eq108": ["1 dropped term at 4"]}
 
 
-#: For each check that disagrees, changes under which print and code say the same.
-AGREE = [
-    ("model_equations", replace(checks, "DIMENSIONS", (3, 1))),
-    ("prediction", replace(checks, "predicted", always(True))),
-    ("covariance", replace(checks, "quote", always("$P_k=P_{kp}-K_kH_kP_{kp}$"))),
-    *(
-        (name, no_excess)
-        for name in (
-            "rounded_prediction",
-            "rounded_covariance",
-            "covariance_bound",
-            "rounded_gain",
-            "gain_error",
-            "gain_bound",
-            "rounded_loop",
-            "rounded_input",
-            "rounded_state",
-            "three_steps_3n",
-            "three_steps_bounded",
-            "four_steps_bounded",
-            "main_result",
-            "others_of_1982",
-        )
-    ),
-    (
-        "rounded_loop_1982",
-        all_of(
-            no_excess,
-            replace(checks, "M", checks.N),
-            replace(derivation, "M", derivation.N),
-            replace(checks, "LAST_OF_112", derivation.PHI),
-        ),
-    ),
-    (
-        "rounded_input_1982",
-        all_of(
-            no_excess,
-            replace(derivation, "gain_error", lambda: (3 * checks.N + 2 * checks.M + 3) * derivation.KZ),
-            replace(derivation, "report", lambda: RIGHT),
-        ),
-    ),
-    ("unrolled_1982", other_step(gain=0, x=0, transition=0)),
-    ("defined_again", replace(derivation, "ONCE", (5 * checks.N + 3 * checks.M + 4, 4 * checks.N + 3 * checks.M + 3))),
-    ("counted_twice", replace(derivation, "TWICE", derivation.ONCE)),
-    (
-        "three_steps_3m",
-        all_of(
-            no_excess,
-            replace(derivation, "count_input", lambda c, d: sp.expand(3 * c) - 3 * checks.M - 1),
-            replace(derivation, "general", lambda: RIGHT),
-        ),
-    ),
-    ("norm_with_minus", replace(derivation, "count_input", lambda c, d: sp.expand(4 * derivation.K * c))),
-    ("assumptions", replace(checks, "column_sum_norm", always(Fraction(1)))),
-    ("usefulness", mild),
-    (
-        "first_coefficient",
-        replace(report_bounds, "coefficients", always(report_bounds.Coefficients(84 * 3_153_600, 12949 * 10**12))),
-    ),
-    (
-        "second_coefficient",
-        replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 12949 * 10**12))),
-    ),
-    (
-        "first_beta",
-        replace(report_bounds, "coefficients", always(report_bounds.Coefficients(Fraction(1, 37_750_000), 1))),
-    ),
-    ("first_beta_1982", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(84 * 3_153_600, 1)))),
-    ("second_beta", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 12949 * 10**12)))),
-    ("first_digits", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(10**8, 1)))),
-    ("second_digits", replace(report_bounds, "coefficients", always(report_bounds.Coefficients(1, 12949 * 10**12)))),
-    ("criterion", replace(checks, "GOAL", 6606)),
-    ("asterisk", replace(smallest, "rounded_step", lambda fmt, case: (STEP(*case).x, None, None))),
-    ("word", replace(checks, "quote", always("$k$, the number of iterations"))),
-    ("reference_1", replace(checks, "TITLES", {1: "Rounding Errors in Algebraic Process"})),
-    ("reference_5", replace(checks, "TITLES", {5: "Introduction to Numerical Computation"})),
-    ("reference_7", replace(checks, "CONTRACT", "NA58-34426")),
-    ("name_of_the_experiment", replace(checks, "quote", always("one year GP-B operation"))),
-]
+def no_excess(patch):
+    patch.setattr(excess, "excess", always(0.5))
+    patch.setattr(bounds, "excess", always(0.5))
 
 
-@pytest.mark.parametrize(("name", "change"), AGREE)
-def test_a_check_that_disagrees_can_agree(rows, patch, name, change):
-    assert {found.agrees for found in faults.findings_of(rows, checks.CHECKS, name)} == {False}
-    change(patch)
-    faults.check_agrees(FUNCTIONS[name])
-
-
-@pytest.mark.parametrize(
-    ("name", "broken"),
-    [
-        ("rounded_prediction", "report"),
-        ("rounded_covariance", "report"),
-        ("covariance_bound", "report"),
-        ("covariance_bound", "smallest"),
-        ("rounded_gain", "report"),
-        ("gain_error", "report"),
-        ("gain_bound", "smallest"),
-        ("rounded_loop", "report"),
-        ("rounded_input_1982", "report"),
-        ("rounded_input", "report"),
-        ("rounded_state", "report"),
-        ("three_steps_3n", "general"),
-        ("three_steps_bounded", "general"),
-        ("four_steps_bounded", "general"),
-        ("main_result", "general"),
-    ],
-)
-def test_a_printed_step_needs_its_algebra_too(patch, name, broken):
+@pytest.mark.parametrize("key", ALGEBRA_IS_RIGHT)
+def test_a_step_that_no_filter_exceeds_is_verified_as_printed_only(patch, key):
+    assert judged(key).verdict is Verdict.WRONG
     no_excess(patch)
-    fails(broken)(patch)
-    assert FUNCTIONS[name]().verdict is Verdict.WRONG
+    assert judged(key).verdict is Verdict.VERIFIED
+    right = []
+    for name, other in altered(BY_ID[key]):
+        try:
+            if checks.CHECKS.run(other).verdict is Verdict.VERIFIED:
+                right.append((name, other.form))
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            pass
+    assert [name for name, _ in right] == STILL_FOLLOWS.get(key, [])
 
 
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("model_equations", other_step(x=2)),
-        ("prediction", replace(checks, "variance", always(sp.Integer(0)))),
-        ("covariance", other_step(P=2)),
-        ("unrolled_1982", other_step(transition=2)),
-        ("unrolled_1982", replace(derivation, "TWICE", derivation.ONCE)),
-        ("asterisk", other_step(gain=2, transition=3)),
-    ],
-)
-def test_a_slip_is_one_only_if_what_follows_is_right(patch, name, change):
-    change(patch)
-    assert FUNCTIONS[name]().verdict is Verdict.WRONG
+@pytest.mark.parametrize(("key", "old", "new"), ALGEBRA_IS_MISPRINTED)
+def test_a_misprinted_step_is_wrong_even_if_no_filter_exceeds_it(patch, key, old, new):
+    no_excess(patch)
+    assert judged(key).verdict is Verdict.WRONG
+    assert corrected(key, old, new).verdict is Verdict.VERIFIED
+
+
+def test_the_filter_alone_makes_a_step_wrong():
+    assert {judged(key).verdict for key in ALGEBRA_IS_RIGHT} == {Verdict.WRONG}
+
+
+def test_claims_about_the_bound_follow_it(patch):
+    no_excess(patch)
+    patch.setattr(smallest, "ratios", always(smallest.Ratios(0.5, 0.5, 0.5)))
+    for place in ("s12.claim-main-result", "s12.claim-usefulness"):
+        assert {judged(key).verdict for key in in_both(place)} == {Verdict.VERIFIED}
 
 
 @pytest.mark.parametrize(
@@ -300,44 +238,60 @@ def test_a_slip_is_one_only_if_what_follows_is_right(patch, name, change):
 )
 def test_every_excess_is_of_the_arithmetic(patch, statement):
     """Where products cancel exactly in forty digits, nothing is exceeded; the others are, in any format."""
-    assert checks.excess(statement) > 1
-    patch.setattr(checks, "FOUR", FloatFormat(10, 40, Rounding.NEAREST))
-    checks.excess.cache_clear()
-    assert (checks.excess(statement) > 1) == (statement not in ("(102)", "(106)"))
-
-
-@pytest.mark.parametrize(
-    "only",
-    [
-        all_of(replace(checks, "M", checks.N), replace(derivation, "M", derivation.N)),
-        replace(checks, "LAST_OF_112", derivation.PHI),
-    ],
-)
-def test_both_letters_of_112_count(patch, only):
-    no_excess(patch)
-    only(patch)
-    assert FUNCTIONS["rounded_loop_1982"]().verdict is Verdict.WRONG
-
-
-def test_the_sums_of_inputs_need_the_newest_one():
-    assert checks.unfolds()
-    assert not checks.unfolds(newest=False)
-    assert checks.inputs_of_124() == [4]
+    assert excess.excess(statement) > 1
+    patch.setattr(excess, "FOUR", FloatFormat(10, 40, Rounding.NEAREST))
+    excess.excess.cache_clear()
+    assert (excess.excess(statement) > 1) == (statement not in ("(102)", "(106)"))
 
 
 def test_an_unknown_statement_has_no_excess():
     with pytest.raises(KeyError):
-        checks.excess("(1)")
+        excess.excess("(1)")
 
 
-def test_every_check_is_among_those_that_can_come_out_otherwise():
-    tried = {name for name, _ in (*DISAGREE, *AGREE)}
-    # Nothing to compare: their data is not there.
-    assert set(FUNCTIONS) - tried == {
-        "dimensions",
-        "several_approaches",
-        "remark_3",
-        "remark_4",
-        "remark_5",
-        "references",
-    }
+# -- what is right could be wrong -----------------------------------------------------------------
+
+NOT_RIGHT = [
+    ("hung1984.II.eq117", replace(derivation, "ONCE", derivation.TWICE)),
+    ("hung1984.II.s12.r-1-rounding", replace(FloatFormat, "unit_roundoff", Fraction(1, 4000))),
+    ("hung1984.II.s12.claim-similar-derivation", replace(derivation, "TWICE", derivation.ONCE)),
+    ("hung1984.II.s12.125-found-from-pattern", replace(derivation, "TWICE", derivation.ONCE)),
+    ("hung1984.II.s12.125-dependence", replace(report_bounds, "state_bound", lambda x, B, beta, c: beta * c.first * x)),
+    ("hung1984.II.s12.125-dependence", replace(report_bounds, "state_bound", lambda x, B, beta, c: c.first * x + B)),
+    ("hung1984.II.s12.example-k", replace(example, "STEP", 20)),
+    ("hung1984.II.s12.example-formula-8", replace(FloatFormat, "round", lambda self, value: Fraction(1))),
+    ("hung1984.II.s13.remark-1", replace(remarks, "refined", always((240, 1, 20.0)))),
+    ("hung1984.II.s13.remark-1", replace(remarks, "refined", always((240, 0, 2000.0)))),
+    ("hung1984.II.s13.remark-1", replace(contraction, "state_error_bound", lambda bound: np.zeros(2))),
+    ("hung1984.II.s13.remark-1", replace(contraction, "covariance_error_bound", lambda bound: np.full((2, 2), 1e9))),
+    ("hung1984.II.s13.remark-1", breaks(derivation, "contraction")),
+    ("hung1984.II.s13.remark-1", breaks(derivation, "recursion")),
+    ("hung1984.II.s13.remark-2", replace(remarks, "year_again", always(False))),
+    ("hung1984.II.s13.remark-2", replace(remarks, "GOAL", Fraction(1, 10**20))),
+]
+
+
+@pytest.mark.parametrize(("key", "change"), NOT_RIGHT)
+def test_a_check_that_agrees_can_disagree(patch, key, change):
+    assert judged(key).agrees is True
+    faults.forget(*MODULES)
+    change(patch)
+    assert judged(key).agrees is False
+
+
+@pytest.mark.parametrize("letter", ["x", "P", "K", "F", "u", "prior"])
+def test_exact_equations_depend_on_every_letter_of_the_run(patch, letter):
+    """Where a letter of the reference run is off, the equations that contain it do not hold."""
+    contain = {
+        "x": ("eq98", "eq98-repeated", "eq111", "eq118", "eq123"),
+        "P": ("eq99", "s12.eq100-recalled", "s12.eq101-recalled"),
+        "K": ("eq98", "eq99", "s12.eq99-recalled", "s12.eq101-recalled"),
+        "F": ("eq111", "eq118", "eq123"),
+        "u": ("eq111", "eq118", "eq123"),
+        "prior": ("eq99", "s12.eq100-recalled", "s12.eq101-recalled"),
+    }[letter]
+    run = {name: dict(values) for name, values in filter_run.least_squares_run().items()}
+    run[letter] = {k: value + sp.ones(*value.shape) for k, value in run[letter].items()}
+    patch.setattr(filter_run, "least_squares_run", lambda: run)
+    for place in contain:
+        assert judged(f"hung1984.II.{place}").verdict is Verdict.WRONG, place

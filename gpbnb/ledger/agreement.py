@@ -1,0 +1,54 @@
+"""Decide whether printed relations hold for given values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import sympy as sp
+
+from gpbnb.ledger.formula import OPERATORS, Link
+
+DIGITS = 50
+"""Digits to which two sides are evaluated when they hold exponentials or roots."""
+NOTHING = sp.Float("1e-40", DIGITS)
+"""Largest difference that the rounding errors of the evaluation may leave."""
+
+
+def vanishes(expression: Any) -> bool:
+    """Whether an expression or every entry of a matrix is zero.
+
+    Rational values are compared exactly. Exponentials and roots of rational values are evaluated to 50 digits. An
+    expression with symbols vanishes if it expands to zero.
+    """
+    if isinstance(expression, sp.MatrixBase):
+        return all(vanishes(entry) for entry in expression)
+    expression = sp.sympify(expression)
+    if expression.free_symbols:
+        return bool(sp.expand(expression) == 0)
+    if expression.is_Rational:
+        return bool(expression == 0)
+    value = sp.N(expression, DIGITS)
+    return bool(value.is_number and abs(value) < NOTHING)
+
+
+def holds(link: Link) -> bool:
+    """Whether one comparison holds; an equation between matrices of different shapes does not."""
+    left, right = (matrix_of(side) for side in (link.left, link.right))
+    shapes = [side.shape if isinstance(side, sp.MatrixBase) else () for side in (left, right)]
+    if link.symbol in ("==", "!="):
+        equal = shapes[0] == shapes[1] and vanishes(left - right)
+        return equal == (link.symbol == "==")
+    compare = next(function for name, _, function in OPERATORS.values() if name == link.symbol)
+    return bool(compare(sp.N(left, DIGITS), sp.N(right, DIGITS)))
+
+
+def hold(links: Iterable[Link]) -> bool:
+    """Whether there are comparisons, and all of them hold."""
+    results = [holds(link) for link in links]
+    return bool(results) and all(results)
+
+
+def matrix_of(value: Any) -> Any:
+    """A SymPy matrix for nested lists, and any other value as it is."""
+    return sp.Matrix(value) if isinstance(value, list) else value

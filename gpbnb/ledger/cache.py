@@ -1,0 +1,137 @@
+"""Findings that are kept between runs, one file for each module of checks.
+
+The name of a file has a digest of everything its findings depend on: the sources that the module imports, directly or
+through others, the data beside them, the versions of the libraries, and the processor. A change of any of them gives
+another file. Several processes share the files; while one runs checks of a module, the others wait for its findings.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from functools import cache, lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from gpbnb.caching import cache_folder, changed_since_import, digest, imported, locked, remove_unused, with_data
+from gpbnb.ledger.finding import Finding, Verdict
+from gpbnb.ledger.statements import Statement
+
+_LIBRARIES = ("matplotlib", "mpmath", "numba", "numpy", "python-flint", "scipy", "sympy")
+_SETTINGS = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")
+_LONGEST_WAIT = 600.0  # seconds
+
+
+_FIELDS = tuple(field.name for field in fields(Finding))
+
+
+class Findings:
+    """The findings of one module of checks that are known so far."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._known = {} if path is None else _read(path)
+        self._changed = False
+
+    def get(self, statement: Statement) -> Finding | None:
+        """The finding on a statement, or None if its check has not been run yet."""
+        return self._known.get(_name(statement))
+
+    def put(self, statement: Statement, finding: Finding) -> None:
+        """Keep a finding."""
+        self._known[_name(statement)] = finding
+        self._changed = True
+
+    def save(self) -> None:
+        """Write the file, if there is something new."""
+        if self._path is None or not self._changed:
+            return
+        content = {name: [getattr(each, field) for field in _FIELDS] for name, each in self._known.items()}
+        draft = self._path.with_name(f"{self._path.name}.{os.getpid()}.tmp")
+        try:
+            draft.write_text(json.dumps(content, default=lambda verdict: verdict.value), encoding="utf-8")
+            draft.replace(self._path)
+        except OSError:  # a full disk costs time only
+            draft.unlink(missing_ok=True)
+
+
+def known(module: Path) -> Findings:
+    """The findings of a module of checks, to read alone.
+
+    Parameters
+    ----------
+    module : the file of the module.
+    """
+    return Findings(_file(module))
+
+
+@contextmanager
+def shared(module: Path) -> Iterator[Findings]:
+    """The findings of a module of checks, to add to: other processes wait, and the findings are saved at the end."""
+    path = _file(module)
+    if path is None:
+        yield Findings(None)
+        return
+    with locked(path, _LONGEST_WAIT):
+        findings = Findings(path)
+        try:
+            yield findings
+        finally:
+            findings.save()
+
+
+@lru_cache(maxsize=1)
+def _folder() -> Path | None:
+    folder = cache_folder("ledger")
+    if folder is not None:
+        remove_unused(folder)
+    return folder
+
+
+@cache
+def _file(module: Path) -> Path | None:
+    folder = _folder()
+    if folder is None:
+        return None
+    files = with_data(imported(module))
+    if changed_since_import(files):
+        return None
+    key = (digest(files), *_environment())
+    return folder / f"{module.stem}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.json"
+
+
+@lru_cache(maxsize=1)
+def _environment() -> tuple[str, ...]:
+    versions = [version(name) for name in _LIBRARIES]
+    settings = [f"{name}={os.environ.get(name, '')}" for name in _SETTINGS]
+    return platform.python_version(), platform.system(), _processor(), *versions, *settings
+
+
+def _processor() -> str:
+    import llvmlite.binding as llvm
+
+    features = sorted(name for name, there in llvm.get_host_cpu_features().items() if there)
+    return " ".join((platform.machine(), llvm.get_host_cpu_name(), *features))
+
+
+def _name(statement: Statement) -> str:
+    return f"{statement.id} {hashlib.sha256(repr(statement).encode()).hexdigest()[:16]}"
+
+
+def _read(path: Path) -> dict[str, Finding]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        os.utime(path)
+        return {name: _finding(**dict(zip(_FIELDS, values, strict=True))) for name, values in content.items()}
+    except (OSError, ValueError, TypeError):  # not there, or damaged: the checks are run again
+        return {}
+
+
+def _finding(verdict: str, **others: Any) -> Finding:
+    return Finding(verdict=Verdict(verdict), **others)

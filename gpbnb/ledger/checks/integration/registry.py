@@ -1,0 +1,12 @@
+"""The checks of savage2016, and the ids of its equations."""
+
+from gpbnb.ledger.registry import Checks
+
+CHECKS = Checks()
+CHAPTER = "chapter *Digital integration error*"
+MAIN = "savage2016.main."
+
+
+def eq(*numbers: str) -> tuple[str, ...]:
+    """Ids of equations."""
+    return tuple(f"{MAIN}eq{number}" for number in numbers)

@@ -1,0 +1,178 @@
+"""Three steps, four, and k: (119)-(125) and the claims about them."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+from gpbnb.kalman import derivation, report_bounds, smallest
+from gpbnb.ledger.checks.kalman import algebra
+from gpbnb.ledger.checks.kalman.excess import exceeded, excess
+from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR, claims
+from gpbnb.ledger.checks.kalman.steps import SIGNS
+from gpbnb.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.ledger.registry import both
+from gpbnb.ledger.statements import Statement, statement
+
+_NO_BOUND = (
+    "one state, $P=H=\\Phi=x_0=1$, $z=0$, $R$ below the last digit: the estimate is lost altogether, in every format"
+)
+_BETA = "; the prefactor is $\\beta$, as the example has it, though the scans read B"
+
+
+@CHECKS.add(*both("eq119"), *both("eq120"))
+def three_steps(printed: Statement) -> Finding:
+    right = algebra.holds(printed, algebra.three_steps(twice=True))
+    return exceeded(
+        "(119)",
+        right,
+        "what (114) rests on fails, and roundings are counted twice; each term of (118) has an error of its own, so "
+        "their errors do not combine to one multiple of $x_3$" + ("" if right else "; $3m+1$ is printed for $3n+1$"),
+        SIGNS,
+    )
+
+
+def _instances() -> list[dict[str, Any]]:
+    """Scalars for (121): the closed loops are 1 and the inputs differ in sign; the last one makes x_3 zero."""
+    found = []
+    for x_0, u_1, u_2, u_3 in ((2, 3, 5, 7), (2, -3, 5, -7), (-3, 1, 1, 1)):
+        values = [Fraction(each) for each in (x_0, u_1, u_2, u_3)]
+        counts = [derivation.count_start(derivation.TWICE[0])] + [
+            derivation.count_input(*derivation.TWICE).subs(derivation.NTH, i) for i in (1, 2, 3)
+        ]
+        at = {derivation.K: 3, derivation.N: 1, derivation.M: 1}
+        error = sum(int(count.subs(at)) * value for count, value in zip(counts, values, strict=True))
+        found.append(
+            {"n": 1, "m": 1, "epsilon": 1, "F_3": 1, "F_2": 1, "norm": abs, "x_3": sum(values), "x_tilde_3": error}
+            | {f"u_{i}": values[i] for i in (1, 2, 3)}
+        )
+    return found
+
+
+@CHECKS.add(*both("eq121"))
+def norm_with_minus(printed: Statement) -> Finding:
+    links = [link for names in _instances() for link in printed.links(names, Fraction)]
+    last = links[-1]
+    return compare(
+        all(link.symbol == "<=" and link.left <= link.right for link in links),
+        f"for $n=m=1$, $F_k=1$, $x_0=-3$ and $u_k=1$ the left side is ${last.left}\\epsilon$ and the right side "
+        f"${last.right}\\epsilon$",
+        otherwise_note="the norm of a difference is bounded by the sum of the norms; (122) has plus signs again",
+        root="minus-signs-in-a-norm-bound",
+    )
+
+
+@CHECKS.add(*both("s12.assumptions-before-122"))
+def assumptions(printed: Statement) -> Finding:
+    """Whether the least B of the printed assumptions bounds what (122) needs it for."""
+    F, u = exact([["9/10", "9/10"], [0, 0]]), exact([1, 1])
+    need = max_norm(F @ F @ u)
+    names: dict[str, Any] = {"norm": lambda a: a, "F_k": column_sum_norm(F), "u_k": max_norm(u)}
+    loops, inputs = printed.relation(1).links(names, Fraction)[0], printed.relation(2).links(names, Fraction)[0]
+    least = {"F": loops.left, "u": inputs.left}
+    powers = [printed.relation(3).links(least | {"i": i}, Fraction)[0].left for i in range(3)]
+    return compare(
+        all(printed.relation(i).text.count("<=") for i in (1, 2, 3)) and need <= max(powers),
+        f"for two loops $F=(0.9,0.9;0,0)$ and $u=(1,1)$: $\\|FFu\\|={float(need)}$, and the least $B$ is "
+        f"{float(max(powers))}",
+        otherwise_note="the norms (21) and (22) are not compatible: $\\|Fu\\|\\le\\|F\\|\\|u\\|$ needs row sums",
+        root="incompatible-norms",
+    )
+
+
+@CHECKS.add(*both("eq122"))
+def three_steps_bounded(printed: Statement) -> Finding:
+    # Without inputs (119) and (122) allow the same.
+    return exceeded("(119)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS, name="(122)")
+
+
+@CHECKS.add("hung1984.II.eq124")
+def four_steps_bounded(printed: Statement) -> Finding:
+    return exceeded("(124)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS)
+
+
+@CHECKS.add("hung1984.II.eq125", "hung1982.III.eq124-125")
+def main_result(printed: Statement) -> Finding:
+    return exceeded("(125)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS)
+
+
+@CHECKS.add(*both("s12.claim-main-result"))
+def claim_of_a_bound(printed: Statement) -> Finding:
+    times = excess("(125)")
+    bound = times <= 1
+    return compare(
+        claims(printed, "equation (125)", {"gives the bound": bound, "does not give a bound": not bound}),
+        f"in four digits, the error of a filter is {times:.3g} times what (125) allows",
+        otherwise_note=_NO_BOUND,
+        root=SIGNS,
+    )
+
+
+@CHECKS.add(*both("s12.125-found-from-pattern"))
+def pattern(printed: Statement) -> Finding:
+    found = algebra.holds(statement("hung1984.II.eq125"), algebra.norms())
+    return compare(
+        claims(printed, "the general case", {"follows the pattern": found, "departs from the pattern": not found}),
+        "the coefficients of (125) are right by summation for every $k$, $n$, $m$",
+        note="the pattern is right; what it is the pattern of is not",
+    )
+
+
+@CHECKS.add(*both("s12.claim-similar-derivation"))
+def similar_derivation(printed: Statement) -> Finding:
+    found = algebra.holds(statement("hung1984.II.eq124"), algebra.norms())
+    return compare(
+        claims(printed, "the same derivation", {"gives (124)": found, "does not give (124)": not found}),
+        "the coefficients of (124) follow by the same sums for $k=4$",
+        note="what the derivation starts from fails",
+    )
+
+
+@CHECKS.add(*both("s12.125-dependence"))
+def dependence(printed: Statement) -> Finding:
+    def value(
+        k: int = 3, n: int = 2, m: int = 1, x: int = 1, B: int = 1, beta: Fraction = FOUR.unit_roundoff
+    ) -> Fraction:
+        return report_bounds.state_bound(Fraction(x), Fraction(B), beta, report_bounds.coefficients(k, n, m))
+
+    others = [value(k=4), value(n=3), value(m=2), value(x=2), value(B=2), value(beta=FOUR.unit_roundoff * 2)]
+    grows = all(other > value() for other in others)
+    return compare(
+        claims(printed, "the bound", {"depends on all six": grows, "is independent of some of the six": not grows}),
+        f"it grows with each of the {len(others)}",
+        note="the error depends on more: on how far $I-KH$ cancels, which none of the six shows",
+    )
+
+
+@CHECKS.add("hung1984.II.s12.word-interactions")
+def word(printed: Statement) -> Finding:
+    return compare(
+        claims(printed, "k counts", {"interactions": False, "iterations": True}),
+        "$k$ counts the iterations of the filter",
+        Verdict.MISPRINT,
+        otherwise_note="iterations are meant, and an iteration period of ten seconds",
+    )
+
+
+@CHECKS.add(*both("s12.claim-usefulness"))
+def usefulness(printed: Statement) -> Finding:
+    seventeen = FloatFormat(10, int(statement("hung1984.II.s12.example-17-digits").number("t").value))
+    times = smallest.ratios(seventeen, smallest.scalar(seventeen)).state
+    useful = times <= 1
+    return compare(
+        claims(
+            printed,
+            "equation (125)",
+            {"gives a general idea of the digits": useful, "gives no idea of the digits": not useful},
+        ),
+        f"with 17 digits, the error of a filter of one state is {times:.2g} times what (125) allows in its first step",
+        otherwise_note="the digits that a formula asks for are of use if the formula is a bound",
+        root=SIGNS,
+    )
+
+
+@CHECKS.add("hung1982.III.s12.all-other-numbered-eqs-23-25-29-33-41-43-45-49-5")
+def others_of_1982(printed: Statement) -> Finding:
+    return given(f"no statement of its own ({printed.text}): each equation is judged under its own number")

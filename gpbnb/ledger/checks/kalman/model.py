@@ -1,0 +1,118 @@
+"""The process and the filter's equations, (98)-(101) and (109)-(111)."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from gpbnb.kalman import exact_step, report_bounds, smallest
+from gpbnb.ledger.checks.kalman.filter_run import MEASUREMENTS, STATES, holds_exactly
+from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR, claims
+from gpbnb.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.ledger.registry import both
+from gpbnb.ledger.statements import Statement
+
+_EXACT = f"compared with weighted least squares in exact arithmetic, $n={STATES}$, $m={MEASUREMENTS}$"
+
+
+@CHECKS.add(*both("s12.model-equations"))
+def model_equations(printed: Statement) -> Finding:
+    w, v = sp.zeros(STATES, 1), sp.zeros(MEASUREMENTS, 1)
+    names = {"E": lambda product: product, "w": lambda k: w, "v": lambda j: v}
+    try:
+        printed.relation(4).links(names)
+    except ValueError:
+        return compare(
+            False,
+            f"with $n={STATES}$, $m={MEASUREMENTS}$ the product $w_kv_j$ does not exist; $w_kv_j^T$ does",
+            Verdict.MISPRINT,
+            note="a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ are one letter, as are $v$ and $V$",
+        )
+    return given("the model that the filter assumes")
+
+
+@CHECKS.add(*both("s12.claim-asterisk"))
+def asterisk(printed: Statement) -> Finding:
+    case = smallest.scalar(FOUR)
+    true = exact_step.exact_step(*case)
+    x, _, _ = smallest.rounded_step(FOUR, case)
+    by_111 = true.transition @ case.x + true.gain @ case.z
+    rounded = bool((x == by_111).all())
+    return compare(
+        claims(printed, "x denotes", {"the rounded value of the estimate": rounded, "the exact estimate": not rounded}),
+        f"a step of one state in four digits gives {float(x[0]):g}, equation (111) gives {float(by_111[0]):.4g}",
+        Verdict.MISPRINT,
+        otherwise_note="from (111) on $x$ is the exact estimate, as (118) says, and $\\hat x$ the rounded one",
+    )
+
+
+@CHECKS.add("hung1984.II.eq98", "hung1984.II.eq98-repeated", "hung1984.II.eq111")
+def estimate(printed: Statement) -> Finding:
+    return compare(holds_exactly(printed), f"the same estimate; {_EXACT}")
+
+
+@CHECKS.add("hung1984.II.eq99", "hung1984.II.s12.eq99-recalled")
+def gains(printed: Statement) -> Finding:
+    cyclic = report_bounds.order(second=True) is None
+    return compare(
+        holds_exactly(printed),
+        f"the same gain; {_EXACT}; with the second form "
+        + ("(99) needs (101) and (101) needs (99)" if cyclic else "an order of the four equations exists"),
+        note="the analysis (106) uses the second form, that of (104) a gain without error: no program does both",
+    )
+
+
+@CHECKS.add("hung1984.II.eq100", "hung1982.III.eq98-101")
+def prediction(printed: Statement) -> Finding:
+    return compare(
+        holds_exactly(printed),
+        r"the covariance of $\Phi_{k-1}x_{k-1}+w_{k-1}$ contains $Q_{k-1}$",
+        Verdict.INCONSISTENT,
+        otherwise_note="(100) prints $Q_k$; (102), which recalls it, has $Q_{k-1}$ in both reports. In the scan of "
+        "hung1982 neither this index nor that of $K$ in (101) is legible: the first is taken from hung1984, the second "
+        "from the sense",
+    )
+
+
+@CHECKS.add("hung1984.II.eq101")
+def covariance(printed: Statement) -> Finding:
+    return compare(
+        holds_exactly(printed),
+        "with $K_k$ it is the covariance of the least squares estimate",
+        Verdict.MISPRINT,
+        otherwise_note="$K_p$ is printed for $K_k$, which the report has where it recalls (101)",
+    )
+
+
+@CHECKS.add("hung1984.II.s12.eq100-recalled", "hung1984.II.s12.eq101-recalled", "hung1982.III.s12.recalled-98-101")
+def recalled(printed: Statement) -> Finding:
+    return compare(holds_exactly(printed), _EXACT)
+
+
+@CHECKS.add("hung1984.II.eq109", "hung1984.II.eq110")
+def defined(printed: Statement) -> Finding:
+    if holds_exactly(printed):
+        return given("the definition of $F_k$ or $u_k$; with it (111) is the estimate of (98)")
+    return compare(False, "with this definition (111) is not the estimate of (98)")
+
+
+@CHECKS.add("hung1982.III.eq109-111")
+def closed_loop(printed: Statement) -> Finding:
+    return compare(
+        holds_exactly(printed), f"the same estimate; {_EXACT}", note="where the scan is garbled, restored from hung1984"
+    )
+
+
+@CHECKS.add("hung1984.II.eq118", "hung1982.III.eq118", "hung1984.II.eq123")
+def unrolled(printed: Statement) -> Finding:
+    return compare(holds_exactly(printed), f"the same estimate; {_EXACT}")
+
+
+@CHECKS.add("hung1982.III.eq123")
+def unrolled_1982(printed: Statement) -> Finding:
+    return compare(
+        holds_exactly(printed),
+        "without $u_4$ it is not the estimate; with it, it is",
+        Verdict.OCR,
+        otherwise_note="the last term is lost from the scan, not from the report: hung1984 has it, and (124), the same "
+        "in both reports, counts it",
+    )

@@ -1,0 +1,15 @@
+"""``python -m gpbnb.sweeps verify``: compute a sample of every stored sweep again on this machine and compare."""
+
+from __future__ import annotations
+
+import sys
+
+from gpbnb.inversion import stored as inversion
+from gpbnb.kalman import stored as kalman
+from gpbnb.rolling import stored as rolling
+from gpbnb.sweeps.stored import run
+
+SWEEPS = (*kalman.stored(), *inversion.stored(), rolling.SWEEP)
+
+if __name__ == "__main__":
+    sys.exit(run(SWEEPS))

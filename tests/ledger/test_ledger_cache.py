@@ -1,0 +1,150 @@
+"""Findings are kept between runs until something changes that they depend on."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from gpbnb import caching, ledger
+from gpbnb.ledger import cache, checking
+from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.statements import load_statements
+
+PROGRAM = """
+import json, sys
+from gpbnb.ledger import checking
+from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.statements import load_statements
+
+ran, examine = [], checking.examine
+
+def noted(statements, *others):
+    statements = tuple(statements)
+    ran.extend(each.id for each in statements)
+    return examine(statements, *others)
+
+checking.examine = noted
+chosen = [each for each in load_statements() if each.id in sys.argv[1:]]
+rows = checking.examine_once(chosen)
+json.dump({"ran": ran, "outcomes": {row.statement.id: row.outcome for row in rows}}, sys.stdout)
+"""
+# One statement each of three topics: the first rests on nothing compiled, the second and third on the kernels.
+GEOMETRY, INTEGRATION, ROUNDING = "hung1982.IV.eq1", "savage2016.main.stitle.date", "hung1984.II.eq8"
+SAMPLE = (GEOMETRY, INTEGRATION, ROUNDING)
+TWO = [each for each in load_statements() if each.id in SAMPLE]
+
+
+@pytest.fixture
+def copy(tmp_path):
+    """A copy of the package; `copy(*ids)` examines entries in a new process and says which checks were run."""
+    package = tmp_path / "gpbnb"
+    shutil.copytree(caching.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "GPBNB_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(*ids: str) -> dict:
+        command = [sys.executable, "-c", PROGRAM, *ids]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+        return json.loads(done.stdout)
+
+    run.package = package
+    return run
+
+
+def append(path, text: str) -> None:
+    path.write_text(path.read_text(encoding="utf-8") + text, encoding="utf-8")
+
+
+def test_exactly_the_checks_that_depend_on_a_change_are_run_again(copy):
+    first = copy(*SAMPLE)
+    assert sorted(first["ran"]) == sorted(SAMPLE)
+    assert copy(*SAMPLE) == {"ran": [], "outcomes": first["outcomes"]}
+    append(copy.package / "arithmetic" / "kernels" / "binary.py", "# changed\n")
+    assert sorted(copy(*SAMPLE)["ran"]) == sorted([INTEGRATION, ROUNDING])
+    append(copy.package / "geometry" / "theory.py", "# changed\n")
+    assert copy(*SAMPLE)["ran"] == [GEOMETRY]
+    (copy.package / "rounding" / "stored.csv").write_text("1\n")  # data beside the sources
+    assert copy(*SAMPLE)["ran"] == [ROUNDING]
+    # The page that shows findings and the other topics change nothing.
+    append(copy.package / "ledger" / "page.py", "# changed\n")
+    append(copy.package / "rolling" / "theory.py", "# changed\n")
+    assert copy(*SAMPLE) == {"ran": [], "outcomes": first["outcomes"]}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "_folder", lambda: tmp_path)
+    cache._file.cache_clear()
+    yield tmp_path
+    cache._file.cache_clear()
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """Ids of the statements whose checks were run."""
+    found, examine = [], checking.examine
+
+    def noted(statements, *others):
+        statements = tuple(statements)
+        found.extend(each.id for each in statements)
+        return examine(statements, *others)
+
+    monkeypatch.setattr(checking, "examine", noted)
+    return found
+
+
+def test_findings_come_back_as_they_were(folder, ran):
+    fresh = ledger.examine(TWO)
+    assert checking.examine_once(TWO) == checking.examine_once(TWO) == fresh
+    assert sorted(ran) == sorted(each.id for each in TWO)
+    assert len(list(folder.glob("*.json"))) == 3
+    assert not list(folder.glob("*.lock"))
+
+
+def test_an_altered_statement_has_its_own_finding(folder, ran):
+    (original,) = [each for each in TWO if each.id == ROUNDING]
+    altered = replace(original, text=original.text + " And more.")
+    checking.examine_once([original])
+    checking.examine_once([altered])
+    assert ran == [ROUNDING, ROUNDING]
+    checking.examine_once([original, altered])
+    assert ran == [ROUNDING, ROUNDING]
+
+
+def test_a_damaged_file_is_written_anew(folder, ran):
+    before = checking.examine_once(TWO)
+    for path in folder.glob("*.json"):
+        path.write_text(path.read_text()[:50])
+    assert checking.examine_once(TWO) == before
+    assert len(ran) == 6
+    assert checking.examine_once(TWO) == before
+    assert len(ran) == 6
+
+
+def test_a_process_whose_sources_were_changed_behind_its_back_keeps_nothing(folder, ran, monkeypatch):
+    monkeypatch.setattr(caching, "_IMPORTED", 0.0)
+    checking.examine_once(TWO)
+    checking.examine_once(TWO)
+    assert len(ran) == 6
+    assert not list(folder.glob("*.json"))
+
+
+def test_an_error_is_not_kept(folder, ran, topic):
+    name = topic("broken", "@CHECKS.add('hung1984.II.eq8')\ndef fails():\n    raise RuntimeError('once')\n")
+    checks = {"broken": __import__(name).CHECKS}
+    chosen = [each for each in TWO if each.id == ROUNDING]
+    for _ in range(2):
+        (row,) = checking.examine_once(chosen, checks)
+        assert row.outcome == "failed"
+    assert ran == [ROUNDING, ROUNDING]
+
+
+def test_every_check_of_the_package_can_be_kept():
+    for statement in load_statements():
+        if any(statement.id in checks for checks in TOPICS.values()):
+            assert checking._module(statement, TOPICS) is not None, statement.id

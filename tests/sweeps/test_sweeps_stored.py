@@ -1,0 +1,67 @@
+"""The stored sweeps of the package: their files are as they were written, and no file was rewritten unnoticed."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from pathlib import Path
+
+import pytest
+
+import gpbnb
+from gpbnb.kalman import year
+from gpbnb.kalman.stored import YEAR
+from gpbnb.sweeps import DamagedFileError
+from gpbnb.sweeps.__main__ import SWEEPS
+
+PACKAGE = Path(gpbnb.__file__).parent
+DIGESTS = Path(__file__).parents[1] / "stored_digests.csv"
+
+
+def digests():
+    with DIGESTS.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.parametrize("row", digests(), ids=lambda row: row["file"])
+def test_no_stored_file_was_rewritten_unnoticed(row):
+    # After a sweep has been computed again on purpose, its line in stored_digests.csv is changed by hand.
+    found = hashlib.sha256((PACKAGE / row["file"]).read_bytes()).hexdigest()
+    assert found == row["sha256"], f"{row['file']} is not the file of which tests/stored_digests.csv has the digest"
+
+
+def test_every_stored_file_has_its_digest():
+    stored = {str(sweep.file.relative_to(PACKAGE)) for sweep in SWEEPS}
+    assert stored <= {row["file"] for row in digests()}
+    assert stored >= {"kalman/year.csv", "kalman/ensembles.csv", "inversion/random.csv", "inversion/variants.csv"}
+    beside = {"kalman/bounds.csv", "kalman/year.json", "kalman/ensembles.json"}
+    assert stored | beside == {row["file"] for row in digests()}
+
+
+@pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
+def test_every_stored_sweep_is_undamaged(sweep):
+    table = sweep.load()
+    keys = [row[: sweep.key] for row in table.rows]
+    assert len(set(keys)) == len(keys) > 0
+    assert table.provenance["command"] == sweep.command
+
+
+@pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
+def test_a_cut_sweep_is_rejected(sweep, tmp_path):
+    lines = sweep.file.read_text(encoding="utf-8").splitlines(keepends=True)
+    cut = tmp_path / sweep.file.name
+    cut.write_text("".join(lines[:-7]), encoding="utf-8")
+    with pytest.raises(DamagedFileError, match=rf"line {len(lines) - 6}: the file ends after .*{sweep.command}"):
+        sweep.load(cut)
+
+
+def test_a_year_cut_at_the_end_of_a_row_does_not_load(tmp_path):
+    text = YEAR.file.read_text(encoding="utf-8").splitlines(keepends=True)
+    (tmp_path / "year.csv").write_text("".join(text[: len(text) // 2]), encoding="utf-8")
+    (tmp_path / "year.json").write_bytes((PACKAGE / "kalman" / "year.json").read_bytes())
+    with pytest.raises(DamagedFileError, match="the file ends after"):
+        year.load(tmp_path)
+
+
+def test_a_year_is_verified_by_its_first_steps():
+    assert YEAR.verify(1, seed=3) == []
