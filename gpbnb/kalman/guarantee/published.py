@@ -30,7 +30,15 @@ def nile_local_level() -> LinearModel:
 
 def elaenia_gold() -> LinearModel:
     """A constant, 990 at first, observed with a standard deviation of 15: sandialabs/elaenia, example 05_kalman."""
-    return LinearModel(*(exact([[v]]) for v in ("1", "1", "0", "225")), exact(["990"]), exact([["100"]]), "gold")
+    return LinearModel(
+        Phi=exact([["1"]]),
+        H=exact([["1"]]),
+        Q=exact([["0"]]),
+        R=exact([["225"]]),
+        x0=exact(["990"]),
+        P0=exact([["100"]]),
+        name="elaenia, gold",
+    )
 
 
 def filterpy_velocity() -> LinearModel:

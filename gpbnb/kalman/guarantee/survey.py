@@ -25,6 +25,7 @@ ROWS = 2_000
 RANDOM, CONSTANT, CHOSEN = 40, 6, 5
 """Runs of each kind for a filter."""
 STEPS = 300
+_WHOLE = {"seed", "n", "m", "base", "precision", "runs"}
 
 
 class Row(NamedTuple):
@@ -78,7 +79,7 @@ def load(file: Path = FILE) -> tuple[Row, ...]:
     """The stored rows."""
     with file.open(encoding="utf-8", newline="") as stream:
         return tuple(
-            Row(*(int(v) if f in ("seed", "n", "m", "base", "precision", "runs") else v for f, v in line.items()))
+            Row(**{f: int(v) if f in _WHOLE else v for f, v in line.items()})  # type: ignore[arg-type]
             for line in csv.DictReader(stream)
         )
 
