@@ -34,7 +34,7 @@ FILE = Path(__file__).with_name("guarantees.csv")
 FORMAT = FloatFormat(2, 24)
 SHARE = 1e-4
 """Tolerance of each state, as a share of its limit."""
-BASES: tuple[Basis, ...] = ("guarantee", "bound", "probable", "emulation")
+BASES: tuple[Basis, ...] = ("guarantee", "probable", "emulation")
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,6 @@ class Row(NamedTuple):
     probable: str
     ratio: str
     guarantee: str
-    contraction: str
     three_sigma: str
     emulation: str
     seconds: str
@@ -117,7 +116,6 @@ def compute(case: Case) -> Row:
         f"{noise[worst_state]:.2g}",
         f"{worst.ratio:.2f}",
         bits["guarantee"],
-        bits["bound"],
         bits["probable"],
         bits["emulation"],
         f"{seconds:.1f}",
@@ -145,7 +143,7 @@ def table() -> Table:
     """Bound, sharpness and bits of each filter."""
     header = (
         "filter", "n", "m", "gain repeats from step", "bound", "probable error", "achieved / bound",
-        "bits: guarantee", "contraction bound", "3 × probable error", "emulation",
+        "bits: guarantee", "3 × probable error", "emulation",
     )  # fmt: skip
     return Table("guarantees of some filters", header, tuple(row[:-1] for row in load()))
 

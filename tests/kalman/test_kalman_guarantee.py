@@ -27,7 +27,7 @@ from gpbnb.kalman.guarantee.program import (
     sequential_program,
     steps_in_python,
 )
-from gpbnb.kalman.guarantee.published import fixif_longitudinal
+from gpbnb.kalman.guarantee.published import fixif_longitudinal, nile_local_level
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 
@@ -239,12 +239,11 @@ def test_the_computed_covariance_repeats_digit_for_digit() -> None:
 
 
 def test_the_error_of_the_gain_matters() -> None:
-    """Chopped in eight bits, the gain settles far off: without its part, the bound is violated."""
-    model = LinearModel(*(exact([[v]]) for v in ("1", "1", "0.01", "1")), exact(["0"]), exact([["1"]]))
-    found = guarantee(model, FloatFormat(2, 8, Rounding.CHOP), limits(1, 1, state=40, innovation=60))
-    outcome = attack(found, 400, 100, center=[0], plans=3)
-    assert outcome.errors[0] <= found.bound[0]
-    assert found.parts[0, GAIN] > 0.05 * found.bound[0]
+    """The first gain of the Nile filter cancels: without its part, an admissible run violates the bound."""
+    found = guarantee(nile_local_level(), FloatFormat(2, 24), limits(1, 1, state=1500, innovation=1200))
+    outcome = attack(found, 300, 100, center=[1000], plans=2)
+    assert outcome.admissible
+    assert found.bound[0] - found.parts[0, GAIN] < outcome.errors[0] <= found.bound[0]
 
 
 def test_roundings_of_the_stored_loop_matter() -> None:

@@ -127,7 +127,7 @@ def guarantee(
     ------
     ValueError : a format without compiled loops, or in which a covariance is not definite.
     """
-    return from_schedule(schedule(model, fmt, form, most), within, horizon)
+    return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon)
 
 
 def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000) -> Guarantee:

@@ -93,7 +93,9 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
                 store(fmt, D[k], (i, j), s)
 
 
-def schedule(model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_000) -> Schedule:
+def schedule(
+    model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_000, horizon: int | None = None
+) -> Schedule:
     """Coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
 
     Parameters
@@ -101,6 +103,7 @@ def schedule(model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_00
     model, fmt, form : as for a run of the filter. The exact filter has model and measurements as the format stores
         them.
     most : steps to try.
+    horizon : steps to give where the gain does not settle; by default all that were tried.
 
     Raises
     ------
@@ -121,6 +124,7 @@ def schedule(model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_00
     if end == 0:
         raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed: {why}")
     if repeat is None or period is None or why:
+        end = end if horizon is None else min(end, horizon)
         K, dK, settled, first = _exact_gains(stored, end, None, most, fmt)[:4]
         repeat = period = None
     else:
