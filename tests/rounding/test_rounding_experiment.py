@@ -95,7 +95,7 @@ FAIL = {"sum": {"1982 (18)"}, "chain": {"(31)"}, "example": {"Examples"}}
 @pytest.mark.parametrize("sort", SORTS)
 def test_bounds_in_a_sweep(sort):
     trials = survey(sort)
-    found = {each.bound: each for each in experiment.tally(trials)}
+    found = {each.bound: each for each in experiment.bound_statistics(trials)}
     assert found.keys() == HOLD[sort].keys() | FAIL.get(sort, set())
     for bound, floor in HOLD[sort].items():
         assert found[bound].violations == 0
@@ -164,7 +164,7 @@ def test_like_signs_obey_18_of_1982():
             assert not trial.violates("1982 (18)")
 
 
-# -- ratio and tally ------------------------------------------------------------------------------
+# -- ratio and bound statistics ---------------------------------------------------------------------
 
 
 def trial(error, **bounds):
@@ -182,14 +182,14 @@ def test_ratio_and_violation():
     assert not trial(0, a=0).violates("a")
 
 
-def test_tally_counts_each_bound_among_the_trials_that_have_it():
+def test_bound_statistics_count_each_bound_among_the_trials_that_have_it():
     trials = [trial(1, a=2, b=1), trial(3, a=2), trial(2, a=8, b=1), trial(0, a=5)]
-    a, b = experiment.tally(trials)
+    a, b = experiment.bound_statistics(trials)
     assert (a.bound, a.trials, a.violations, a.largest, a.median) == ("a", 4, 1, 1.5, 0.375)
     assert a.worst is trials[1]
     assert (b.bound, b.trials, b.violations, b.largest, b.median) == ("b", 2, 1, 2.0, 1.5)
     assert b.worst is trials[2]
-    assert experiment.tally([]) == ()
+    assert experiment.bound_statistics([]) == ()
 
 
 # -- data -----------------------------------------------------------------------------------------
