@@ -244,12 +244,12 @@ def _exact_gains(
     """
     n, m = stored.n, stored.m
     if period is None:
-        run = _followed(stored, repeat)
+        run = _bounded_run(stored, repeat)
         return run.G.reshape(repeat, n, m, 2), run.bounds[1], False, repeat
     unit = float(fmt.unit_roundoff)
     steps = repeat + 2 * period
     while True:
-        run = _followed(stored, steps)
+        run = _bounded_run(stored, steps)
         first = steps - period
         K = run.G.reshape(steps, n, m, 2)
         change = np.abs(K[first:, :, :, 0] - K[first - period : first, :, :, 0])
@@ -268,12 +268,12 @@ def _exact_gains(
             break
         steps = min(most, 2 * steps - repeat)
         steps = repeat + (steps - repeat) // period * period
-        run = _followed(stored, steps)
+        run = _bounded_run(stored, steps)
         first = steps - period
     return K, run.bounds[1], False, len(K)
 
 
-def _followed(stored: LinearModel, steps: int) -> BoundedRun:
+def _bounded_run(stored: LinearModel, steps: int) -> BoundedRun:
     run = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     run.take(np.zeros((steps, stored.m)))
     if run.stopped:
