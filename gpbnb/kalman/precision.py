@@ -1,4 +1,4 @@
-"""How many digits does a filter of one's own need?"""
+"""The number of digits that your own filter needs."""
 
 from __future__ import annotations
 
