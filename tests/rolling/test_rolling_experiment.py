@@ -12,6 +12,7 @@ from scipy import signal
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.ledger.checks.rolling import material
 from gpbnb.rolling import experiment, theory
+from gpbnb.rolling.flicker import record
 from gpbnb.rolling.stored import SWEEP
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
 
@@ -134,7 +135,7 @@ def test_drift_rates_are_those_of_whole_records():
     """The slow way: all in one array, fitted by np.polyfit."""
     n, interval = 3000, 10.0
     study = experiment.drift_rates([None, 77.5], 2, rng(4), LEVEL, n * interval, interval)
-    pairs = experiment.record(LEVEL, n, 4, rng(4))
+    pairs = record(LEVEL, n, 4, rng(4))
     t = np.arange(n) * interval
     for g in range(2):
         noise = pairs[:, 2 * g] + 1j * pairs[:, 2 * g + 1]
