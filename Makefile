@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test test-pages notebooks lint format exactness bench environment screenshots pdf serve clean
+.PHONY: help book test test-pages test-portable notebooks lint format exactness bench environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -45,20 +45,25 @@ help: ## list the targets
 	@scripts/make-venv.sh
 	@printf '%s\n' '$(HERE)' > $@
 
-book: .venv/made-for ## execute every notebook afresh and build the HTML book
-	@rm -rf $(HTML) _build/.doctrees
-	.venv/bin/jupyter-book build . -W -n --keep-going
+# Pages that gave a warning would be taken from the doctrees, without one, the next time.
+book: .venv/made-for ## execute the notebooks and build the HTML book; what has not changed is not computed again
+	@rm -f $(HTML)/index.html
+	.venv/bin/jupyter-book build . -W -n --keep-going || { rm -rf _build/.doctrees; exit 1; }
 	@test -f $(HTML)/index.html || { echo "make book: $(HTML)/index.html was not built" >&2; exit 1; }
 	@printf '\nThe book is ready. Open it in a browser, no network needed:\n  %s\n  file://%s\n' \
 		'$(HTML)/index.html' '$(HERE)/$(HTML)/index.html'
 
 test: .venv/made-for ## unit and property tests, and every notebook against its stored outputs
-	$(PY) -m pytest -n 2 --dist loadfile --nbval --nbval-current-env --nbval-cell-timeout=900 \
-		--ignore=tests/pages tests book
+	$(PY) scripts/execute_notebooks.py --check
+	$(PY) -m pytest -n 2 --dist loadfile --ignore=tests/pages tests
 
 test-pages: .venv/made-for ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
+	@$(PY) -m tests.pages.browser
 	$(PY) -m pytest -n 2 tests/pages
+
+test-portable: .venv/made-for ## notebooks and numerical tests as on other machines; SETTINGS="nehalem locale-de" picks some
+	$(PY) scripts/portable.py $(SETTINGS)
 
 notebooks: .venv/made-for ## execute the notebooks in place
 	$(PY) scripts/execute_notebooks.py
@@ -92,7 +97,7 @@ screenshots: .venv/made-for ## pictures of every page: light, dark, phone
 	$(PY) -m tests.pages.screenshots
 
 pdf: .venv/made-for ## the whole book as one PDF, printed by Chromium
-	@rm -rf _build/singlehtml _build/.doctrees
+	@rm -rf _build/singlehtml
 	.venv/bin/jupyter-book build . -W -n --keep-going --builder custom --custom-builder singlehtml
 	$(PY) -m tests.pages.pdf
 

@@ -15,7 +15,7 @@ from benchmarks.timing import Row, medians, rows
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.matrices import difference, total
+from gpbnb.arithmetic.kernels.matrices import difference, matrix_sum
 from gpbnb.arithmetic.kernels.scalar import divide, load, matmul, multiply, negative, store, subtract
 
 N, M = 10, 2
@@ -32,10 +32,10 @@ def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps
     for _ in range(steps):
         matmul(fmt, Phi, P0, T)
         matmul(fmt, T, PhiT, V)
-        total(fmt, V, Q, V)
+        matrix_sum(fmt, V, Q, V)
         matmul(fmt, V, HT, PHt)
         matmul(fmt, H, PHt, HP)
-        total(fmt, HP, R, S)
+        matrix_sum(fmt, HP, R, S)
         a, b = load(fmt, S, (0, 0)), load(fmt, S, (0, 1))
         c, d = load(fmt, S, (1, 0)), load(fmt, S, (1, 1))
         determinant = subtract(fmt, multiply(fmt, a, d), multiply(fmt, b, c))
@@ -48,7 +48,7 @@ def compiled_steps(fmt: Any, model: Any, x0: Any, P0: Any, x: Any, P: Any, steps
         matmul(fmt, H, u, y)
         difference(fmt, z, y, g)
         matmul(fmt, K, g, x)
-        total(fmt, u, x, x)
+        matrix_sum(fmt, u, x, x)
         matmul(fmt, K, H, T)
         difference(fmt, identity, T, W)
         matmul(fmt, W, V, P)
@@ -117,7 +117,7 @@ def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
         raise TypeError(f"got {fmt}; needed a format with compiled loops")
     given, x0, P0 = model()
     arrays = [fmt.array(a) for a in (*given, x0, P0)]
-    packed = [backend.pack(a._parts) for a in arrays]
+    packed = [backend.pack(a.components) for a in arrays]
     x, P = np.empty_like(packed[-2]), np.empty_like(packed[-1])
 
     def run(steps: int) -> Any:

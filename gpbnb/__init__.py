@@ -2,7 +2,9 @@
 
 The public interface::
 
-    FloatFormat, Rounding      a number format: base, precision, rounding
+    FloatFormat, Rounding      a number format: base, precision, rounding, range
+    FixedFormat                fixed point: integer bits, fraction bits, overflow
+    BINARY32, BFLOAT16, ...    the formats of processors; NAMED_FORMATS lists them
     linalg                     dot, matmul, lu, solve, inv with every operation rounded
     LinearModel                a linear dynamic model for a Kalman filter
     required_precision         the smallest precision that keeps a filter within a tolerance
@@ -17,14 +19,23 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gpbnb.arithmetic import linalg
     from gpbnb.arithmetic.array import FloatArray
+    from gpbnb.arithmetic.fixed import FixedFormat
     from gpbnb.arithmetic.formats import FloatFormat, Rounding
     from gpbnb.kalman.model import LinearModel
     from gpbnb.kalman.precision import required_precision
 
 __version__ = "0.1.0"
-__all__ = ["FloatArray", "FloatFormat", "LinearModel", "Rounding", "linalg", "required_precision"]
+__all__ = ["FixedFormat", "FloatArray", "FloatFormat", "LinearModel", "Rounding", "linalg", "required_precision"]
+
+# fmt: off
+NAMED_FORMATS = (
+    "BINARY16", "BINARY32", "BINARY64", "BINARY128", "BFLOAT16", "TF32", "FP8_E4M3", "FP8_E5M2",
+    "DECIMAL32", "DECIMAL64", "DECIMAL128", "IBM_HEX32", "IBM_HEX64", "IBM_704",
+)
+# fmt: on
 
 _HOME = {
+    "FixedFormat": "gpbnb.arithmetic.fixed",
     "FloatArray": "gpbnb.arithmetic.array",
     "FloatFormat": "gpbnb.arithmetic.formats",
     "LinearModel": "gpbnb.kalman.model",
@@ -37,10 +48,12 @@ def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that ``import gpbnb`` stays light."""
     if name == "linalg":
         return import_module("gpbnb.arithmetic.linalg")
+    if name in NAMED_FORMATS:
+        return getattr(import_module("gpbnb.arithmetic.named"), name)
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module 'gpbnb' has no attribute {name!r}; the public names are {', '.join(__all__)}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *NAMED_FORMATS})

@@ -5,14 +5,18 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import platform
 import re
 import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
 from functools import cache
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import IO
+
+import llvmlite.binding as llvm
 
 try:
     import fcntl
@@ -22,6 +26,7 @@ except ImportError:  # Windows: processes do not wait for each other there
 PACKAGE = Path(__file__).resolve().parent
 """The folder of the package."""
 
+_SETTINGS = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")
 _NO_DATA = (".py", ".pyc", ".tmp", ".lock")
 _IMPORTED = time.time()
 _KEPT = 30 * 24 * 3600.0  # seconds after the last use
@@ -162,6 +167,16 @@ def digest(paths: Iterable[Path]) -> str:
     return found.hexdigest()
 
 
+@cache
+def environment() -> tuple[str, ...]:
+    """Describe what a result may depend on beside sources and data: Python, the installed packages, the processor."""
+    packages = sorted({f"{each.name}=={each.version}" for each in distributions()})
+    features = sorted(name for name, there in llvm.get_host_cpu_features().items() if there)
+    settings = [f"{name}={os.environ.get(name, '')}" for name in _SETTINGS]
+    machine = (platform.system(), platform.machine(), llvm.get_host_cpu_name(), *features)
+    return platform.python_version(), *machine, *settings, *packages
+
+
 def changed_since_import(paths: Iterable[Path]) -> bool:
     """Tell whether a file was written after this process imported the package, and may run what it was before."""
     return any(path.stat().st_mtime > _IMPORTED for path in paths)
@@ -169,13 +184,22 @@ def changed_since_import(paths: Iterable[Path]) -> bool:
 
 def imported(path: Path) -> frozenset[Path]:
     """List a source file of the package, and all files of the package that it imports, directly or through others."""
+    return _following([path.resolve()])
+
+
+def imported_by(code: str) -> frozenset[Path]:
+    """List all files of the package that some code imports, directly or through others."""
+    return _following(_named(code.encode()))
+
+
+def _following(first: Iterable[Path]) -> frozenset[Path]:
     found: set[Path] = set()
-    waiting = [path.resolve()]
+    waiting = list(first)
     while waiting:
         file = waiting.pop()
         if file not in found:
             found.add(file)
-            waiting += _named(file) - found
+            waiting += _named(_content(file)) - found
     return frozenset(found)
 
 
@@ -187,16 +211,21 @@ def with_data(sources: Iterable[Path]) -> frozenset[Path]:
     return frozenset(found)
 
 
+def forget() -> None:
+    """Read the files again when their digests are asked for next."""
+    _content.cache_clear()
+
+
 @cache
 def _content(path: Path) -> bytes:
     return path.read_bytes()
 
 
 @cache
-def _named(path: Path) -> frozenset[Path]:
-    """Files of the package that a source file names in its import statements."""
+def _named(code: bytes) -> frozenset[Path]:
+    """Files of the package that some code names in its import statements."""
     names: set[str] = set()
-    for match in _IMPORT.finditer(_content(path)):
+    for match in _IMPORT.finditer(code):
         if match["module"]:
             module = match["module"].decode()
             names.add(module)

@@ -217,3 +217,36 @@ def table(*rows):
     made = [nodes.row("", *(nodes.entry("", nodes.paragraph("", cell)) for cell in row)) for row in rows]
     group += [nodes.thead("", made[0]), nodes.tbody("", *made[1:])]
     return nodes.table("", group)
+
+
+# -- executed notebooks --------------------------------------------------------------------------------
+
+notebooks = load("gpbnb_notebooks")
+
+
+def test_a_changed_output_makes_all_pages_be_read_again():
+    env = SimpleNamespace(found_docs={"book/b", "book/a"})
+
+    def outdated(outputs):
+        return notebooks.outdated(SimpleNamespace(config=SimpleNamespace(gpbnb_outputs=outputs)), env, *3 * (set(),))
+
+    assert outdated("first") == []  # Sphinx reads all of a new book anyway
+    assert outdated("first") == []
+    assert outdated("second") == ["book/a", "book/b"]
+    assert outdated("second") == []
+
+
+def test_pages_whose_source_is_gone_are_removed(tmp_path):
+    kept = ["index.html", "book/a.html", "_modules/gpbnb/x.html", "_modules/index.html", "_static/part.html"]
+    gone = ["book/old.html", "_modules/gpbnb/old.html"]
+    for name in kept + gone:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    env = SimpleNamespace(found_docs={"book/a"}, _viewcode_modules={"gpbnb.x": ()})
+    builder = SimpleNamespace(name="html", get_target_uri=lambda name: f"{name}.html")
+    app = SimpleNamespace(outdir=tmp_path, env=env, builder=builder)
+    notebooks.remove_old_pages(app, RuntimeError("a build that failed"))
+    assert all((tmp_path / name).exists() for name in kept + gone)
+    notebooks.remove_old_pages(app, None)
+    there = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.html")]
+    assert sorted(there) == sorted(kept)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import csv
 import json
 import re
 from pathlib import Path
@@ -13,6 +14,9 @@ BOOK = Path(__file__).resolve().parents[1] / "book"
 PATHS = sorted(BOOK.glob("*.ipynb"))
 MOST_LINES = 12
 ABSOLUTE = re.compile(r"(?<![\w.:/<])/(home|root|Users|work|tmp|usr|opt|var|private|mnt|srv)/|\b[A-Z]:\\\\")
+MOST_DIGITS = 6
+# A number in a text, not part of a name, an address or a fraction.
+NUMBER = re.compile(r"(?<![\w.#/&])(?<!\w-)\d+(?:[ ,\u2009\u202f]\d{3})*(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 PICTURES = ("image/png", "image/svg+xml", "image/jpeg")
 
 
@@ -74,3 +78,73 @@ def test_every_figure_has_alt_text_and_a_caption(path):
             settings = cell["metadata"].get("mystnb", {})
             assert settings.get("image", {}).get("alt", "").strip(), "".join(cell["source"])
             assert settings.get("figure", {}).get("caption", "").strip(), "".join(cell["source"])
+
+
+def significant_digits(number: str) -> int:
+    """Of a number that is written with a point; whole numbers are counts or exact, however long they are."""
+    whole, _, fraction = number.partition("e")[0].partition(".")
+    if not fraction.strip("0"):
+        return 0
+    return len((re.sub(r"\D", "", whole) + fraction).lstrip("0"))
+
+
+def long_numbers(cell: dict) -> list[str]:
+    """Numbers in the outputs of a cell with more digits than every processor gives alike."""
+    found = []
+    for output in cell["outputs"]:
+        parts = ["".join(output.get("text", []))]
+        parts += [
+            "".join(v) for kind, v in output.get("data", {}).items() if "image" not in kind and "json" not in kind
+        ]
+        for part in parts:
+            numbers = NUMBER.findall(re.sub(r"<[^>]*>", " ", part))
+            found += [number for number in numbers if significant_digits(number) > MOST_DIGITS]
+    return found
+
+
+def exact_numbers() -> set[tuple[str, str]]:
+    """Long numbers that exact or emulated arithmetic gives to the last digit, each with its reason in the table."""
+    with (Path(__file__).parent / "exact_outputs.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert all(row["why"].strip() for row in rows)
+    return {(row["notebook"], row["number"]) for row in rows}
+
+
+@pytest.mark.parametrize(
+    ("number", "digits"),
+    [("0.639965805573098", 15), ("0.639966", 6), ("-0.0012345678", 8), ("12345678", 0), ("5.0", 0), ("1.5e-300", 2)],
+)
+def test_digits_are_counted(number, digits):
+    assert [significant_digits(each) for each in NUMBER.findall(f"x = {number}, or so")] == [digits]
+
+
+def test_a_long_number_is_found_in_every_kind_of_output():
+    text = "1.2345678"
+    for output in (
+        {"output_type": "stream", "name": "stdout", "text": [f"x {text}\n"]},
+        {"output_type": "display_data", "data": {"text/html": [f"<td title='9.87654321'>{text}</td>"]}},
+        {"output_type": "display_data", "data": {"application/papermill.record/text/plain": [text]}},
+    ):
+        assert long_numbers({"outputs": [output]}) == [text]
+
+
+@each_notebook
+def test_outputs_have_no_digits_that_differ_between_processors(path):
+    exact = exact_numbers()
+    for number, cell in enumerate(json.loads(path.read_text(encoding="utf-8"))["cells"]):
+        if cell["cell_type"] == "code":
+            wrong = [each for each in long_numbers(cell) if (path.stem, each) not in exact]
+            assert not wrong, (
+                f"{path.name}, cell {number} stores {', '.join(dict.fromkeys(wrong))}: print at most {MOST_DIGITS} "
+                "digits, use gpbnb.display.glue, or add an exact number to tests/exact_outputs.csv with its reason"
+            )
+
+
+def test_every_exact_number_is_still_there():
+    there = {(path.stem, number) for path in PATHS for cell in code_cells(path) for number in long_numbers(cell)}
+    assert exact_numbers() - there == set()
+
+
+@each_notebook
+def test_values_are_glued_by_the_helper_that_rounds_them(path):
+    assert [text for text in texts(path) if "from myst_nb" in text] == []

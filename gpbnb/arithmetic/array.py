@@ -15,6 +15,9 @@ from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.text import decimal_text, in_columns
 
 if TYPE_CHECKING:
+    from typing import Self
+
+    from gpbnb.arithmetic.fixed import FixedFormat
     from gpbnb.arithmetic.formats import FloatFormat
 
 
@@ -51,7 +54,7 @@ class FloatArray(NumPyProtocols):
         raise TypeError("got FloatArray(...); needed a format; write fmt.array(values)")
 
     @classmethod
-    def from_pairs(cls, m: Any, e: Any, fmt: FloatFormat) -> FloatArray:
+    def from_pairs(cls, m: Any, e: Any, fmt: Any) -> Self:
         """Hold significands and exponents that are already normalized numbers of `fmt`."""
         pair = _frozen(m, object), _frozen(e, object)
         components = fmt.backend.from_exact(*pair)
@@ -62,7 +65,7 @@ class FloatArray(NumPyProtocols):
         )
 
     @classmethod
-    def from_components(cls, backend: Backend, components: Any, fmt: FloatFormat) -> FloatArray:
+    def from_components(cls, backend: Backend, components: Any, fmt: Any) -> Self:
         """Hold what a backend has made, or moved."""
         self = object.__new__(cls)
         self._format = fmt
@@ -80,14 +83,14 @@ class FloatArray(NumPyProtocols):
         return m, e
 
     @classmethod
-    def from_values(cls, values: Any, fmt: FloatFormat) -> FloatArray:
+    def from_values(cls, values: Any, fmt: FloatFormat | FixedFormat) -> Self:
         """See :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
         return cls._read(values, fmt, exactly=False)
 
     @classmethod
-    def _read(cls, values: Any, fmt: FloatFormat, exactly: bool) -> FloatArray:
+    def _read(cls, values: Any, fmt: Any, exactly: bool) -> Self:
         if isinstance(values, FloatArray):
-            if values.format == fmt:
+            if values.format == fmt and isinstance(values, cls):
                 return values
             if values.format.base == fmt.base:
                 pairs = values.to_pairs()
@@ -115,7 +118,7 @@ class FloatArray(NumPyProtocols):
         return cls.from_pairs(m, e, fmt)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return FloatArray.from_pairs, (*self.to_pairs(), self.format)
+        return type(self).from_pairs, (*self.to_pairs(), self.format)
 
     # -- shape ---------------------------------------------------------------------------------
 
@@ -209,6 +212,18 @@ class FloatArray(NumPyProtocols):
             if components is None
             else self.from_components(backend, components, self.format)
         )
+
+    def multiply_add(self, factor: Any, addend: Any) -> FloatArray:
+        """``self * factor + addend``, rounded once for each entry: the fused multiply-add of a processor."""
+        arrays = [self, self.operand(factor), self.operand(addend)]
+        broadcast("multiply_add", arrays[0].shape, arrays[1].shape)
+        broadcast("multiply_add", np.broadcast_shapes(arrays[0].shape, arrays[1].shape), arrays[2].shape)
+        backend, found = _common(arrays)
+        components = backend.apply("fused", *(array.components for array in found))
+        if components is None:
+            backend, found = self.format.exact_backend, [array.on_exact_backend() for array in arrays]
+            components = backend.apply("fused", *(array.components for array in found))
+        return self.from_components(backend, components, self.format)
 
     def _unary(self, name: str) -> FloatArray:
         if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,20 +17,17 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
+from gpbnb.arithmetic.kernels.limited import LimitedKernel, limited_kernel
+from gpbnb.arithmetic.kernels.limited_backends import LimitedFloats, limited_backend, limited_exact, run_tag
+from gpbnb.arithmetic.kernels.rules import Limits, Rounding, Rules
+from gpbnb.arithmetic.kernels.tags import Tag
 
-
-class Rounding(Enum):
-    """How a number with more digits than the format holds is fitted into it."""
-
-    #: To the nearest, half away from zero; hung1984, ch. II, (3).
-    NEAREST = "nearest"
-    #: Towards zero, the further digits dropped; hung1984, ch. II, (9).
-    CHOP = "chop"
+__all__ = ["FloatFormat", "Rounding", "prints_as"]
 
 
 @dataclass(frozen=True)
 class FloatFormat:
-    r"""Floating-point numbers :math:`\pm.d_1 d_2 \dots d_t \times b^e` with unbounded exponent.
+    r"""Floating-point numbers :math:`\pm.d_1 d_2 \dots d_t \times b^e`, of any exponent unless a range is given.
 
     Zero is a number of every format; there is no negative zero, infinity or NaN.
 
@@ -39,11 +36,24 @@ class FloatFormat:
     base : b, an int of at least 2.
     precision : t, digits of the significand, an int of at least 1.
     rounding : applied to every stored number and every result.
+    emin, emax : exponents of the least normal and of the largest number, as IEEE 754 counts them:
+        :math:`b^{\text{emin}}` and :math:`d.dd\dots\times b^{\text{emax}}`. Give both or neither.
+    subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Else
+        results that are below it after rounding become zero.
+    largest : the largest number, where it is not the one with t digits b - 1.
+    seed : of stochastic rounding. A filter run starts its random numbers with the seed; operations on arrays continue
+        one sequence, which :meth:`restart` begins again.
 
     Raises
     ------
     TypeError : a parameter is not of its type.
-    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory.
+    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; one of `emin` and `emax` without the
+        other, or ``emin > emax``; a largest number that the format does not hold.
+
+    Notes
+    -----
+    A result beyond the largest number is an OverflowError that names the operation and the entry. A range is applied
+    after rounding, as in IEEE 754.
 
     References
     ----------
@@ -58,6 +68,11 @@ class FloatFormat:
     base: int
     precision: int
     rounding: Rounding = Rounding.NEAREST
+    emin: int | None = None
+    emax: int | None = None
+    subnormal: bool = True
+    largest: Fraction | None = None
+    seed: int = 0
 
     def __post_init__(self) -> None:
         for name, least in (("base", 2), ("precision", 1)):
@@ -72,7 +87,7 @@ class FloatFormat:
         if not isinstance(self.rounding, Rounding):
             raise TypeError(
                 f"rounding: got {self.rounding!r} of type {type(self.rounding).__name__}; "
-                "needed Rounding.NEAREST or Rounding.CHOP"
+                f"needed one of {', '.join(map(str, Rounding))}"
             )
         if self.precision > LARGEST_BITS / math.log2(self.base):
             raise ValueError(
@@ -80,36 +95,118 @@ class FloatFormat:
                 f"{int(LARGEST_BITS / math.log2(self.base))}, or numbers do not fit in memory; use fewer"
             )
 
+        self._check_range()
+
+    def _check_range(self) -> None:
+        for name in ("emin", "emax", "seed"):
+            value = getattr(self, name)
+            if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer))):
+                raise TypeError(f"{name}: got {value!r} of type {type(value).__name__}; needed an int")
+        if (self.emin is None) != (self.emax is None):
+            raise ValueError(f"got emin={self.emin}, emax={self.emax}; needed both, or neither for an unlimited range")
+        if self.emin is None or self.emax is None:
+            if self.largest is not None or not self.subnormal:
+                raise ValueError(
+                    "got a largest number or subnormal=False without a range; needed emin and emax as well"
+                )
+            return
+        object.__setattr__(self, "emin", int(self.emin))
+        object.__setattr__(self, "emax", int(self.emax))
+        if self.emin > self.emax:
+            raise ValueError(f"got emin={self.emin} above emax={self.emax}; needed emin <= emax")
+        last = Fraction(self.base) ** (self.emax - self.precision + 1)
+        nines = (self.base**self.precision - 1) * last
+        if self.largest is None:
+            return
+        object.__setattr__(self, "largest", Fraction(self.largest))
+        if (
+            not self.base ** (self.precision - 1) * last <= self.largest <= nines
+            or (self.largest / last).denominator != 1
+        ):
+            raise ValueError(f"largest: got {self.largest}; needed a number of the format with the exponent emax")
+
     def __repr__(self) -> str:
-        return f"FloatFormat(base={self.base}, precision={self.precision}, rounding={self.rounding})"
+        text = f"base={self.base}, precision={self.precision}, rounding={self.rounding}"
+        if self.emin is not None:
+            text += f", emin={self.emin}, emax={self.emax}"
+        if not self.subnormal:
+            text += ", subnormal=False"
+        if self.largest is not None:
+            text += f", largest={self.largest}"
+        if self.seed:
+            text += f", seed={self.seed}"
+        return f"FloatFormat({text})"
+
+    @property
+    def limits(self) -> Limits | None:
+        """How far the numbers reach; None if their exponents are unlimited."""
+        if self.emin is None or self.emax is None:
+            return None
+        nines = (self.base**self.precision - 1) * Fraction(self.base) ** (self.emax - self.precision + 1)
+        largest = nines if self.largest is None else self.largest
+        return Limits(self.emin, self.subnormal, largest, -largest)
+
+    @cached_property
+    def _rules(self) -> Rules | None:
+        """The rules of the format; None for the two roundings of the reports without a range."""
+        if self.emin is None and self.rounding in Rounding.documented():
+            return None
+        return Rules(self.base, self.precision, self.rounding, self.limits, self.seed)
 
     @property
     def kernel(self) -> ExactKernel:
         """The scalar operations of this format."""
+        if self._rules is not None:
+            return limited_kernel(self._rules)
         return kernel(self.base, self.precision, self.rounding is Rounding.NEAREST)
+
+    def run_tag(self, fused: bool = False) -> Tag:
+        """The arithmetic for a compiled loop of its own; random roundings begin with the first number of the seed.
+
+        Parameters
+        ----------
+        fused : whether sums of products use fused multiply-add.
+
+        Raises
+        ------
+        ValueError : the format has no compiled loops, or none with fused multiply-add.
+        """
+        return run_tag(self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused)
+
+    def restart(self) -> None:
+        """Begin the random numbers of stochastic rounding again."""
+        for part in (self.kernel, self.backend):
+            if isinstance(part, (LimitedKernel, LimitedFloats)):
+                part.restart()
 
     @property
     def backend(self) -> Backend:
         """What holds the numbers of an array of this format, compiled where the format allows."""
+        if self._rules is not None:
+            return limited_backend(self._rules)
         return backend(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
     @property
     def exact_backend(self) -> Exact:
         """What holds every number of this format, slowly."""
+        if self._rules is not None:
+            return limited_exact(self._rules)
         return exact(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
     @property
     def unit_roundoff(self) -> Fraction:
         r"""Bound of the relative error of one rounding, exact.
 
-        .. math:: \beta = \tfrac12 b^{1-t} \text{ (nearest)}, \qquad \beta_c = b^{1-t} \text{ (chop)}
+        .. math:: \beta = \tfrac12 b^{1-t} \text{ (to nearest)}, \qquad \beta_c = b^{1-t} \text{ (otherwise)}
+
+        With a range it holds for results that are not below the least normal number.
 
         References
         ----------
         hung1984, ch. II, (8) and (13).
         """
         step = Fraction(1, self.base ** (self.precision - 1))
-        return step / 2 if self.rounding is Rounding.NEAREST else step
+        return step / 2 if self.rounding in (Rounding.NEAREST, Rounding.EVEN) else step
 
     def round(self, value: Any) -> Fraction:
         """Round one number into the format.

@@ -8,13 +8,15 @@ Operands are FloatArrays of one format, and so are results. Where their backend 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.kernels.backends import Compiled
+
+Order = Literal["left", "pairwise", "blocked"]
 
 
 class LU(NamedTuple):
@@ -25,14 +27,15 @@ class LU(NamedTuple):
     permutation: NDArray[np.intp]
 
 
-def dot(x: FloatArray, y: FloatArray) -> FloatArray:
-    r"""Inner product, from left to right.
+def dot(x: FloatArray, y: FloatArray, order: Order = "left", fused: bool = False, block: int = 32) -> FloatArray:
+    r"""Inner product, from left to right unless another order is asked for.
 
     .. math:: \mathrm{fl}(\dots\mathrm{fl}(\mathrm{fl}(x_1 y_1) + \mathrm{fl}(x_2 y_2)) + \dots)
 
     Parameters
     ----------
     x, y : (n,) vectors of one format.
+    order, fused, block : as in :func:`matmul`.
 
     Returns
     -------
@@ -49,20 +52,26 @@ def dot(x: FloatArray, y: FloatArray) -> FloatArray:
     """
     _check(x, "x", 1)
     _check(y, "y", 1)
-    return x @ y
+    return matmul(x, y, order, fused, block)
 
 
-def matmul(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Matrix product; each entry is :func:`dot` of a row and a column. The same as ``a @ b``.
+def matmul(a: FloatArray, b: FloatArray, order: Order = "left", fused: bool = False, block: int = 32) -> FloatArray:
+    """Matrix product; each entry is :func:`dot` of a row and a column. By default the same as ``a @ b``.
 
     Parameters
     ----------
     a, b : (..., m, n) and (..., n, p), or a vector (n,) on either side.
+    order : of the additions. "left": from left to right. "pairwise": the sum of the first half, rounded down, plus
+        that of the second, and each of them likewise. "blocked": sums of `block` products from left to right, then
+        these sums from left to right, as in the inner loops of optimized BLAS.
+    fused : each product is added by a fused multiply-add, which rounds once; not with "pairwise", where products are
+        not added to sums.
+    block : products in a block.
 
     Raises
     ------
     TypeError : not FloatArrays.
-    ValueError : interface dimensions or formats differ.
+    ValueError : interface dimensions or formats differ; an unknown order, a block below 1, or pairwise and fused.
 
     References
     ----------
@@ -70,7 +79,53 @@ def matmul(a: FloatArray, b: FloatArray) -> FloatArray:
     """
     _check(a, "a")
     _check(b, "b")
-    return a @ b
+    if order not in ("left", "pairwise", "blocked"):
+        raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
+    if block < 1:
+        raise ValueError(f"block: got {block}; needed at least 1")
+    if fused and order == "pairwise":
+        raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
+    n = a.shape[-1] if a.ndim else 0
+    if not b.ndim or n == 0 or (order == "left" and not fused) or n != b.shape[max(b.ndim - 2, 0)]:
+        return a @ b  # which also names shapes that do not fit
+    a.operand(b)
+    rows = a if a.ndim > 1 else a[np.newaxis, :]
+    columns = b if b.ndim > 1 else b[:, np.newaxis]
+    c = _sum_of_products(rows, columns, order, fused, block)
+    if a.ndim == 1:
+        c = c[..., 0, :]
+    return c if b.ndim > 1 else c[..., 0]
+
+
+def _sum_of_products(rows: FloatArray, columns: FloatArray, order: Order, fused: bool, block: int) -> FloatArray:
+    def factors(k: int) -> tuple[FloatArray, FloatArray]:
+        return rows[..., :, k, np.newaxis], columns[..., np.newaxis, k, :]
+
+    def product(k: int) -> FloatArray:
+        left, right = factors(k)
+        return left * right
+
+    def from_left(first: int, end: int) -> FloatArray:
+        s = product(first)
+        for k in range(first + 1, end):
+            left, right = factors(k)
+            s = left.multiply_add(right, s) if fused else s + left * right
+        return s
+
+    def pairwise(first: int, end: int) -> FloatArray:
+        if end - first == 1:
+            return product(first)
+        middle = (first + end) // 2
+        return pairwise(first, middle) + pairwise(middle, end)
+
+    n = rows.shape[-1]
+    if order == "pairwise":
+        return pairwise(0, n)
+    step = n if order == "left" else block
+    total, *others = (from_left(first, min(first + step, n)) for first in range(0, n, step))
+    for partial in others:
+        total = total + partial
+    return total
 
 
 def lu(a: FloatArray, pivot: bool = False) -> LU:
@@ -213,7 +268,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
         return None
     if column >= 0:
         raise np.linalg.LinAlgError(_zero_pivot(column, len(a), pivot))
-    return FloatArray.from_components(backend, backend.unpack(factors), a.format), order
+    return type(a).from_components(backend, backend.unpack(factors), a.format), order
 
 
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
@@ -230,7 +285,7 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
         _loops().substitute(backend.tag, factors, columns)
     except OverflowError:
         return None
-    return FloatArray.from_components(backend, backend.unpack(columns), a.format)
+    return type(a).from_components(backend, backend.unpack(columns), a.format)
 
 
 @lru_cache(maxsize=1)

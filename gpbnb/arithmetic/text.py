@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from gpbnb.arithmetic.kernels.exact import ExactKernel, integer_text, kernel
+from gpbnb.arithmetic.kernels.limited import LimitedKernel
+from gpbnb.arithmetic.kernels.rules import Rounding
 
 
 def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:
@@ -64,11 +66,16 @@ def decimal_text(m: int, e: int, form: ExactKernel) -> str:
 def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int]:
     """Enough decimal digits to tell ``m * base**e`` from its neighbours in the format.
 
-    Rounded up when the format chops, so that chopping them gives the number and not the one below.
+    Rounded up when the format chops, so that chopping them gives the number and not the one below. A format that may
+    round a number away from its nearest neighbour gets all digits.
     """
+    value = form.to_fraction(m, e)
+    if isinstance(form, LimitedKernel) and form.rounding not in (*Rounding.documented(), Rounding.EVEN):
+        places = max(value.denominator.bit_length() - 1, 0)
+        if 10**places % value.denominator == 0:
+            return integer_text(int(value * 10**places)), -places
     count = math.ceil(form.precision * math.log10(form.base)) + 2
     decimal = kernel(10, count, True)
-    value = form.to_fraction(m, e)
     digits, exponent = decimal.from_ratio(value.numerator, value.denominator)
     if not form.nearest and decimal.to_fraction(digits, exponent) < value:
         digits += 1

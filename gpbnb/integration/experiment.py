@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import mpmath
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
 from gpbnb.arithmetic.kernels.tags import Double
 from gpbnb.integration import theory
@@ -82,7 +82,7 @@ def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
 # -- simulation, exact at the sampling times ------------------------------------------------------
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _advance(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
     """Move all paths; x[k] and d[k] are the new sample and the error of the trapezoid that ends there."""
     cycles, paths, size = normal.shape
@@ -103,7 +103,7 @@ def _advance(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
             d[k, path] = new[m]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
     """The same for an input of first order, digit for digit."""
     phi, h, b00, b10, b11 = a[0, 0], a[1, 0], b[0, 0], b[1, 0], b[1, 1]
@@ -305,7 +305,7 @@ def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> S
 # -- the integrator in t-digit arithmetic ---------------------------------------------------------
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _integrate(fmt: Any, half: Any, x: Any, total: Any) -> None:
     """(2) for each path: add half T times the sum of two samples to the accumulator, every operation rounded.
 
@@ -322,7 +322,7 @@ def _integrate(fmt: Any, half: Any, x: Any, total: Any) -> None:
         store(fmt, total, path, s)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
     """The same for samples in float64, each of which is rounded as it comes in."""
     factor = load(fmt, half, 0)

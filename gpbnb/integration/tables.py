@@ -77,7 +77,7 @@ def design(omega_bw: float, duration: float, precisions: Sequence[int], base: in
     """The best rate of formats and the two errors there, over the input's rms; "none" where no rate will do."""
     body: list[tuple[str, ...]] = []
     for t in precisions:
-        for rounding in Rounding:
+        for rounding in Rounding.documented():
             fmt = FloatFormat(base, t, rounding)
             try:
                 rate = theory.best_rate(omega_bw, duration, fmt)

@@ -87,7 +87,7 @@ class Wordlength:
 
 
 KINDS = ("t = places", "t = places + 1", "fixed point")
-WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KINDS, Rounding))
+WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KINDS, Rounding.documented()))
 
 # -- ways to invert, with a rounding after each operation -----------------------------------------
 
@@ -440,7 +440,7 @@ def all_possible() -> tuple[Possible, ...]:
     Rounding matters only where three digits cannot hold the matrix as given.
     """
     given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in (*KINDS, "t = places + 2")]
-    stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding]
+    stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding.documented()]
     cases = product((*given, *stored), SEARCHED, (False, True), PLACES)
     return tuple(possible(w, places, norm, relative, None, r) for (w, r), norm, relative, places in cases)
 

@@ -54,7 +54,7 @@ def find_answers(tolerance: float = 1.0) -> Answers:
     """
     runs = tuple(run for run in year.load() if run.case.model == year_cases.MODELS[0])
     observed = {}
-    for rounding in Rounding:
+    for rounding in Rounding.documented():
         enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, tolerance)) is not None]
         if not enough:
             raise ValueError(
@@ -77,7 +77,7 @@ def _good(run: year.Year, rounding: Rounding, tolerance: float) -> FloatFormat |
 
 
 def _best(runs: tuple[year.Year, ...]) -> float:
-    return max(min(largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
+    return max(min(largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding.documented())
 
 
 def _both(counts: report_bounds.Coefficients) -> tuple[int, int]:

@@ -94,6 +94,7 @@ def emulate(
     form: Form = Form.HUNG,
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
+    fused: bool = False,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
 
@@ -101,14 +102,15 @@ def emulate(
     ----------
     model : n states, m measurements.
     z : (steps, m), measurements.
-    fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13.
+    fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13; or fixed point.
     checkpoint_steps : steps at which to compare; by default four a decade.
     true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
         errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
+    fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
     """
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
-    run = Run(model, fmt, form, chosen)
+    run = Run(model, fmt, form, chosen, fused)
     run.take(measured)
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)

@@ -39,7 +39,7 @@ KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
 FORMATS = tuple(
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 11), (2, 24), (2, 53), (10, 4), (10, 8), (16, 6))
-    for rounding in Rounding
+    for rounding in Rounding.documented()
 )
 
 #: How often the command repeats each, 34 x 5 x 12 x 5 = 10,200 trials.

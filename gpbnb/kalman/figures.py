@@ -115,7 +115,7 @@ def year_end(
         of a year, which is what they grant; the last is drawn upright, through the tolerance.
     """
     artists: list[Artist] = []
-    for form, rounding in [(form, rounding) for rounding in Rounding for form in Form]:
+    for form, rounding in [(form, rounding) for rounding in Rounding.documented() for form in Form]:
         group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
         if points := _points(group):
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]

@@ -29,6 +29,7 @@ class Run:
     fmt : the format in which all of it is stored and computed; None for double-double.
     form : how a step is computed.
     checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in rising order.
+    fused : whether products are added by fused multiply-add; base 2 or 16.
 
     Raises
     ------
@@ -37,7 +38,12 @@ class Run:
     """
 
     def __init__(
-        self, model: LinearModel, fmt: FloatFormat | None, form: Form, checkpoint_steps: Sequence[int]
+        self,
+        model: LinearModel,
+        fmt: FloatFormat | None,
+        form: Form,
+        checkpoint_steps: Sequence[int],
+        fused: bool = False,
     ) -> None:
         self.model, self.fmt, self.form = model, fmt, Form(form)
         self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
@@ -49,6 +55,8 @@ class Run:
             raise ValueError(
                 f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
             )
+        #: In which arithmetic the compiled loops work.
+        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused)
         Phi, H, Q, R = (self._packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
@@ -69,10 +77,6 @@ class Run:
                 "this format; use more digits, or add a little to the diagonals of Q and P0"
             )
         self._matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
-
-    @property
-    def tag(self) -> Tag:
-        return DoubleDouble() if self.fmt is None else cast(Compiled, self.fmt.backend).tag
 
     @property
     def steps(self) -> int:

@@ -159,7 +159,7 @@ def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
 COLUMNS = (
     Column("states", "text", choices=STATES),
     Column("base", "integer", 2, 16),
-    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding)),
+    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding.documented())),
     Column("form", "text", choices=tuple(FORMS)),
     Column("precision", "integer", 1, 53),
     Column("record", "integer", 0, 9999),

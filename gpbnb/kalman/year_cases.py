@@ -50,7 +50,7 @@ class Case(NamedTuple):
 
 def _cases() -> tuple[Case, ...]:
     usual, flown, noiseless = MODELS
-    nearest, chop = Rounding
+    nearest, chop = Rounding.documented()
     others = (Form.INNOVATION, Form.JOSEPH, Form.UD)
     cases = [Case(usual, 2, t, nearest, Form.HUNG) for t in (24, 18, 32, 14, 20, 53)]
     cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (24, 18, 32)]

@@ -10,21 +10,26 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import platform
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
 from functools import cache, lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from gpbnb.caching import cache_folder, changed_since_import, digest, imported, locked, remove_unused, with_data
+from gpbnb.caching import (
+    cache_folder,
+    changed_since_import,
+    digest,
+    environment,
+    imported,
+    locked,
+    remove_unused,
+    with_data,
+)
 from gpbnb.ledger.finding import Finding, Verdict
 from gpbnb.ledger.statements import Statement
 
-_LIBRARIES = ("matplotlib", "mpmath", "numba", "numpy", "python-flint", "scipy", "sympy")
-_SETTINGS = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")
 _LONGEST_WAIT = 600.0  # seconds
 
 
@@ -102,22 +107,8 @@ def _file(module: Path) -> Path | None:
     files = with_data(imported(module))
     if changed_since_import(files):
         return None
-    key = (digest(files), *_environment())
+    key = (digest(files), *environment())
     return folder / f"{module.stem}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.json"
-
-
-@lru_cache(maxsize=1)
-def _environment() -> tuple[str, ...]:
-    versions = [version(name) for name in _LIBRARIES]
-    settings = [f"{name}={os.environ.get(name, '')}" for name in _SETTINGS]
-    return platform.python_version(), platform.system(), _processor(), *versions, *settings
-
-
-def _processor() -> str:
-    import llvmlite.binding as llvm
-
-    features = sorted(name for name, there in llvm.get_host_cpu_features().items() if there)
-    return " ".join((platform.machine(), llvm.get_host_cpu_name(), *features))
 
 
 def _name(statement: Statement) -> str:

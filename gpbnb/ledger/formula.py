@@ -371,6 +371,8 @@ def _base(word: str) -> str:
         return rf"\{word[: len('delta')]} {_base(word[len('delta') :])}"
     if word == "dots":
         return r"\cdots"
+    if word == "degree":
+        return r"^{\circ}"
     if word == "inf":
         return r"\infty"
     return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word

@@ -11,7 +11,6 @@ from typing import Any
 
 import mpmath
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import signal
 from tqdm import tqdm  # type: ignore[import-untyped]
@@ -19,6 +18,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
@@ -279,7 +279,7 @@ class DriftStudy:
         return 1 / math.sqrt(2 * self.errors[0].size)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _add_sums(first, noise, cosines, sines, slope, kx, ky, sums):  # type: ignore[no-untyped-def]
     # One pass: signal rolled, noise added, derolled, and summed with the times, which are centred and scaled.
     for p in range(cosines.shape[0]):
@@ -555,7 +555,7 @@ class Rotation:
         return float(np.max(self.size * self.step * (drift * self.interval / YEAR)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
     a, b = load(fmt, step, 0), load(fmt, step, 1)
     c, s = load(fmt, state, 0), load(fmt, state, 1)

@@ -15,8 +15,9 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from gpbnb.arithmetic.kernels.compiling import compiled
 
 ACCURACY = 1e-6
 """Of the response h_k, relative, up to `LONGEST`."""
@@ -56,7 +57,7 @@ def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[ND
     return 1 / (1 + np.exp(y)), weights
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _filter(poles, weights, states, white, out):  # type: ignore[no-untyped-def]
     channels = white.shape[1]
     for i in range(white.shape[0]):

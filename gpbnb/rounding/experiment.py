@@ -49,7 +49,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Tally:
+class BoundStatistics:
     """A bound over many trials."""
 
     bound: str
@@ -60,7 +60,7 @@ class Tally:
     worst: Trial
 
 
-def tally(trials: Sequence[Trial]) -> tuple[Tally, ...]:
+def bound_statistics(trials: Sequence[Trial]) -> tuple[BoundStatistics, ...]:
     """Count, for each bound in order of its name's appearance, its violations."""
     names = list(dict.fromkeys(name for trial in trials for name in trial.bounds))
     result = []
@@ -69,7 +69,7 @@ def tally(trials: Sequence[Trial]) -> tuple[Tally, ...]:
         ratios = [trial.ratio(name) for trial in having]
         worst = having[int(np.argmax(ratios))]
         violations = sum(trial.violates(name) for trial in having)
-        result.append(Tally(name, len(having), violations, max(ratios), float(np.median(ratios)), worst))
+        result.append(BoundStatistics(name, len(having), violations, max(ratios), float(np.median(ratios)), worst))
     return tuple(result)
 
 
@@ -260,7 +260,7 @@ def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng:
 SURVEYED = tuple(
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 3), (2, 11), (2, 24), (3, 3), (10, 2), (10, 4), (10, 8), (16, 6))
-    for rounding in Rounding
+    for rounding in Rounding.documented()
 )
 
 

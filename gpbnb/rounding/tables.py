@@ -7,23 +7,22 @@ from collections.abc import Mapping, Sequence
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.rational import exact
 from gpbnb.display.tables import Table, digits
-from gpbnb.rounding.experiment import Trial
-from gpbnb.rounding.experiment import tally as count
+from gpbnb.rounding.experiment import Trial, bound_statistics
 
 
-def tallies(trials: Mapping[str, Sequence[Trial]]) -> Table:
+def bound_statistics_table(trials: Mapping[str, Sequence[Trial]]) -> Table:
     """Violations and ratios of every bound, a line each, by sort of computation."""
     body = [
         (
             sort,
-            tally.bound,
-            str(tally.trials),
-            str(tally.violations),
-            f"{tally.largest:.3g}",
-            f"{tally.median:.3g}",
+            each.bound,
+            str(each.trials),
+            str(each.violations),
+            f"{each.largest:.3g}",
+            f"{each.median:.3g}",
         )
         for sort, group in trials.items()
-        for tally in count(group)
+        for each in bound_statistics(group)
     ]
     header = ("computation", "bound", "trials", "violations", "largest error / bound", "median error / bound")
     return Table(f"{len(body)} bounds in random trials", header, tuple(body))

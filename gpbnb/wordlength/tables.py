@@ -65,7 +65,7 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
     """Bits with which rounding is a tenth of the discretization error, and the rates that a format allows."""
     body = []
     for name, duration in durations.items():
-        needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding]
+        needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding.documented()]
         rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
         body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
     kind = digits(fmt)

@@ -14,7 +14,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
-FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 3)) for r in Rounding]
+FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 3)) for r in Rounding.documented()]
 
 each_format = pytest.mark.parametrize("fmt", FORMATS, ids=lambda f: f"base{f.base}-{f.rounding.value}")
 each_size = pytest.mark.parametrize("n", [1, 2, 3, 4, 5])

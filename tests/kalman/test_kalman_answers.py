@@ -61,7 +61,8 @@ def test_the_largest_error_may_be_of_any_step_state_and_sign(part, place, size):
 def test_a_looser_tolerance_asks_for_fewer_digits_and_an_impossible_one_is_refused():
     assert answers.find_answers(100.0).observed[Rounding.NEAREST] < answers.find_answers().observed[Rounding.NEAREST]
     runs = answers.find_answers().runs
-    best = max(min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in Rounding)
+    both = Rounding.documented()
+    best = max(min(answers.largest(run) for run in runs if run.case.rounding is rounding) for rounding in both)
     with pytest.raises(ValueError, match=f"needed one that some year meets: the best rounds to {best:.2g}"):
         answers.find_answers(1e-12)
 

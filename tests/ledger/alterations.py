@@ -51,6 +51,19 @@ def _of_literal(literal: str) -> Iterator[tuple[str, str]]:
 
 
 def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
+    """The usual alterations; where they are few, dropped factors as well."""
+    usual = dict(_usual(relation))
+    yield from usual.items()
+    if len(usual) < 3:
+        tree = relation.tree
+        for k, node in enumerate(ast.walk(tree)):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
+                new = copy.deepcopy(tree)
+                _substitute(new, list(ast.walk(new))[k], node.left)
+                yield f"dropped factor at {k}", ast.unparse(new)
+
+
+def _usual(relation: Relation) -> Iterator[tuple[str, str]]:
     """Signs, coefficients, exponents, indices, dropped terms, digits, and the direction of an inequality."""
     tree = relation.tree
     nodes = list(ast.walk(tree))
@@ -92,6 +105,8 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             for i, index in enumerate(indices):
                 moved = [*indices[:i], ast.BinOp(index, ast.Add(), ast.Constant(1)), *indices[i + 1 :]]
                 yield f"index {i + 1}", ast.Subscript(value, ast.Tuple(moved, ast.Load()), ast.Load())
+        case ast.Call(func=ast.Name(id="sin" | "cos" as name), args=arguments):
+            yield "function", ast.Call(ast.Name("cos" if name == "sin" else "sin", ast.Load()), arguments, [])
         case ast.Compare(left=left, ops=ops, comparators=rights):
             for i, op in enumerate(ops):
                 if type(op) in _OPPOSITE:

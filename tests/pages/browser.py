@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib.util
 import os
 import shutil
 import threading
@@ -11,7 +12,10 @@ from contextlib import contextmanager
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
-from playwright.sync_api import Browser, sync_playwright
+try:
+    from playwright.sync_api import Browser, sync_playwright
+except ImportError:
+    sync_playwright = None
 
 HTML = Path(__file__).resolve().parents[2] / "_build" / "html"
 FLAGS = [
@@ -29,13 +33,30 @@ SETTLED = "async () => { await window.MathJax?.startup?.promise; await document.
 SIZES = {"desktop": {"width": 1280, "height": 900}, "phone": {"width": 390, "height": 844}}
 
 
+def missing() -> str | None:
+    """What the page tests lack, and how to get it."""
+    if not list(HTML.rglob("*.html")):
+        return f"no page in {HTML.parent.name}/{HTML.name}: build the book with `make book`"
+    if sync_playwright is None or importlib.util.find_spec("axe_playwright_python") is None:
+        return "no playwright: install the group `pages` of pyproject.toml, as `make test-pages` does"
+    if chromium() is None:
+        return (
+            "no Chromium: install it (Debian: apt install chromium; Ubuntu: snap install chromium) or name its program "
+            "in the environment variable CHROMIUM"
+        )
+    return None
+
+
+def required() -> None:
+    """End the program if something is missing."""
+    if reason := missing():
+        raise SystemExit(f"The pages cannot be opened. There is {reason}.")
+
+
 def pages() -> list[str]:
     """Every HTML page of the book, as its address below the root; index.html only leads to the first."""
     every = (p.relative_to(HTML) for p in HTML.rglob("*.html"))
-    found = sorted(p.as_posix() for p in every if p.parts[0] != "_static" and p.parts != ("index.html",))
-    if not found:
-        raise SystemExit(f"No page in {HTML.parent.name}/{HTML.name}. Build the book first: make book")
-    return found
+    return sorted(p.as_posix() for p in every if p.parts[0] != "_static" and p.parts != ("index.html",))
 
 
 def opened() -> list[str]:
@@ -45,15 +66,10 @@ def opened() -> list[str]:
     return [address for address in pages() if address not in others]
 
 
-def chromium() -> str:
+def chromium() -> str | None:
     """Path of the machine's Chromium; the environment variable CHROMIUM overrides the search."""
-    for name in (os.environ.get("CHROMIUM"), "chromium", "chromium-browser", "google-chrome"):
-        if name and (path := shutil.which(name)):
-            return path
-    raise SystemExit(
-        "The page tests need Chromium, and found none. Install it (Debian: apt install chromium; Ubuntu: "
-        "snap install chromium) or name its program in the environment variable CHROMIUM."
-    )
+    names = (os.environ.get("CHROMIUM"), "chromium", "chromium-browser", "google-chrome")
+    return next((path for name in names if name and (path := shutil.which(name))), None)
 
 
 class QuietHandler(SimpleHTTPRequestHandler):
@@ -77,6 +93,7 @@ def serve(folder: Path = HTML) -> Iterator[str]:
 
 @contextmanager
 def launch() -> Iterator[Browser]:
+    required()
     with sync_playwright() as playwright:
         settings = {**os.environ, "XDG_CONFIG_HOME": str(HTML.parents[1] / ".cache" / "config")}
         browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS, env=settings)
@@ -84,3 +101,7 @@ def launch() -> Iterator[Browser]:
             yield browser
         finally:
             browser.close()
+
+
+if __name__ == "__main__":
+    required()

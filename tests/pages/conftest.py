@@ -3,9 +3,21 @@ from __future__ import annotations
 from contextlib import contextmanager
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 
 from . import browser as tools
+
+MISSING = tools.missing()
+
+
+class Skipped(pytest.Module):
+    """A file of page tests, where they cannot be run."""
+
+    def collect(self):
+        pytest.skip(f"the page tests need more: {MISSING}", allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(module_path, parent):
+    return Skipped.from_parent(parent, path=module_path) if MISSING else None
 
 
 @pytest.fixture(scope="session")
@@ -41,4 +53,6 @@ def page(request, open_page):
 
 @pytest.fixture(scope="session")
 def axe():
+    from axe_playwright_python.sync_playwright import Axe
+
     return Axe()

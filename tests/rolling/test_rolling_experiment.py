@@ -10,7 +10,7 @@ import pytest
 from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.ledger.checks import rolling as checks
+from gpbnb.ledger.checks.rolling import material
 from gpbnb.rolling import experiment, theory
 from gpbnb.rolling.stored import SWEEP
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
@@ -66,7 +66,7 @@ def test_rounded_rates():
 
 
 def test_the_spectra_of_the_figures():
-    found = checks.spectra()
+    found = material.spectra()
     duration, n = found.duration, len(found.base_noise)
     base = theory.ramp_density(found.drift, duration, np.arange(1, n + 1) / duration)
     assert found.base_signal[:5] == pytest.approx(base[:5], rel=1e-3)
@@ -200,8 +200,8 @@ def test_memory_does_not_grow_with_the_record():
 
 
 def test_filtered_drifts_agree_with_lag_and_exact_noise():
-    study = checks.filter_study()
-    expected = checks.expected_squares(study)
+    study = material.filter_study()
+    expected = material.expected_squares(study)
     assert np.max(abs(study.error - expected) / study.uncertainty) < 4
     assert np.max(study.uncertainty / study.error) < 0.06
     closed = theory.filtered_error(study.drift, theory.FLOWN_DENSITY, study.bandwidth)
@@ -226,10 +226,10 @@ def test_the_image_behind_filters_is_that_of_their_gain():
 
 
 def test_wandering_roll_rates_agree_with_theory():
-    errors = checks.walk_errors()
+    errors = material.walk_errors()
     sizes = np.sqrt(np.mean(errors**2, axis=1))
     for size, reset in zip(sizes, (None, 60000.0), strict=True):
-        expected = theory.rate_walk_error(DRIFTS[0], checks.WALK, reset=reset)
+        expected = theory.rate_walk_error(DRIFTS[0], material.WALK, reset=reset)
         assert size == pytest.approx(expected, rel=4 / math.sqrt(2 * errors.shape[1]))
     assert sizes[0] > 300 * sizes[1]
 

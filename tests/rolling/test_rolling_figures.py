@@ -11,8 +11,8 @@ from matplotlib.container import ErrorbarContainer
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.display import style
-from gpbnb.ledger.checks import experiment, figures, theory
-from gpbnb.ledger.checks import rolling as checks
+from gpbnb.ledger.checks.rolling import material
+from gpbnb.rolling import experiment, figures, theory
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def theory_lines(artists):
 
 
 def test_density_and_residual(ax):
-    found, slope = checks.noise()
+    found, slope = material.noise_spectrum()
     measured, line = figures.density(found, theory.LEVEL, slope, ax)
     assert np.array_equal(xy(measured), (found.frequency, found.density))
     assert np.array_equal(xy(line)[1], theory.LEVEL / found.frequency)
@@ -45,7 +45,7 @@ def test_density_and_residual(ax):
 
 
 def test_spectra(ax):
-    found = checks.spectra()
+    found = material.spectra()
     noise, drift, *lines = figures.before_rolling(found, ax)
     assert np.array_equal(xy(noise), (found.noise.frequency, found.noise.density))
     assert np.array_equal(xy(drift), (found.ramp.frequency, found.ramp.density))
@@ -63,7 +63,7 @@ def test_spectra(ax):
 
 
 def test_the_lines_pass_through_the_points(ax):
-    found = checks.spectra()
+    found = material.spectra()
     _, drift, noise_line, drift_line = figures.at_base(found, ax)
     x, y = xy(drift)
     assert np.interp(x[:4], *xy(drift_line)) == pytest.approx(y[:4], rel=0.02)
@@ -84,7 +84,7 @@ def test_the_lines_pass_through_the_points(ax):
 
 
 def test_trace(ax):
-    found = checks.stages()
+    found = material.stages()
     t = np.arange(1200) / 360
     x, line_x, y, line_y = figures.trace(t, found["derolled"], found["signal"], "(7)", ax)
     assert np.array_equal(xy(x)[1], found["derolled"].real)
@@ -106,7 +106,7 @@ def test_drift_errors(ax):
 
 
 def test_bandwidths(ax):
-    study = checks.filter_study()
+    study = material.filter_study()
     pole, average, line, lag, noise, _ = figures.bandwidths(study, theory.FLOWN_DENSITY, ax)
     assert xy(line)[1] == pytest.approx(np.hypot(xy(lag)[1], xy(noise)[1]), rel=1e-13)
     assert np.array_equal(xy(pole), (study.bandwidth[:3], np.sqrt(study.error[:3])))
@@ -122,12 +122,12 @@ def test_bandwidths(ax):
 
 def test_resets(ax):
     errors = np.array([[1.0, -2.0, 2.0], [3.0, 3.0, -3.0]])
-    points, line, never, free = figures.resets([6000.0, 60000.0], errors, 6600.0, checks.WALK, 7.0, ax)
+    points, line, never, free = figures.resets([6000.0, 60000.0], errors, 6600.0, material.WALK, 7.0, ax)
     assert xy(points)[1] == pytest.approx([3**0.5, 3.0])
     x, y = xy(line)
-    assert y == pytest.approx([theory.rate_walk_error(6600.0, checks.WALK, reset=r) for r in x])
+    assert y == pytest.approx([theory.rate_walk_error(6600.0, material.WALK, reset=r) for r in x])
     assert list(never.get_ydata()) == [7.0, 7.0]
-    assert list(free.get_ydata()) == [theory.rate_walk_error(6600.0, checks.WALK)] * 2
+    assert list(free.get_ydata()) == [theory.rate_walk_error(6600.0, material.WALK)] * 2
 
 
 def test_rotations(ax):

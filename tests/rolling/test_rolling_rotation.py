@@ -15,7 +15,9 @@ from gpbnb.rolling import experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [
-    FloatFormat(b, t, r) for b, t in ((2, 5), (2, 24), (2, 53), (10, 3), (10, 8), (10, 12), (16, 6)) for r in Rounding
+    FloatFormat(b, t, r)
+    for b, t in ((2, 5), (2, 24), (2, 53), (10, 3), (10, 8), (10, 12), (16, 6))
+    for r in Rounding.documented()
 ]
 PERIODS = [600.0, 77.5]
 

@@ -14,10 +14,10 @@ TWO = FloatFormat(10, 2)
 FOUR = FloatFormat(10, 4)
 
 
-def test_tallies_have_a_line_a_bound():
+def test_bound_statistics_have_a_line_a_bound():
     trials = {sort: experiment.sweep(sort, TWO, [3], 2, np.random.default_rng(1)) for sort in ("sum", "dot")}
-    table = tables.tallies(trials)
-    found = [(sort, each) for sort, group in trials.items() for each in experiment.tally(group)]
+    table = tables.bound_statistics_table(trials)
+    found = [(sort, each) for sort, group in trials.items() for each in experiment.bound_statistics(group)]
     assert len(table.body) == len(found) == 6
     for (sort, each), cells in zip(found, table.body, strict=True):
         assert cells[:4] == (sort, each.bound, str(each.trials), str(each.violations))

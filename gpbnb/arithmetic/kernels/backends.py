@@ -104,9 +104,16 @@ class Compiled(Backend):
 
     tag: Tag
     count: int  # of components
+    fuses = False  # whether it has a fused multiply-add
+
+    def run_tag(self) -> Tag:
+        """The tag for a run of its own: random roundings begin with the first number of their seed."""
+        return self.tag
 
     def apply(self, name: str, *operands: Components) -> Components | None:
-        shape = _shape(operands[0], operands[-1])
+        if name == "fused" and not self.fuses:
+            return None
+        shape = _shape(*operands)
         size = math.prod(shape)
         out = self._empty(size)
         inputs = [self._seen(tuple([_flat(part, shape) for part in components])) for components in operands]
@@ -162,6 +169,7 @@ class Floats(Compiled):
 
     dtype = np.float64
     count = 1
+    lowest_power, highest_power = -960, 1023  # of two, of numbers that it holds
 
     def __init__(self, base: int, precision: int, nearest: bool) -> None:
         super().__init__(base, precision, nearest)
@@ -170,7 +178,9 @@ class Floats(Compiled):
 
     def from_exact(self, m: Array, e: Array) -> Components | None:
         # base**(e + t - 1) <= |x| < base**(e + t)
-        if np.any((e + self.precision) * self.bits > 1023) or np.any((e + self.precision - 1) * self.bits < -960):
+        if np.any((e + self.precision) * self.bits > self.highest_power):
+            return None
+        if np.any((e + self.precision - 1) * self.bits < self.lowest_power):
             return None
         return (np.asarray(np.ldexp(m.astype(np.float64), self.bits * e.astype(np.int64))),)
 
@@ -296,8 +306,11 @@ def _flat(part: Array, shape: tuple[int, ...]) -> Array:
     return flat
 
 
-def _shape(a: Components, b: Components) -> tuple[int, ...]:
-    return a[0].shape if a[0].shape == b[0].shape else np.broadcast_shapes(a[0].shape, b[0].shape)
+def _shape(*operands: Components) -> tuple[int, ...]:
+    first = operands[0][0].shape
+    if all(components[0].shape == first for components in operands[1:]):
+        return first
+    return np.broadcast_shapes(*(components[0].shape for components in operands))
 
 
 @lru_cache(maxsize=1)

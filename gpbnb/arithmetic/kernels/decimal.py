@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
+from gpbnb.arithmetic.kernels.tags import Away, Down, Even, LimitedDecimal, Odd, Up, Zero
 
 NARROW = 9  # digits up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
@@ -117,14 +119,50 @@ def check(e: Any) -> None:
         )
 
 
+def _increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+    """1 if a magnitude goes up to m + 1, else 0; `up`: it is halfway or more, `tie`: halfway, `inexact`: above m."""
+    raise TypeError("got a call of _increment from Python; needed one from a function compiled by numba")
+
+
+@overload(_increment, strict=False, jit_options={"forceinline": True})
+def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+    if getattr(fmt, "instance_class", None) is not LimitedDecimal:
+        return lambda fmt, m, up, tie, inexact, negative: np.uint64(up & fmt.nearest)
+    return {
+        Away: lambda fmt, m, up, tie, inexact, negative: np.uint64(up),
+        Even: lambda fmt, m, up, tie, inexact, negative: np.uint64(up & ((not tie) | ((m & _U1) == _U1))),
+        Zero: lambda fmt, m, up, tie, inexact, negative: _U0,
+        Up: lambda fmt, m, up, tie, inexact, negative: np.uint64(inexact & (not negative)),
+        Down: lambda fmt, m, up, tie, inexact, negative: np.uint64(inexact & negative),
+        Odd: lambda fmt, m, up, tie, inexact, negative: np.uint64(inexact & ((m & _U1) == _U0)),
+    }[fmt.types[0].instance_class]
+
+
+def _held(fmt: Any, m: Any, e: Any) -> Any:
+    """The pair, if its exponent is one that the backend and the format hold."""
+    raise TypeError("got a call of _held from Python; needed one from a function compiled by numba")
+
+
+@overload(_held, strict=False, jit_options={"forceinline": True})
+def _overloaded_held(fmt: Any, m: Any, e: Any) -> Any:
+    def anywhere(fmt: Any, m: Any, e: Any) -> Any:
+        check(e)
+        return m, e
+
+    def within(fmt: Any, m: Any, e: Any) -> Any:
+        if e > fmt.largest or (e < fmt.least and not fmt.flush):
+            raise OverflowError("got a result beyond the normal numbers of the format; needed one within")
+        return (m, e) if e >= fmt.least else (np.int64(0), np.int64(0))
+
+    return within if getattr(fmt, "instance_class", None) is LimitedDecimal else anywhere
+
+
 @njit(forceinline=True)
 def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
     """The pair of a magnitude of t digits, or one that rounding carried to t + 1."""
     carried = m == _power(fmt.precision)
     m = _power(fmt.precision - 1) if carried else m
-    e += np.int64(carried)
-    check(e)
-    return (-np.int64(m) if negative else np.int64(m)), e
+    return _held(fmt, (-np.int64(m) if negative else np.int64(m)), e + np.int64(carried))
 
 
 @njit(forceinline=True)
@@ -152,6 +190,8 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     negative = m1 < 0
     same = negative == (m2 < 0)
     beyond_half: Any = False  # of what lies below the last digit of n
+    halfway: Any = False
+    more: Any = False
     if d <= 1:
         x *= _power(d)
         e = e2
@@ -174,6 +214,8 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
         else:
             whole, unit = _quotient(y, k), _power(k)
             rest = y - whole * unit
+        more = rest != _U0
+        halfway = rest + rest == unit
         if same:
             n = x * _U10 + whole
             beyond_half = rest + rest >= unit
@@ -184,16 +226,22 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
                 beyond_half = rest + rest <= unit
     if n >= _power(t + 1):
         m = n // _U100
-        up: Any = n - m * _U100 >= _U50
+        last = n - m * _U100
+        up: Any = last >= _U50
+        halfway = (last == _U50) & (not more)
+        more = more | (last != _U0)
         e += 2
     elif n >= _power(t):
         m = n // _U10
-        up = n - m * _U10 >= _U5
+        last = n - m * _U10
+        up = last >= _U5
+        halfway = (last == _U5) & (not more)
+        more = more | (last != _U0)
         e += 1
     else:
         m = n
         up = beyond_half
-    m += np.uint64(up & fmt.nearest)
+    m += _increment(fmt, m, up, halfway, more, negative)
     return _number(fmt, m, e, negative)
 
 
@@ -212,14 +260,16 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
     k = t - 1
     x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
     m, rest = _wide_by_power(high_product(x, y), x * y, k)
-    up = rest + rest >= _power(k)
+    up, tie, inexact = rest + rest >= _power(k), rest + rest == _power(k), rest != _U0
     if m >= _power(t):
         n = m
         m = n // _U10
-        up = n - m * _U10 >= _U5
+        last = n - m * _U10
+        up, tie, inexact = last >= _U5, (last == _U5) & (not inexact), inexact | (last != _U0)
         k = t
-    m += np.uint64(up & fmt.nearest)
-    return _number(fmt, m, e1 + e2 + k, (m1 < 0) != (m2 < 0))
+    negative = (m1 < 0) != (m2 < 0)
+    m += _increment(fmt, m, up, tie, inexact, negative)
+    return _number(fmt, m, e1 + e2 + k, negative)
 
 
 @njit
@@ -239,8 +289,9 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
         rest = n - m * y
     else:
         m, rest = _wide_by_any(high_product(x, _power(k)), x * _power(k), y)
-    m += np.uint64(fmt.nearest & (rest + rest >= y))
-    return _number(fmt, m, e1 - e2 - k, (m1 < 0) != (m2 < 0))
+    negative = (m1 < 0) != (m2 < 0)
+    m += _increment(fmt, m, rest + rest >= y, rest + rest == y, rest != _U0, negative)
+    return _number(fmt, m, e1 - e2 - k, negative)
 
 
 @njit
@@ -268,9 +319,8 @@ def sqrt(fmt: Any, a: Any) -> Any:
         rest -= 2 * root + 1
         root += 1
     # Never a tie, never a carry: as in the exact kernel.
-    if fmt.nearest and rest > root:
-        root += 1
-    return _number(fmt, np.uint64(root), (e - k) // 2, False)
+    whole = np.uint64(root)
+    return _number(fmt, whole + _increment(fmt, whole, rest > root, False, rest > 0, False), (e - k) // 2, False)
 
 
 @njit
@@ -286,8 +336,7 @@ def round_(fmt: Any, x: Any) -> Any:
     unit = _power(drop)
     q = n // unit
     rest = n - q * unit
-    if fmt.nearest and rest + rest >= unit:
-        q += _U1
+    q += _increment(fmt, q, rest + rest >= unit, rest + rest == unit, rest != _U0, m < 0)
     return _number(fmt, q, e + drop, m < 0)
 
 

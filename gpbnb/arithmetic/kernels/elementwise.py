@@ -39,6 +39,19 @@ def _one(operation: Any) -> Callable[..., bool]:
     return loop
 
 
+def _three(operation: Any) -> Callable[..., bool]:
+    @compiled
+    def loop(fmt: Any, n: int, a: Any, b: Any, c: Any, d: Any) -> Any:
+        gone = False
+        for i in range(n):
+            x = operation(fmt, load(fmt, a, i), load(fmt, b, i), load(fmt, c, i))
+            gone |= lost(fmt, x)
+            put(fmt, d, i, x)
+        return gone
+
+    return loop
+
+
 def _fold(operation: Any) -> Callable[..., bool]:
     @compiled
     def loop(fmt: Any, n: int, width: int, a: Any, c: Any) -> Any:
@@ -56,6 +69,7 @@ def _fold(operation: Any) -> Callable[..., bool]:
 
 ENTRIES = {name: _two(getattr(scalar, name)) for name in ("add", "subtract", "multiply", "divide")}
 ENTRIES |= {name: _one(getattr(scalar, name)) for name in ("sqrt", "round_")}
+ENTRIES["fused"] = _three(scalar.fused)
 FOLDS = {name: _fold(getattr(scalar, name)) for name in ("add", "multiply")}
 
 

@@ -112,6 +112,19 @@ class ExactKernel:
             return ZERO
         return self._round_quotient(m1 if m2 > 0 else -m1, abs(m2), e1 - e2)
 
+    def fused(self, m1: int, e1: int, m2: int, e2: int, m3: int, e3: int) -> Pair:
+        """``a * b + c``, rounded once."""
+        m, e = m1 * m2, e1 + e2
+        if m == 0:
+            return m3, e3
+        if m3 == 0:
+            return self._round_integer(m, e)
+        (m, e), (n, f) = ((m, e), (m3, e3)) if e >= e3 else ((m3, e3), (m, e))
+        if e - f > 3 * self.precision + 2:
+            n, f = (1 if n > 0 else -1), e - self.precision - 3  # far below: only its sign matters
+        n += m * self._power(e - f)
+        return self._round_integer(n, f) if n else ZERO
+
     def sqrt(self, m: int, e: int) -> Pair:
         """The caller has excluded ``m < 0``."""
         if m == 0:

@@ -17,6 +17,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     divide,
     load,
     multiply,
+    multiply_add,
     one,
     put,
     store,
@@ -48,7 +49,7 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
 
 
 @njit(nogil=True)
-def total(fmt: Any, a: Any, b: Any, c: Any) -> None:
+def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a + b."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
@@ -78,7 +79,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
                 fresh = False
             else:
                 for j in range(b.shape[1]):
-                    put(fmt, c, (i, j), add(fmt, load(fmt, c, (i, j)), multiply(fmt, factor, load(fmt, b, (k, j)))))
+                    put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
         if fresh:
             for j in range(b.shape[1]):
                 put(fmt, c, (i, j), zero(fmt))
@@ -100,7 +101,7 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
                 fresh = False
             else:
                 for i in range(a.shape[0]):
-                    put(fmt, c, (i, j), add(fmt, load(fmt, c, (i, j)), multiply(fmt, load(fmt, a, (i, k)), factor)))
+                    put(fmt, c, (i, j), multiply_add(fmt, load(fmt, a, (i, k)), factor, load(fmt, c, (i, j))))
         if fresh:
             for i in range(a.shape[0]):
                 put(fmt, c, (i, j), zero(fmt))
@@ -147,19 +148,19 @@ def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
     Returns whether no entry of D came out negative, nor one zero below a column that is not.
     """
     n = a.shape[0]
-    fine = True
+    definite = True
     for j in range(n - 1, -1, -1):
         d = load(fmt, a, (j, j))
         sign = compare(fmt, d, zero(fmt))
         if sign < 0:
-            fine = False
+            definite = False
         put(fmt, u, (j, j), d)
         for i in range(j):
             put(fmt, u, (j, i), zero(fmt))
             x = load(fmt, a, (i, j))
             if sign == 0:
                 if not is_zero(fmt, x):
-                    fine = False
+                    definite = False
                 put(fmt, u, (i, j), zero(fmt))
             else:
                 store(fmt, u, (i, j), divide(fmt, x, d))
@@ -168,4 +169,4 @@ def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
                 for k in range(i + 1):
                     x = multiply(fmt, load(fmt, u, (k, j)), load(fmt, a, (i, j)))
                     store(fmt, a, (k, i), subtract(fmt, load(fmt, a, (k, i)), x))
-    return fine
+    return definite

@@ -27,13 +27,24 @@ import numpy as np
 from numba import njit, types
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, shortdecimal
-from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal, ShortDecimal
+from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal
+from gpbnb.arithmetic.kernels.tags import (
+    FLOATS,
+    PAIRS,
+    Decimal,
+    Double,
+    DoubleDouble,
+    Fused,
+    Hardware32,
+    Hardware64,
+    Limited,
+    LimitedDecimal,
+    ShortDecimal,
+)
 
 _INLINE = {"forceinline": True}
-_OF_FLOATS = (Binary, Hexadecimal, Double)
-_OF_PAIRS = (Decimal, ShortDecimal)
-_MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, DoubleDouble: doubledouble}
+_MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, LimitedDecimal: decimal, DoubleDouble: doubledouble}
+_MACHINE = {Hardware32: processor.SINGLE, Hardware64: processor.DOUBLE}
 
 _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
@@ -135,9 +146,17 @@ def lost(fmt: Any, x: Any) -> Any:
     raise _only_compiled("lost")
 
 
-def _multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """fl(c + fl(a * b)); a product that the backend could not hold is told by the sum, if it matters there."""
-    raise _only_compiled("_multiply_add")
+def _beyond_largest(fmt: Any, a: Any) -> Any:
+    """A number, or what becomes of it beyond the largest."""
+    raise _only_compiled("_beyond_largest")
+
+
+def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """fl(c + fl(a * b)), or fl(c + a * b) where the tag fuses.
+
+    Where the backend cannot hold the product, the sum says so if it matters there.
+    """
+    raise _only_compiled("multiply_add")
 
 
 # -- plain float64 -----------------------------------------------------------------------------------
@@ -186,8 +205,24 @@ _DOUBLE = {
 def _implementation(fmt: Any, name: str) -> Any:
     tag = _tag(fmt)
     if tag in binary.OPERATIONS:
-        return binary.OPERATIONS[tag][name]
-    return _DOUBLE[name] if tag is Double else getattr(_MODULES.get(tag), name, None)
+        return binary.OPERATIONS[tag].get(name)
+    if tag in _MACHINE:
+        return _MACHINE[tag][name]
+    if tag is Limited:
+        digits, mode = (kind.instance_class for kind in fmt.types[:2])
+        return processor.operations(digits, mode)[name]
+    return _DOUBLE.get(name) if tag is Double else getattr(_MODULES.get(tag), name, None)
+
+
+def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """fl(a * b + c), rounded once; only for ``Limited``, ``Hardware32`` and ``Hardware64``."""
+    raise _only_compiled("fused")
+
+
+@overload(fused, strict=False, jit_options=_INLINE)
+def _overloaded_fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    function = _implementation(fmt, "fused")
+    return None if function is None else lambda fmt, a, b, c: function(fmt, a, b, c)
 
 
 def _overload_two(stub: Callable[..., Any]) -> None:
@@ -221,27 +256,37 @@ _overload_one(round_, "x")
 
 @overload(negative, strict=False, jit_options=_INLINE)
 def _negative(fmt: Any, a: Any) -> Any:
-    if _tag(fmt) in _OF_PAIRS:
+    if _tag(fmt) in PAIRS:
         return lambda fmt, a: (-a[0], a[1])
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, a: (0.0 - a[0], 0.0 - a[1])
     if _tag(fmt) is Double:
         return lambda fmt, a: -a
-    return lambda fmt, a: 0.0 - a
+    return lambda fmt, a: _beyond_largest(fmt, 0.0 - a)
+
+
+@overload(_beyond_largest, strict=False, jit_options=_INLINE)
+def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
+    # A fixed-point format has one negative number more.
+    if _tag(fmt) is Limited:
+        return lambda fmt, a: fmt.over if a > fmt.largest else a
+    return lambda fmt, a: a
 
 
 @overload(absolute, strict=False, jit_options=_INLINE)
 def _absolute(fmt: Any, a: Any) -> Any:
-    if _tag(fmt) in _OF_PAIRS:
+    if _tag(fmt) in PAIRS:
         return lambda fmt, a: (abs(a[0]), a[1])
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, a: a if a[0] >= 0.0 else (-a[0], -a[1])
-    return lambda fmt, a: abs(a)
+    if _tag(fmt) is Double:
+        return lambda fmt, a: abs(a)
+    return lambda fmt, a: _beyond_largest(fmt, abs(a))
 
 
 @overload(compare, strict=False, jit_options=_INLINE)
 def _compare(fmt: Any, a: Any, b: Any) -> Any:
-    if _tag(fmt) in _OF_FLOATS:
+    if _tag(fmt) in FLOATS:
 
         def of_floats(fmt: Any, a: Any, b: Any) -> Any:
             if a != a or b != b:
@@ -260,7 +305,7 @@ def _less(fmt: Any, a: Any, b: Any) -> Any:
 
 @overload(integer, strict=False, jit_options=_INLINE)
 def _integer(fmt: Any, n: Any) -> Any:
-    if _tag(fmt) in _OF_PAIRS:
+    if _tag(fmt) in PAIRS:
         return lambda fmt, n: round_(fmt, (np.int64(n), np.int64(0)))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, n: (np.float64(n), 0.0)
@@ -269,7 +314,7 @@ def _integer(fmt: Any, n: Any) -> Any:
 
 @overload(zero, strict=False, jit_options=_INLINE)
 def _zero(fmt: Any) -> Any:
-    if _tag(fmt) in _OF_PAIRS:
+    if _tag(fmt) in PAIRS:
         return lambda fmt: (np.int64(0), np.int64(0))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt: (0.0, 0.0)
@@ -281,8 +326,10 @@ def _one(fmt: Any) -> Any:
     return lambda fmt: integer(fmt, 1)
 
 
-@overload(_multiply_add, strict=False, jit_options=_INLINE)
+@overload(multiply_add, strict=False, jit_options=_INLINE)
 def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    if _tag(fmt) is Limited and fmt.types[2].instance_class is Fused:
+        return lambda fmt, a, b, c: fused(fmt, a, b, c)
     if _tag(fmt) is ShortDecimal:
         return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
     return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
@@ -294,7 +341,7 @@ def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 @overload(load, strict=False, jit_options=_INLINE)
 def _load(fmt: Any, array: Any, index: Any) -> Any:
-    if _tag(fmt) in _OF_FLOATS:
+    if _tag(fmt) in FLOATS:
         return lambda fmt, array, index: array[index]
     if isinstance(array, types.BaseTuple):
         return lambda fmt, array, index: (array[0][index], array[1][index])
@@ -320,7 +367,7 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
         array[(*index, 0)] = x[0]
         array[(*index, 1)] = x[1]
 
-    if _tag(fmt) in _OF_FLOATS:
+    if _tag(fmt) in FLOATS:
         return of_floats
     if isinstance(array, types.BaseTuple):
         return in_two
@@ -329,7 +376,7 @@ def _overloaded_put(fmt: Any, array: Any, index: Any, x: Any) -> Any:
 
 @overload(lost, strict=False, jit_options=_INLINE)
 def _lost(fmt: Any, x: Any) -> Any:
-    if _tag(fmt) in _OF_PAIRS:
+    if _tag(fmt) in PAIRS:
         return lambda fmt, x: False
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, x: x[0] != x[0]
@@ -359,7 +406,7 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
         return zero(fmt)
     s = multiply(fmt, load(fmt, x, 0), load(fmt, y, 0))
     for k in range(1, n):
-        s = _multiply_add(fmt, load(fmt, x, k), load(fmt, y, k), s)
+        s = multiply_add(fmt, load(fmt, x, k), load(fmt, y, k), s)
     return s
 
 
@@ -381,7 +428,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
         for k in range(1, a.shape[1]):
             factor = load(fmt, a, (i, k))
             for j in range(b.shape[1]):
-                put(fmt, c, (i, j), _multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
+                put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
     check(fmt, c)
 
 

@@ -17,9 +17,9 @@ from gpbnb.arithmetic.kernels.matrices import (
     factor_ud,
     inverse,
     is_zero,
+    matrix_sum,
     product,
     product_by_sparse,
-    total,
     transpose,
 )
 from gpbnb.arithmetic.kernels.scalar import (
@@ -210,10 +210,10 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
         return answer
     product(fmt, phi, P, T)
     product_by_sparse(fmt, T, phiT, V)
-    total(fmt, V, Q[k % Q.shape[0]], V)
+    matrix_sum(fmt, V, Q[k % Q.shape[0]], V)
     product_by_sparse(fmt, V, hT, PHt)
     product(fmt, h, PHt, S)
-    total(fmt, S, r, S)
+    matrix_sum(fmt, S, r, S)
     copy(fmt, S, pivots)
     answer = inverse(fmt, pivots, SI)
     if answer == 0:
@@ -228,7 +228,7 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
         transpose(fmt, K, KT)
         product_by_sparse(fmt, K, r, B)
         product(fmt, B, KT, T)
-        total(fmt, F, T, P)
+        matrix_sum(fmt, F, T, P)
     else:
         product(fmt, W, V, P)
     if form == _HUNG_SECOND_GAIN:
@@ -245,7 +245,7 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
         product(fmt, h, u, y)
         difference(fmt, z, y, g)
         product(fmt, K, g, v)
-    total(fmt, u, v, x)
+    matrix_sum(fmt, u, v, x)
     for i in range(x.shape[0]):
         if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
             answer = -1

@@ -180,5 +180,5 @@ def inside(function: FunctionType) -> list:
 
 def test_every_cache_has_this_key():
     for path in caching.PACKAGE.rglob("*.py"):
-        if path.name != "compiling.py" and path.parent.name not in ("rolling", "integration"):
+        if path.name != "compiling.py":
             assert "cache=True" not in path.read_text(encoding="utf-8"), f"{path.name}: use `compiled` for a cache"

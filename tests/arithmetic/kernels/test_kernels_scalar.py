@@ -39,7 +39,7 @@ from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, DoubleDouble,
 FORMATS = [
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 11), (2, 24), (2, 53), (10, 8), (10, 17), (16, 6))
-    for rounding in Rounding
+    for rounding in Rounding.documented()
 ]
 
 

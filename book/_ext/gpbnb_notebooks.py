@@ -1,0 +1,89 @@
+"""Build the book from executed copies of the notebooks, which the cache of `scripts/execute_notebooks.py` keeps.
+
+MyST-NB executes one notebook after the other, and its cache does not notice changes in the package.
+"""
+
+import hashlib
+import os
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+from sphinx.errors import ExtensionError
+from sphinx.util import logging
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+import execute_notebooks
+
+LOGGER = logging.getLogger(__name__)
+COPIES = "executed"
+MOST_JOBS = 8
+
+
+def execute(app: Sphinx) -> None:
+    """Execute the notebooks whose outputs are not known, and lay executed copies of all beside the pages."""
+    if app.parallel == 1:
+        app.parallel = min(os.cpu_count() or 1, MOST_JOBS)
+    if numbering := app.extensions.get("sphinx_multitoc_numbering"):
+        numbering.parallel_read_safe = True  # it works after reading, and does not say so
+    found = app.project.discover(app.config.exclude_patterns, app.config.include_patterns)
+    paths = [path for each in sorted(found) if (path := Path(app.env.doc2path(each))).suffix == ".ipynb"]
+    try:
+        notebooks = execute_notebooks.executed(paths, say=LOGGER.info)
+    except ExceptionGroup as group:
+        raise ExtensionError("\n\n".join(map(str, group.exceptions))) from group
+    folder = copies(app)
+    folder.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256()
+    for path, notebook in notebooks.items():
+        execute_notebooks.write(folder / path.name, notebook)
+        for cell in notebook.cells:
+            digest.update(repr(cell.get("outputs")).encode())
+    app.config.gpbnb_outputs = digest.hexdigest()
+
+
+def copies(app: Sphinx) -> Path:
+    return Path(app.outdir).parent / COPIES
+
+
+def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
+    """Read the executed copy of a notebook in place of the notebook."""
+    path = Path(app.env.doc2path(docname))
+    if path.suffix == ".ipynb":
+        copy = copies(app) / path.name
+        app.env.note_dependency(str(copy))
+        source[0] = copy.read_text(encoding="utf-8")
+
+
+def outdated(app: Sphinx, env: BuildEnvironment, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
+    """Read all pages again if an output has changed: any page may show a number of any notebook."""
+    before, now = getattr(env, "gpbnb_outputs", None), app.config.gpbnb_outputs
+    env.gpbnb_outputs = now
+    return [] if before in (None, now) else sorted(env.found_docs)
+
+
+def remove_old_pages(app: Sphinx, error: Exception | None) -> None:
+    """Remove pages whose source is gone: Sphinx leaves them where they are."""
+    if error or app.builder.name != "html":
+        return
+    root = Path(app.outdir)
+    kept = {app.builder.get_target_uri(name) for name in app.env.found_docs}
+    kept |= {f"{name}.html" for name in ("index", "genindex", "search", "py-modindex", "_modules/index")}
+    kept |= {f"_modules/{name.replace('.', '/')}.html" for name in getattr(app.env, "_viewcode_modules", {})}
+    for page in root.rglob("*.html"):
+        name = page.relative_to(root).as_posix()
+        if name not in kept and not name.startswith("_static/"):
+            page.unlink()
+
+
+def setup(app: Sphinx) -> dict:
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    state = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+    app.add_config_value("gpbnb_extensions", state, "env")  # a change of them changes any page
+    app.add_config_value("gpbnb_outputs", "", "")
+    app.connect("builder-inited", execute)
+    app.connect("source-read", use_copy)
+    app.connect("env-get-outdated", outdated)
+    app.connect("build-finished", remove_old_pages)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

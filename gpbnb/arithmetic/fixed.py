@@ -1,0 +1,175 @@
+"""Fixed point: multiples of one unit between two limits, as digital signal processors compute."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.kernels.backends import Backend
+from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel
+from gpbnb.arithmetic.kernels.limited import limited_kernel
+from gpbnb.arithmetic.kernels.limited_backends import LimitedExact, limited_backend, limited_exact, run_tag
+from gpbnb.arithmetic.kernels.rules import Limits, Rounding, Rules
+from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.rational import exact
+
+_POLICIES = ("raise", "saturate", "wrap")
+
+
+class FixedArray(FloatArray):
+    """An immutable n-dimensional array of fixed-point numbers; make one with ``fmt.array``.
+
+    Its operations are those of :class:`gpbnb.arithmetic.array.FloatArray`: each rounds its exact result once, to a
+    multiple of the unit, and treats a result beyond the limits as the format says.
+    """
+
+    __slots__ = ()
+
+
+@dataclass(frozen=True)
+class FixedFormat:
+    r"""Two's complement fixed point: multiples of :math:`2^{-f}` from :math:`-2^i` to :math:`2^i - 2^{-f}`.
+
+    Parameters
+    ----------
+    integer_bits : i, bits before the binary point, without the sign.
+    fraction_bits : f, bits behind it; the word has 1 + i + f bits.
+    rounding : of every stored number and every result.
+    overflow : "raise" an OverflowError that names the operation and the entry, "saturate" at the nearest limit, or
+        "wrap" around as two's complement does.
+    seed : of stochastic rounding.
+
+    Raises
+    ------
+    TypeError : a parameter is not of its type.
+    ValueError : no bits at all, or an unknown overflow.
+
+    Examples
+    --------
+    >>> q15 = FixedFormat(integer_bits=0, fraction_bits=15)
+    >>> (q15.array("0.1") * q15.array("0.5")).to_fractions()
+    Fraction(819, 16384)
+    """
+
+    integer_bits: int
+    fraction_bits: int
+    rounding: Rounding = Rounding.NEAREST
+    overflow: str = "raise"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("integer_bits", "fraction_bits", "seed"):
+            value = getattr(self, name)
+            if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+                raise TypeError(f"{name}: got {value!r} of type {type(value).__name__}; needed an int")
+            object.__setattr__(self, name, int(value))
+        if not isinstance(self.rounding, Rounding):
+            raise TypeError(f"rounding: got {self.rounding!r}; needed one of {', '.join(map(str, Rounding))}")
+        if not 1 <= self.precision <= LARGEST_BITS:
+            raise ValueError(
+                f"got {self.integer_bits} integer bits and {self.fraction_bits} fraction bits; needed at least one"
+            )
+        if self.overflow not in _POLICIES:
+            raise ValueError(f"overflow: got {self.overflow!r}; needed one of {', '.join(map(repr, _POLICIES))}")
+
+    @property
+    def base(self) -> int:
+        """The number base, 2."""
+        return 2
+
+    @property
+    def precision(self) -> int:
+        """Bits of the word without its sign."""
+        return self.integer_bits + self.fraction_bits
+
+    @property
+    def unit(self) -> Fraction:
+        """The distance of neighbouring numbers, exact. The error of a rounding is at most half of it, to nearest."""
+        return Fraction(1, 2) ** self.fraction_bits
+
+    @property
+    def largest(self) -> Fraction:
+        """The largest number."""
+        return Fraction(2) ** self.integer_bits - self.unit
+
+    @property
+    def lowest(self) -> Fraction:
+        """The lowest number."""
+        return -(Fraction(2) ** self.integer_bits)
+
+    @cached_property
+    def _rules(self) -> Rules:
+        limits = Limits(self.integer_bits - 1, True, self.largest, self.lowest, self.overflow, fixed=True)
+        return Rules(2, self.precision, self.rounding, limits, self.seed)
+
+    @property
+    def kernel(self) -> ExactKernel:
+        """The scalar operations of this format."""
+        return limited_kernel(self._rules)
+
+    @property
+    def backend(self) -> Backend:
+        """What holds the numbers of an array of this format."""
+        return limited_backend(self._rules)
+
+    @property
+    def exact_backend(self) -> LimitedExact:
+        """What holds every number of this format, slowly."""
+        return limited_exact(self._rules)
+
+    def run_tag(self, fused: bool = False) -> Tag:
+        """The arithmetic for a compiled loop of its own; random roundings begin with the first number of the seed.
+
+        Parameters
+        ----------
+        fused : whether sums of products use fused multiply-add.
+
+        Raises
+        ------
+        ValueError : the format has no compiled loops, or none with fused multiply-add.
+        """
+        return run_tag(self.backend, self._rules, fused)
+
+    def round(self, value: Any) -> Fraction:
+        """Round one number into the format; as :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""
+        return self.kernel.to_fraction(*self.kernel.from_decimal(*exact_ratio(value)))
+
+    def array(self, values: Any) -> FixedArray:
+        """Round numbers into a :class:`FixedArray`; as :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
+        return FixedArray.from_values(values, self)
+
+
+def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overflow: str = "raise") -> FixedFormat:
+    """Choose the binary point of a word so that no value overflows and no bit is wasted.
+
+    Parameters
+    ----------
+    values : the numbers that occur, of any shape: the range of a variable in a reference run, with a margin.
+    bits : of the word, its sign included.
+
+    Raises
+    ------
+    ValueError : fewer than two bits, or all values zero.
+    """
+    if bits < 2:
+        raise ValueError(f"bits: got {bits}; needed at least 2, one of them the sign")
+    largest = max(abs(exact(values)).ravel(), default=Fraction(0))
+    if not largest:
+        raise ValueError("got values that are all zero; needed one that is not; leave the variable out")
+    integer_bits = math.frexp(float(largest))[1]  # largest < 2**integer_bits, but for the last rounding
+    while True:
+        fmt = FixedFormat(integer_bits, bits - 1 - integer_bits, rounding, overflow)
+        if largest <= fmt.largest:
+            smaller = FixedFormat(integer_bits - 1, bits - integer_bits, rounding, overflow)
+            if largest > smaller.largest:
+                return fmt
+            integer_bits -= 1
+        else:
+            integer_bits += 1

@@ -1,0 +1,210 @@
+"""Correctly rounded arithmetic on Python integers with every rounding mode and a limited range.
+
+Numbers are the pairs of :mod:`gpbnb.arithmetic.kernels.exact`. A subnormal number is normalized as well: its last
+digits are zeros.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import lru_cache
+from math import isqrt
+from typing import cast
+
+from gpbnb.arithmetic.kernels.exact import ZERO, ExactKernel, Pair
+from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Limits, Rounding, Rules
+
+_MASK = 2**64 - 1
+
+
+def draw(seed: int, count: int) -> int:
+    """Random bits for the rounding number `count`: SplitMix64, of which the upper bits are taken."""
+    z = (seed + count * 0x9E3779B97F4A7C15) & _MASK
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+    return (z ^ (z >> 31)) >> (64 - DRAW_BITS)
+
+
+class LimitedKernel(ExactKernel):
+    """Scalar operations of one format with any rounding mode, and with limits if it has any.
+
+    Results are rounded as if the exponent had no upper limit; a result that is then beyond the largest number
+    overflows. Where a format has no subnormal numbers, results that are below the least normal number after rounding
+    become zero.
+
+    Raises
+    ------
+    OverflowError : a result overflows, and the format neither saturates nor wraps around.
+    """
+
+    def __init__(self, rules: Rules) -> None:
+        super().__init__(rules.base, rules.precision, rules.rounding in (Rounding.NEAREST, Rounding.EVEN))
+        self.rules = rules
+        self.rounding, self.limits = rules.rounding, rules.limits
+        self.count = 0  # of roundings, for the random ones
+        if self.limits is not None:
+            #: Exponent of the last digit of the least normal number.
+            self.quantum = self.limits.emin - rules.precision + 1
+            largest = self.limits.largest / Fraction(rules.base) ** self.quantum
+            m, e = self._normalized(int(largest), self.quantum)
+            self.top = e, m  # in the order of size
+
+    def restart(self) -> None:
+        """Begin the random numbers of stochastic rounding again."""
+        self.count = 0
+
+    # -- operations ----------------------------------------------------------------------------
+
+    def from_ratio(self, p: int, q: int, e: int = 0) -> Pair:
+        self.count += 1
+        return super().from_ratio(p, q, e)
+
+    def is_exactly(self, pair: Pair, p: int, q: int, k: int) -> bool:
+        return p == 0 if pair == ZERO else super().is_exactly(pair, p, q, k)
+
+    def add(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        self.count += 1
+        return self._sum(m1, e1, m2, e2)
+
+    def multiply(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        self.count += 1
+        return super().multiply(m1, e1, m2, e2)
+
+    def divide(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        self.count += 1
+        return super().divide(m1, e1, m2, e2)
+
+    def fused(self, m1: int, e1: int, m2: int, e2: int, m3: int, e3: int) -> Pair:
+        """``a * b + c``, rounded once."""
+        self.count += 1
+        return self._sum(m1 * m2, e1 + e2, m3, e3)
+
+    def sqrt(self, m: int, e: int) -> Pair:
+        """The caller has excluded ``m < 0``."""
+        self.count += 1
+        if m == 0:
+            return ZERO
+        # So many digits that the root has more than t, and more than a random rounding looks at.
+        shift = 2 * (self.precision + DRAW_BITS) + (e & 1)
+        n = m * self.base**shift
+        root = isqrt(n)
+        # An inexact root lies strictly between two integers: one more digit says so.
+        sticky = int(root * root != n)
+        return self._round_integer(root * self.base + sticky, (e - shift) // 2 - 1)
+
+    def negative(self, m: int, e: int) -> Pair:
+        return self._within(-m, abs(m), e)
+
+    def absolute(self, m: int, e: int) -> Pair:
+        return self._within(1, abs(m), e)
+
+    def _sum(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        if m1 == 0 or m2 == 0:
+            m, e = (m1, e1) if m2 == 0 else (m2, e2)
+            return self._round_integer(m, e) if m else ZERO
+        if e1 < e2:
+            m1, e1, m2, e2 = m2, e2, m1, e1
+        gap = 3 * self.precision + DRAW_BITS + 2
+        if e1 - e2 > gap and self.limits is None:
+            # Only the sign of the smaller number matters: it is far below what any mode looks at.
+            m2, e2 = (1 if m2 > 0 else -1), e1 - 2 * DRAW_BITS - 3
+        n = m1 * self._power(e1 - e2) + m2
+        return self._round_integer(n, e2) if n else ZERO
+
+    # -- rounding ------------------------------------------------------------------------------
+
+    def _round_integer(self, n: int, e: int) -> Pair:
+        a = abs(n)
+        drop = self._dropped(self._digits(a) - self.precision, e)
+        if drop <= 0:
+            return self._within(n, a, e)
+        if drop > self._digits(a) + DRAW_BITS + 2:  # far below half of the last digit
+            a, e, drop = 1, e + drop - DRAW_BITS - 2, DRAW_BITS + 2
+        unit = self._power(drop)
+        m, rest = divmod(a, unit)
+        return self._within(n, m + self._up(m, rest, unit, n < 0), e + drop)
+
+    def _round_quotient(self, p: int, q: int, e: int) -> Pair:
+        a = abs(p)
+        shift = self.precision - self._digits(a) + self._digits(q)
+        # The quotient has t digits or one more at this shift; then it is rounded at the right one.
+        numerator, denominator = (a * self._power(shift), q) if shift >= 0 else (a, q * self._power(-shift))
+        drop = self._dropped(int(numerator >= denominator * self._limit), e - shift)
+        if drop < 0:
+            numerator *= self._power(-drop)
+        else:
+            denominator *= self._power(drop)
+        m, rest = divmod(numerator, denominator)
+        return self._within(p, m + self._up(m, rest, denominator, p < 0), e - shift + drop)
+
+    def _dropped(self, excess: int, e: int) -> int:
+        """How many digits of an integer times ``base**e`` are dropped, of which `excess` are too many for t."""
+        if self.limits is None:
+            return excess
+        if self.limits.fixed:
+            return self.quantum - e
+        return max(excess, self.quantum - e) if self.limits.subnormal else excess
+
+    def _up(self, m: int, rest: int, unit: int, negative: bool) -> bool:
+        """Whether the magnitude ``m + rest / unit`` is rounded to m + 1."""
+        match self.rounding:
+            case Rounding.NEAREST:
+                return 2 * rest >= unit
+            case Rounding.EVEN:
+                return 2 * rest > unit or (2 * rest == unit and m % 2 == 1)
+            case Rounding.CHOP:
+                return False
+            case Rounding.UP:
+                return rest > 0 and not negative
+            case Rounding.DOWN:
+                return rest > 0 and negative
+            case Rounding.ODD:
+                return rest > 0 and m % 2 == 0
+            case Rounding.STOCHASTIC:
+                return draw(self.rules.seed, self.count) * unit < rest << DRAW_BITS
+
+    def _within(self, sign: int, m: int, e: int) -> Pair:
+        """The pair of a rounded magnitude, if it is within the limits."""
+        if m == 0:
+            return ZERO
+        if self.limits is not None and self.limits.fixed:
+            m = self._wrapped(m if sign > 0 else -m, e)
+            return self._normalized(m, self.quantum) if m else ZERO
+        m, e = self._normalized(m, e)
+        if self.limits is not None:
+            if not self.limits.subnormal and e < self.quantum:
+                return ZERO
+            if (e, m) > self.top:
+                raise OverflowError(
+                    f"got a result of about {self._about(e)}; needed at most {float(self.limits.largest):.7g} in size; "
+                    "scale the numbers, or use a format with a larger range"
+                )
+        return (m if sign > 0 else -m), e
+
+    def _wrapped(self, m: int, e: int) -> int:
+        """A fixed-point number as a count of its last digit."""
+        limits = cast(Limits, self.limits)
+        count = m * self._power(e - self.quantum)
+        unit = Fraction(self.base) ** self.quantum
+        lowest, largest = int(limits.lowest / unit), int(limits.largest / unit)
+        if lowest <= count <= largest:
+            return count
+        if limits.overflow == "saturate":
+            return largest if count > 0 else lowest
+        if limits.overflow == "wrap":
+            return (count - lowest) % (largest - lowest + 1) + lowest
+        raise OverflowError(
+            f"got a result of about {float(count * unit):.7g}; needed one from {float(limits.lowest):.7g} to "
+            f"{float(limits.largest):.7g}; scale the numbers, or use more integer bits"
+        )
+
+    def _normalized(self, m: int, e: int) -> Pair:
+        """Add zeros up to t digits, or take them away where rounding has carried to more."""
+        shift = self.precision - self._digits(abs(m))
+        return (m * self._power(shift) if shift >= 0 else m // self._power(-shift)), e - shift
+
+
+@lru_cache(maxsize=256)
+def limited_kernel(rules: Rules) -> LimitedKernel:
+    """The kernel of a format, made once."""
+    return LimitedKernel(rules)

@@ -1,0 +1,214 @@
+"""Backends for the formats of processors: every rounding mode, and a limited range."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, cast
+
+import numpy as np
+
+from gpbnb.arithmetic.kernels import tags
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Backend, Compiled, Components, Exact, Floats, Pairs
+from gpbnb.arithmetic.kernels.limited import limited_kernel
+from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Rounding, Rules
+
+_MODES: dict[Rounding, Any] = {
+    Rounding.NEAREST: tags.Away,
+    Rounding.EVEN: tags.Even,
+    Rounding.CHOP: tags.Zero,
+    Rounding.UP: tags.Up,
+    Rounding.DOWN: tags.Down,
+    Rounding.ODD: tags.Odd,
+}
+_REACH = 320  # bits of exponent up to which products, quotients and their rests are normal float64
+_HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
+_UNLIMITED = 2**60  # exponent of base 10
+
+
+class LimitedExact(Exact):
+    """Any format, on Python's integers."""
+
+    def __init__(self, rules: Rules) -> None:
+        self.base, self.precision, self.rules = rules.base, rules.precision, rules
+        self.nearest = rules.rounding is Rounding.NEAREST
+        self.kernel = limited_kernel(rules)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return limited_exact, (self.rules,)
+
+    def apply(self, name: str, *operands: Components) -> Components:
+        try:
+            return super().apply(name, *operands)
+        except OverflowError as error:
+            raise OverflowError(f"{_NAMES[name]}{self._place(name, operands)}: {error}") from None
+
+    def _place(self, name: str, operands: tuple[Components, ...]) -> str:
+        """Where the first entry overflows."""
+        parts = np.broadcast_arrays(*(part for components in operands for part in components))
+        operation = getattr(self.kernel, name)
+        for index in np.ndindex(parts[0].shape):
+            try:
+                operation(*(part[index] for part in parts))
+            except OverflowError:
+                return f" at [{', '.join(map(str, index))}]" if index else ""
+        return ""
+
+
+_NAMES = {
+    "add": "addition",
+    "subtract": "subtraction",
+    "multiply": "multiplication",
+    "divide": "division",
+    "fused": "fused multiply-add",
+    "sqrt": "square root",
+    "negative": "negation",
+    "absolute": "absolute value",
+}
+
+
+class LimitedFloats(Floats):
+    """Bases 2 and 16 on float64."""
+
+    fuses = True
+
+    def __init__(self, rules: Rules, tag: Any) -> None:
+        self.base, self.precision, self.rules = rules.base, rules.precision, rules
+        self.nearest = rules.rounding is Rounding.NEAREST
+        self.kernel = limited_kernel(rules)
+        self.bits = rules.base.bit_length() - 1
+        self.tag = tag
+        if isinstance(tag, tags.Hardware64):
+            self.lowest_power, self.highest_power = -1074, 1024
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return limited_backend, (self.rules,)
+
+    def apply(self, name: str, *operands: Components) -> Components | None:
+        limits = self.rules.limits
+        if name in ("negative", "absolute") and limits is not None and limits.fixed:
+            return None if np.any(operands[0][0] == float(limits.lowest)) else super().apply(name, *operands)
+        return super().apply(name, *operands)
+
+    def run_tag(self) -> Any:
+        if isinstance(self.tag, tags.Limited) and isinstance(self.tag.mode, tags.Random):
+            return self.tag._replace(mode=_random(self.rules.seed))
+        return self.tag
+
+    def restart(self) -> None:
+        """Begin the random numbers of stochastic rounding again."""
+        if isinstance(self.tag, tags.Limited) and isinstance(self.tag.mode, tags.Random):
+            self.tag.mode.state[1] = 0
+
+
+class LimitedPairs(Pairs):
+    """Base 10 on pairs of int64."""
+
+    def __init__(self, rules: Rules) -> None:
+        self.base, self.precision, self.rules = rules.base, rules.precision, rules
+        self.nearest = rules.rounding is Rounding.NEAREST
+        self.kernel = limited_kernel(rules)
+        self.exact = limited_exact(rules)
+        limits, last = rules.limits, rules.precision - 1
+        least, largest = (-_UNLIMITED, _UNLIMITED) if limits is None else (limits.emin - last, _emax(rules) - last)
+        flush = limits is not None and not limits.subnormal
+        self.tag = tags.LimitedDecimal(_MODES[rules.rounding](), rules.precision, least, largest, flush)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return limited_backend, (self.rules,)
+
+
+def _random(seed: int) -> tags.Random:
+    return tags.Random(np.array([seed & (2**64 - 1), 0], np.uint64))
+
+
+def _emax(rules: Rules) -> int:
+    """Exponent of the largest number, d.dd... * base**emax."""
+    limits = rules.limits
+    if limits is None:
+        return _UNLIMITED
+    e, _ = limited_kernel(rules).top
+    return e + rules.precision - 1
+
+
+def run_tag(backend: Backend, rules: Rules, fused: bool) -> tags.Tag:
+    """The tag for a compiled loop of its own; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
+    if not isinstance(backend, Compiled):
+        raise ValueError(f"got {rules}; needed a format with compiled loops")
+    if not fused:
+        return backend.run_tag()
+    tag = _float_tag(rules, hardware=False) if rules.base in (2, 16) else None
+    if tag is None:
+        raise ValueError(f"got fused multiply-add in {rules}; needed base 2 up to 52 digits, or 16 up to 13")
+    return cast(tags.Limited, tag._replace(sums=tags.Fused()))
+
+
+@lru_cache(maxsize=256)
+def limited_exact(rules: Rules) -> LimitedExact:
+    """The backend that holds every number of a format."""
+    return LimitedExact(rules)
+
+
+@lru_cache(maxsize=256)
+def limited_backend(rules: Rules) -> Backend:
+    """The fastest backend of a format."""
+    if rules.base == 10 and rules.precision <= LARGEST_PRECISION[10] and rules.rounding in _MODES:
+        if rules.limits is None or (not rules.limits.fixed and rules.limits.largest == _all_nines(rules, _emax(rules))):
+            return LimitedPairs(rules)
+    elif rules.base in (2, 16) and (tag := _float_tag(rules)) is not None:
+        return LimitedFloats(rules, tag)
+    return limited_exact(rules)
+
+
+def _all_nines(rules: Rules, emax: int) -> Any:
+    scale = rules.base ** (rules.precision - 1)
+    return (rules.base * scale - 1) * (limited_kernel(rules).to_fraction(1, emax - rules.precision + 1))
+
+
+def _float_tag(rules: Rules, hardware: bool = True) -> Any:
+    """The tag for numbers on float64; None where float64 cannot hold what decides a rounding."""
+    base, precision, rounding, limits, seed = rules
+    random = rounding is Rounding.STOCHASTIC
+    longest = 53 - DRAW_BITS if random else 52 if base == 2 else 13
+    digits = tags.Two() if base == 2 else tags.Sixteen()
+    mode = _random(seed) if random else _MODES[rounding]()
+    if limits is None:
+        nan, least, largest = math.nan, 2.0**-960, 2.0**1023
+        return (
+            tags.Limited(
+                digits, mode, tags.Separate(), precision, 0.0, 2.0**-960, nan, -(2.0**1023), 2.0**1023, nan, nan
+            )
+            if precision <= longest and not (random and base == 16)
+            else None
+        )
+    emin, emax = limits.emin, _emax(rules)
+    if limits.fixed:  # numbers up to twice the largest have its spacing as well, so that none is rounded into the range
+        emin, precision = emin + 1, precision + 1
+    plain = not limits.fixed and limits.subnormal and limits.largest == _all_nines(rules, emax)
+    if hardware and base == 2 and rounding is Rounding.EVEN and plain and (precision, limits.emin, emax) in _HARDWARE:
+        return _HARDWARE[precision, limits.emin, emax]
+    bits = base.bit_length() - 1
+    if (
+        precision > longest
+        or (precision == 1 and limits.subnormal)
+        or (random and base == 16)
+        or limits.overflow == "wrap"
+        or bits * (emin - precision) < -_REACH
+        or bits * (emax + 1) > _REACH
+    ):
+        return None
+    least = float(base) ** emin
+    lowest, largest = float(limits.lowest), float(limits.largest)
+    beyond = (lowest, largest) if limits.overflow == "saturate" else (math.nan, math.nan)
+    return tags.Limited(
+        digits,
+        mode,
+        tags.Separate(),
+        precision,
+        least if limits.subnormal else 0.0,
+        0.0 if limits.subnormal else least,
+        0.0,
+        lowest,
+        largest,
+        *beyond,
+    )

@@ -1,0 +1,256 @@
+"""Bases 2 and 16 as processors compute: every rounding mode, a limited range, fused multiply-add; on float64.
+
+As in :mod:`gpbnb.arithmetic.kernels.binary`, an operation gives the nearest float64 p and the sign of what p lacks of
+the exact result. Below the least normal number B of a format all numbers have the spacing of those from B to 2B. So B
+is added to the magnitude, the sum is rounded as any other number, and B is taken away again, without an error.
+
+Results beyond the range become NaN, and stay so.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from gpbnb.arithmetic.kernels.binary import LEAST
+from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
+from gpbnb.arithmetic.kernels.rules import DRAW_BITS
+from gpbnb.arithmetic.kernels.tags import Away, Down, Even, Odd, Random, Sixteen, Two, Up, Zero
+
+EXACT_PRODUCT = 26  # digits up to which a product has at most 53
+_ONE = np.int64(1)
+_LARGEST_32 = float(np.finfo(np.float32).max)
+_GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
+_DRAWN = np.uint64(64 - DRAW_BITS)
+
+
+# -- rounding the integer view of a magnitude, already chopped to 53 bits -----------------------------
+
+
+def _dropped_binary(fmt: Any, u: Any) -> Any:
+    return np.int64(53) - fmt.precision
+
+
+def _dropped_hexadecimal(fmt: Any, u: Any) -> Any:
+    # The first digit of 2**e * 1.f has 1 + e mod 4 bits.
+    return np.int64(56) - np.int64(4) * fmt.precision - (((u >> 52) + 1) & 3)
+
+
+def _away(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    unit = _ONE << k
+    return (u + (unit >> 1)) & -unit
+
+
+def _even(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    unit = _ONE << k
+    return (u + ((unit >> 1) - 1) + (((u >> k) & 1) | np.int64(sticky))) & -unit
+
+
+def _zero(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    return u & -(_ONE << k)
+
+
+def _up(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    unit = _ONE << k
+    return (u + ((unit - 1) + np.int64(sticky)) * np.int64(not negative)) & -unit
+
+
+def _down(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    unit = _ONE << k
+    return (u + ((unit - 1) + np.int64(sticky)) * np.int64(negative)) & -unit
+
+
+def _odd(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    unit = _ONE << k
+    inexact = ((u & (unit - 1)) != 0) | sticky
+    return (u & -unit) | (np.int64(inexact) << k)
+
+
+def _random(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    # The same numbers as those of gpbnb.arithmetic.kernels.limited.draw.
+    state = fmt.mode.state
+    state[1] += np.uint64(1)
+    z = state[0] + state[1] * _GOLDEN
+    z = (z ^ (z >> np.uint64(30))) * _FIRST
+    z = (z ^ (z >> np.uint64(27))) * _SECOND
+    drawn = np.int64((z ^ (z >> np.uint64(31))) >> _DRAWN)
+    unit = _ONE << k
+    rest = u & (unit - 1)
+    # k >= DRAW_BITS: the draw times the unit, over 2**DRAW_BITS, against the rest and what it lacks
+    scaled = drawn << (k - DRAW_BITS)
+    up = (scaled < rest) | ((scaled == rest) & sticky)
+    return (u & -unit) + (np.int64(up) << k)
+
+
+_MODES = {Away: _away, Even: _even, Zero: _zero, Up: _up, Down: _down, Odd: _odd, Random: _random}
+_DROPPED = {Two: _dropped_binary, Sixteen: _dropped_hexadecimal}
+
+
+@cache
+def operations(digits: Any, mode: Any) -> dict[str, Any]:
+    """The scalar operations for the classes of the digits and of the rounding mode."""
+    dropped = njit(forceinline=True)(_DROPPED[digits])
+    round_magnitude = njit(forceinline=True)(_MODES[mode])
+
+    @njit(forceinline=True)
+    def fit(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
+        """Round the exact p + r, of whose r only the sign counts; p is its nearest float64."""
+        negative = p < 0.0
+        a = abs(p)
+        base = fmt.gradual if a < fmt.gradual else 0.0
+        s = a + base
+        e = a - (s - base)
+        rest = e if e != 0.0 else (-r if negative else r)
+        u = bits(s) - np.int64(rest < 0.0)
+        v = round_magnitude(fmt, u, dropped(fmt, u), rest != 0.0, negative)
+        y = from_bits(v) - base
+        y = y if (y >= fmt.least) | (exact_zero & (y == 0.0)) else fmt.below
+        y = 0.0 - y if negative else y
+        y = fmt.over if y > fmt.largest else y
+        y = fmt.under if y < fmt.lowest else y
+        return y if a == a else np.nan
+
+    @njit(forceinline=True)
+    def add(fmt: Any, a: Any, b: Any) -> Any:
+        s = a + b
+        c = s - a
+        return fit(fmt, s, (a - (s - c)) + (b - c), True)
+
+    @njit(forceinline=True)
+    def subtract(fmt: Any, a: Any, b: Any) -> Any:
+        return add(fmt, a, 0.0 - b)
+
+    @njit(forceinline=True)
+    def multiply(fmt: Any, a: Any, b: Any) -> Any:
+        p = a * b
+        zero = (a == 0.0) | (b == 0.0)
+        return fit(fmt, p, 0.0 if fmt.precision <= EXACT_PRODUCT else fma(a, b, -p), zero)
+
+    @njit(error_model="numpy", forceinline=True)
+    def divide(fmt: Any, a: Any, b: Any) -> Any:
+        if b == 0.0:
+            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+        q = a / b
+        r = fma(-q, b, a)
+        return fit(fmt, q, -r if b < 0.0 else r, a == 0.0)
+
+    @njit(forceinline=True)
+    def sqrt(fmt: Any, a: Any) -> Any:
+        if a < 0.0:
+            raise ValueError("got the square root of a negative number; needed x >= 0")
+        s = math.sqrt(a)
+        return fit(fmt, s, fma(-s, s, a), a == 0.0)
+
+    @njit(forceinline=True)
+    def round_(fmt: Any, x: Any) -> Any:
+        return fit(fmt, x, 0.0, x == 0.0)
+
+    @njit(forceinline=True)
+    def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        w, rest, zero = _fused_sum(a, b, c)
+        return fit(fmt, w, rest, zero)
+
+    return {
+        "add": add,
+        "subtract": subtract,
+        "multiply": multiply,
+        "divide": divide,
+        "sqrt": sqrt,
+        "round_": round_,
+        "fused": fused,
+    }
+
+
+@njit(forceinline=True)
+def _two_sum(a: Any, b: Any) -> Any:
+    s = a + b
+    c = s - a
+    return s, (a - (s - c)) + (b - c)
+
+
+@njit(forceinline=True)
+def _fused_sum(a: Any, b: Any, c: Any) -> Any:
+    """a * b + c as the nearest float64 w and a rest of the right sign, and whether it is exactly zero.
+
+    With p + e the exact product and s + r = p + c, the rests e and r add up to v + lowest, and s + v to w + low. If low
+    is not zero, it is a multiple of the last bit of v, and larger than lowest. A product whose rest is too small for
+    float64 gives NaN.
+    """
+    p = a * b
+    e = fma(a, b, -p)
+    s, r = _two_sum(p, c)
+    v, lowest = _two_sum(r, e)
+    w, low = _two_sum(s, v)
+    zero = (a == 0.0) | (b == 0.0)
+    w = w if zero | (abs(p) >= LEAST) else np.nan
+    return w, (low if low != 0.0 else lowest), (w == 0.0) & (zero | (c != 0.0))
+
+
+# -- by the machine ----------------------------------------------------------------------------------
+
+
+@njit(forceinline=True)
+def _single(x: Any) -> Any:
+    y = np.float64(np.float32(x)) + 0.0  # no negative zero
+    return y if abs(y) <= _LARGEST_32 else np.nan
+
+
+@njit(forceinline=True)
+def _double(x: Any) -> Any:
+    y = x + 0.0
+    return y if abs(y) < np.inf else np.nan
+
+
+def _machine(rounded: Any) -> dict[str, Any]:
+    @njit(forceinline=True)
+    def add(fmt: Any, a: Any, b: Any) -> Any:
+        return rounded(a + b)
+
+    @njit(forceinline=True)
+    def subtract(fmt: Any, a: Any, b: Any) -> Any:
+        return rounded(a - b)
+
+    @njit(forceinline=True)
+    def multiply(fmt: Any, a: Any, b: Any) -> Any:
+        return rounded(a * b)
+
+    @njit(error_model="numpy", forceinline=True)
+    def divide(fmt: Any, a: Any, b: Any) -> Any:
+        if b == 0.0:
+            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+        return rounded(a / b)
+
+    @njit(forceinline=True)
+    def sqrt(fmt: Any, a: Any) -> Any:
+        if a < 0.0:
+            raise ValueError("got the square root of a negative number; needed x >= 0")
+        return rounded(math.sqrt(a))
+
+    @njit(forceinline=True)
+    def round_(fmt: Any, x: Any) -> Any:
+        return rounded(x)
+
+    return {"add": add, "subtract": subtract, "multiply": multiply, "divide": divide, "sqrt": sqrt, "round_": round_}
+
+
+@njit(forceinline=True)
+def _fused_single(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    # The product is exact. The sum is rounded to odd, and so its second rounding comes out right.
+    s, r = _two_sum(a * b, c)
+    u = bits(abs(s)) - np.int64(((r < 0.0) & (s > 0.0)) | ((r > 0.0) & (s < 0.0)))
+    odd = from_bits(u | np.int64(r != 0.0))
+    return _single(odd if s >= 0.0 else 0.0 - odd)
+
+
+@njit(forceinline=True)
+def _fused_double(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    return _double(fma(a, b, c))
+
+
+# Sums, products, quotients and roots of 24-bit numbers may be rounded to 53 bits first: it never makes a tie.
+SINGLE = {**_machine(_single), "fused": _fused_single}
+DOUBLE = {**_machine(_double), "fused": _fused_double}

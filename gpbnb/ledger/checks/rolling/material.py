@@ -1,0 +1,73 @@
+"""Simulated records on which several checks of hung1984, ch. III, rest."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from gpbnb.measurement import YEAR
+from gpbnb.rolling import experiment, theory
+from gpbnb.rolling.theory import DRIFTS, FLOWN_DENSITY, LEVEL, PERIOD
+
+
+@cache
+def spectra() -> experiment.Spectra:
+    """A short record, 600 turns, of a drift that is as strong beside its noise as that of a year."""
+    samples = 36000
+    return experiment.spectra(DRIFTS[1] * YEAR / (10.0 * samples), np.random.default_rng(3), 4, samples=samples)
+
+
+@cache
+def noise_spectrum() -> tuple[experiment.Spectrum, experiment.Slope]:
+    found = experiment.noise_spectrum(np.random.default_rng(1), 2**17, 8, 2**15, bands=16)
+    return found, experiment.fit_slope(found)
+
+
+@cache
+def stages() -> dict[str, np.ndarray]:
+    """A drift through (5)-(7) with noise, 20 turns of 600 s."""
+    return experiment.derolled_record((2e6, 1e6), 400.0, PERIOD, np.random.default_rng(2), 1200)
+
+
+@cache
+def filter_study() -> experiment.FilterStudy:
+    best = theory.best_bandwidth(DRIFTS[0], FLOWN_DENSITY)
+    rng = np.random.default_rng(8)
+    return experiment.filter_study(DRIFTS[0], [best / 3, best, 3 * best], 8, rng, duration=YEAR / 16)
+
+
+@cache
+def walk_errors() -> np.ndarray:
+    """Drift errors, never reset and reset every 100 steps of 600 s, of 200 random walks of the roll rate."""
+    walks = experiment.rate_walks(WALK, 200, 52560, 600.0, np.random.default_rng(9))
+    return experiment.roll_rate_errors(DRIFTS[0], walks, 600.0, [None, 100])
+
+
+WALK = 3e-6 / YEAR**3
+"""Intensity of a roll rate, rad²/s³, at which the phase is off by a milliradian after a year."""
+
+
+def deviation(found: float, expected: float, error: float) -> float:
+    """Difference in standard errors."""
+    return (found - expected) / error
+
+
+def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16) -> np.ndarray:
+    """Lag and exact noise of the filters of a study; noise at the time where its logarithm has its mean."""
+    middle = round(duration / theory.INTERVAL / math.e)
+    expected = []
+    for name, lag, width in zip(study.names, study.lag, study.bandwidth, strict=True):
+        if name == "single pole":
+            weights = theory.single_pole(lag_constant(lag))
+        else:
+            weights = theory.moving_average(1 / (2 * width))
+        noise = theory.filtered_variance(weights, LEVEL, middle, study.period)
+        expected.append((study.drift / YEAR * lag) ** 2 + noise)
+    return np.array(expected)
+
+
+def lag_constant(lag: float, interval: float = theory.INTERVAL) -> float:
+    """Time constant of the single pole of a given lag."""
+    return interval / math.log1p(interval / lag)

@@ -1,0 +1,119 @@
+"""Section 1: statistics or bounds."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.ledger.checks.rounding.instances import FOUR, FOUR_CHOPPED, samples, surveyed_bounds
+from gpbnb.ledger.checks.rounding.registry import CHECKS
+from gpbnb.ledger.finding import Finding, compare, unverifiable
+from gpbnb.ledger.registry import both
+from gpbnb.ledger.statements import Statement
+from gpbnb.rounding import experiment
+
+COUNTS = {"four": 4, "four hundred": 400}
+
+
+@cache
+def beyond_the_law() -> tuple[float, float]:
+    """Share of sums of 1000 terms that exceed a law meant to fail in 1 %: of varied terms, and of equal terms."""
+    varied, constant = (
+        experiment.growth(FloatFormat(2, 11), kind, (1000,), 30, np.random.default_rng(1)).beyond_probabilistic()[0]
+        for kind in ("like signs", "constant")
+    )
+    return float(varied), float(constant)
+
+
+@CHECKS.add(*both("s1.approach"))
+def approach(printed: Statement) -> Finding:
+    varied, constant = beyond_the_law()
+    strict = surveyed_bounds("dot")["strict"]
+    statistics = "not sufficiently reliable" if max(varied, constant) > 0.01 else "sufficiently reliable"
+    tight = "close to the actual error" if strict.median > 0.5 else "conservative though pessimistic"
+    bounds = "violated" if strict.violations else tight
+    return compare(
+        printed.says("statistics") == statistics and printed.says("bounds") == bounds,
+        f"a law that should fail in 1 % fails in {constant:.0%} of the rounded sums of 1000 equal terms, and in "
+        f"{varied:.0%} where the terms vary; the strict bound of an inner product fails in {strict.violations} of "
+        f"{strict.trials} trials, and the median error is {strict.median:.1%} of it",
+        note="statistics fail where the rounding errors have a mean; the bounds hold but are pessimistic",
+    )
+
+
+@CHECKS.add(*both("s1.claim-not-easy"))
+def not_easy(printed: Statement) -> Finding:
+    varied, constant = beyond_the_law()
+    easy = "not easy" if (varied > 0.01) != (constant > 0.01) else "easy"
+    return compare(
+        printed.says("statistics") == easy,
+        f"a law for independent rounding errors, meant to fail in 1 % of the sums, fails in {varied:.0%} where the "
+        f"terms vary and in {constant:.0%} where they are equal",
+        note="the statistics of the errors depend on the data",
+    )
+
+
+@CHECKS.add(*both("s1.claim-only-rounding"))
+def only_rounding() -> Finding:
+    return unverifiable(
+        "",
+        "this is about the computers of 1982, and the report names no source; section 4 treats chopping nevertheless",
+    )
+
+
+@CHECKS.add(*both("s1.claim-background"), *both("s1.claim-main-activity"))
+def background() -> Finding:
+    return unverifiable("", "this is about the literature or the mission's plans, and the report names no source")
+
+
+@CHECKS.add(*both("s1.claim-rounding-or-chopping"))
+def rounding_or_chopping(printed: Statement) -> Finding:
+    longer = [x for x in samples() if FOUR.round(x) != x and FOUR_CHOPPED.round(x) != x]
+    products = [(x, y) for x in range(1000, 1030) for y in range(1001, 1031) if FOUR.round(x * y) != x * y]
+    need = "requires" if longer and products else "works without"
+    return compare(
+        printed.says("need").startswith(need),
+        f"{len(longer)} of {len(samples())} sampled numbers and {len(products)} of {30 * 30} products of numbers of "
+        "four digits have more than four digits",
+        note="other rules exist, such as ties to even, rounding up, or rounding at random; each of them takes a "
+        "neighbouring number, so bound (8) or bound (13) applies to it",
+    )
+
+
+def scatter(n: int) -> float:
+    """Standard deviation of the sample standard deviation of n normal deviates, over the true one."""
+    mean = math.sqrt(2 / (n - 1)) * math.exp(math.lgamma(n / 2) - math.lgamma((n - 1) / 2))
+    return math.sqrt(1 - mean**2)
+
+
+@CHECKS.add(*both("s1.claim-small-sample"))
+def small_sample(printed: Statement) -> Finding:
+    n = COUNTS[printed.says("gyros")]
+    spread, mean = scatter(n), 1 / math.sqrt(n)
+    deviation = "a good deal" if min(spread, mean) > 0.25 else "very little"
+    return compare(
+        printed.says("deviation") == deviation and deviation == "a good deal",
+        f"for {n} normal deviates the sample standard deviation scatters by {spread:.0%} of the true value and the "
+        f"mean by {mean:.0%}; for 1000 deviates, by {scatter(1000):.1%} and {1 / math.sqrt(1000):.1%}",
+        note="true, but no argument against statistics: a probabilistic bound concerns the many roundings of one run, "
+        "not a sample of gyros",
+    )
+
+
+@CHECKS.add(*both("s1.claim-more-reliable"))
+def more_reliable(printed: Statement) -> Finding:
+    _, constant = beyond_the_law()
+    strict = [surveyed_bounds(trial)["strict"] for trial in ("sum", "product", "dot", "chain")]
+    violations, trials = (sum(getattr(each, name) for each in strict) for name in ("violations", "trials"))
+    chain = surveyed_bounds("chain")["(31)"]
+    found = "more reliable" if violations / trials < 0.01 < constant else "less reliable"
+    return compare(
+        printed.says("reliability") == found,
+        f"the strict bounds of sums, products, inner products and chains fail in {violations} of {trials} trials; a "
+        f"law that should fail in 1 % fails in {constant:.0%} of the sums of equal terms",
+        note=f"true of proved bounds; the printed (31) fails in {chain.violations} of {chain.trials} trials, and this "
+        "report builds on it",
+    )

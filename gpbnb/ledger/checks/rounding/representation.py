@@ -1,0 +1,196 @@
+"""Section 2: splitting and rounding a number."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import sympy as sp
+
+from gpbnb.ledger.checks.rounding.instances import (
+    FOUR,
+    Names,
+    all_numbers,
+    judge,
+    link_holds,
+    number_names,
+    power,
+    relations,
+    samples,
+    split_text,
+)
+from gpbnb.ledger.checks.rounding.registry import CHECKS
+from gpbnb.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.ledger.formula import Relation
+from gpbnb.ledger.registry import both
+from gpbnb.ledger.statements import Statement, statement
+
+HALF = Fraction(1, 2)
+
+
+def split_is_printed(relation: Relation, names: Names) -> bool:
+    """Whether the terms of a printed number ``x = .1234e2 + .56e-2`` are those of its split (2)."""
+    b, t, e = names["b"], names["t"], names["e"]
+    terms = relation.terms(names, number=lambda q: q)
+    return terms == (names["u"] * b**e, names["v"] * b ** (e - t))
+
+
+@CHECKS.add(*both("eq1"))
+def representation() -> Finding:
+    return given("the form of a number: sign, digits, base and exponent; zero has no such form with $d_1\\ne0$")
+
+
+RADICANDS = {r"$\sqrt2$": 2, r"$\sqrt4$": 4}
+
+
+@CHECKS.add(*both("s2.claim-infinite-digits"))
+def infinite_digits(printed: Statement) -> Finding:
+    radicand = RADICANDS[printed.says("example")]
+    places, bases = range(40), (2, 10, 16)
+    finite = [
+        (b, k) for b in bases for k in places if math.isqrt(radicand * b ** (2 * k)) ** 2 == radicand * b ** (2 * k)
+    ]
+    digits = "finite" if finite or sp.sqrt(radicand).is_rational else "infinite"
+    return compare(
+        printed.says("digits") == digits == "infinite",
+        f"a number of finitely many digits is rational, and $\\sqrt{{{radicand}}}$ is not; no number of fewer than "
+        f"{len(places)} places in base {', '.join(map(str, bases))} has the square {radicand}",
+    )
+
+
+def _digits(printed: Statement, names: Names) -> bool:
+    """Whether u has the printed number of digits, t, and no fewer in general."""
+    count = {"$t$": names["t"], "$t+1$": names["t"] + 1}[printed.says("digits")]
+    return bool((names["u"] * names["b"] ** names["t"]).denominator == 1 and count == names["t"])
+
+
+@CHECKS.add("hung1984.II.eq2")
+def split(printed: Statement) -> Finding:
+    whole = judge(relations(printed), all_numbers())
+    rest = judge(relations(printed), [names for names in all_numbers() if names["v"] != 0])
+    digits = all(_digits(printed, names) for names in all_numbers())
+    return compare(
+        whole.holds and digits,
+        f"for all numbers it {whole}; where $v\\ne0$ it {rest}",
+        Verdict.MISPRINT if rest.holds and digits else Verdict.WRONG,
+        otherwise_note="the condition must be $0\\le|v|$: as printed it excludes $v=0$, the case of a number that has "
+        "at most $t$ digits; nothing later uses $v\\ne0$",
+    )
+
+
+@CHECKS.add("hung1982.III.eq2")
+def split_1982(printed: Statement) -> Finding:
+    names = number_names(Fraction("765.4567"))
+    shifted = [{**names, "u": names["u"] + Fraction(k, 10**4), "v": names["v"] - k} for k in range(-3, 4)]
+    found = relations(printed)
+    admitted = [each["v"] for each in shifted if judge(found, [each]).holds and _digits(printed, each)]
+    return compare(
+        bool(admitted) and all(abs(v) < 1 for v in admitted),
+        f"as printed, {len(admitted)} splits of 765.4567 would do, with $v$ up to {float(max(admitted, default=0)):g}; "
+        "the second condition must bound $v$, not $u$",
+        Verdict.OCR,
+        otherwise_note="the first condition already bounds $u$; hung1984 prints $v$, so the letter is the scan's fault",
+    )
+
+
+@CHECKS.add(*both("s2.example-2a"), *both("s2.example-2b"))
+def example_2(printed: Statement) -> Finding:
+    number, *parameters = relations(printed)
+    (link,) = number.links({}, number=lambda q: q)
+    names = number_names(Fraction(link.left))
+    right = split_is_printed(number, names) and judge(parameters, [names]).holds
+    return compare(
+        right,
+        f"{split_text(link.left)} for {float(link.left):.9g} in base 10 with four digits",
+        Verdict.MISPRINT,
+        otherwise_note="the first power must be $10^{-1}$, in keeping with the printed $e=-1$; corrected in hung1984",
+    )
+
+
+@CHECKS.add(*both("s2.claim-t-digit-mantissa"))
+def carry(printed: Statement) -> Finding:
+    x = Fraction("99.996")
+    rounded = FOUR.round(x)
+    changes = {FOUR.split(FOUR.round(each))[2] - FOUR.split(each)[2] for each in (x, *samples())}
+    said = {"$b^e$": {0}, "$b^{e+1}$": {1}}[printed.says("exponent")]
+    return compare(
+        changes == said,
+        f"99.996 has $e={FOUR.split(x)[2]}$ and rounds to {power(rounded)}, which has $e={FOUR.split(rounded)[2]}$",
+        Verdict.MISPRINT,
+        otherwise_note="a carry past the first digit raises the exponent by one; (3) and (5) hold all the same",
+    )
+
+
+@CHECKS.add(*both("eq3"))
+def rounding_rule(printed: Statement) -> Finding:
+    found = judge(relations(printed), all_numbers())
+    return compare(
+        found.right,
+        f"the printed rule gives the nearest number; it {found}",
+        note="a tie goes away from zero; IEEE 754 of 1985 sends it to the even neighbour, with the same bound (5)",
+    )
+
+
+@CHECKS.add(*both("s2.claim-conventional"))
+def conventional(printed: Statement) -> Finding:
+    rule = statement("hung1984.II.eq3").relation()
+    covered = {"negative": 0, "positive": 0}
+    for names in all_numbers():
+        (link,) = rule.links(names, number=lambda q: q)
+        nearest = 2 * abs(link.right - names["x"]) <= names["b"] ** (names["e"] - names["t"])
+        covered["positive" if names["x"] > 0 else "negative"] += nearest
+    numbers = "any number" if sum(covered.values()) == len(all_numbers()) else "positive numbers alone"
+    return compare(
+        printed.says("numbers") == numbers,
+        f"rule (3) takes a nearest number for {covered['positive']} positive and {covered['negative']} negative "
+        f"numbers of {len(all_numbers())}",
+    )
+
+
+@CHECKS.add(*both("s2.claim-u-v-same-sign"))
+def same_sign(printed: Statement) -> Finding:
+    signs = {names["u"] * names["v"] > 0 for names in all_numbers() if names["v"]}
+    found = {(True,): "the same sign", (False,): "opposite signs"}.get(tuple(signs), "either sign")
+    names = number_names(Fraction("765.4567"))
+    u, v = names["u"] + Fraction(1, 10**4), names["v"] - 1
+    return compare(
+        printed.says("signs") == found,
+        f"$u$ and $v$ have {found} in the splits of {len(all_numbers())} numbers",
+        note=f"except for $v=0$; (2) alone would also allow $u={float(u):g}$, $v={float(v):g}$ for 765.4567",
+    )
+
+
+def _case_is_printed(number: Relation, rest: tuple[Relation, ...]) -> tuple[bool, bool, Fraction]:
+    """Whether the split of an example (3) is the printed one, whether the rest is right, and the number."""
+    x = Fraction(number.links({}, number=lambda q: q)[0].right)
+    names = number_names(x)
+    (condition,) = rest[0].links(names, number=lambda q: q)
+    threshold = abs(condition.right) == HALF and condition.right * names["v"] > 0 and link_holds(condition)
+    follows = threshold and judge(rest[1:], [names]).holds
+    return split_is_printed(number, names) and judge([number], [names]).holds, follows, x
+
+
+@CHECKS.add("hung1984.II.s2.example-3a", "hung1984.II.s2.example-3b", "hung1984.II.s2.example-3c")
+def example_3(printed: Statement) -> Finding:
+    number, *rest = relations(printed)
+    split_right, follows, x = _case_is_printed(number, tuple(rest))
+    return compare(
+        split_right and follows,
+        f"{split_text(x)}; $\\hat x=$ {power(FOUR.round(x))}",
+        Verdict.MISPRINT if follows else Verdict.WRONG,
+        otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line and back in the next",
+    )
+
+
+@CHECKS.add("hung1982.III.s2.examples-3a-3c")
+def examples_3_1982(printed: Statement) -> Finding:
+    found = relations(printed)
+    cases = [_case_is_printed(found[i], found[i + 1 : j]) for i, j in ((0, 4), (4, 7), (7, 10))]
+    others = all(follows for _, follows, _ in cases) and all(right for right, _, _ in cases[:2])
+    return compare(
+        others and cases[2][0],
+        "; ".join(f"{split_text(x)}, $x_R=$ {power(FOUR.round(x))}" for _, _, x in cases),
+        Verdict.MISPRINT,
+        otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line of (3c), in both reports, and "
+        "back in the next; $-.7685$ for the result is the scan's",
+    )

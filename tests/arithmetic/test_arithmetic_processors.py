@@ -1,0 +1,401 @@
+"""Formats of processors: every rounding mode, a limited range, fused operations, fixed point."""
+
+from __future__ import annotations
+
+import decimal
+import math
+import operator
+import pickle
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic import linalg, named
+from gpbnb.arithmetic.fixed import FixedFormat, scaling
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.backends import Compiled, Exact
+from gpbnb.arithmetic.kernels.limited_backends import LimitedFloats, LimitedPairs
+
+BINARY = [operator.add, operator.sub, operator.mul, operator.truediv]
+DETERMINISTIC = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
+
+
+def rounded(x: Fraction, unit: Fraction, mode: Rounding) -> Fraction:
+    """x as a multiple of the unit, by the definition of each mode."""
+    low = math.floor(x / unit)
+    rest = x / unit - low
+    if rest == 0:
+        return x
+    up = {
+        Rounding.NEAREST: rest > Fraction(1, 2) or (rest == Fraction(1, 2) and x > 0),
+        Rounding.EVEN: rest > Fraction(1, 2) or (rest == Fraction(1, 2) and low % 2 == 1),
+        Rounding.CHOP: x < 0,
+        Rounding.UP: True,
+        Rounding.DOWN: False,
+        Rounding.ODD: low % 2 == 0,
+    }[mode]
+    return (low + up) * unit
+
+
+def expected(x: Fraction, fmt: FloatFormat) -> Fraction | None:
+    """The number of the format for an exact result; None if it overflows."""
+    if x == 0:
+        return x
+    power = 0
+    while abs(x) >= Fraction(fmt.base) ** (power + 1):
+        power += 1
+    while abs(x) < Fraction(fmt.base) ** power:
+        power -= 1
+    if fmt.emin is not None and fmt.subnormal:
+        power = max(power, fmt.emin)
+    y = rounded(x, Fraction(fmt.base) ** (power - fmt.precision + 1), fmt.rounding)
+    limits = fmt.limits
+    if limits is None:
+        return y
+    if abs(y) > limits.largest:
+        return None
+    return Fraction(0) if not fmt.subnormal and abs(y) < Fraction(fmt.base) ** limits.emin else y
+
+
+TINY = [
+    FloatFormat(2, 3, emin=-3, emax=3),
+    FloatFormat(2, 3, emin=-3, emax=3, subnormal=False),
+    FloatFormat(16, 1, emin=-1, emax=0, subnormal=False),
+    FloatFormat(10, 1, emin=-1, emax=0),
+    FloatFormat(10, 1, emin=-1, emax=0, subnormal=False),
+    FloatFormat(3, 2, emin=-1, emax=1),
+    FloatFormat(2, 4),
+]
+
+
+def numbers(fmt: FloatFormat) -> list[Fraction]:
+    """Every number of a small format; of an unlimited one those near 1."""
+    emin, emax = (-2, 2) if fmt.emin is None or fmt.emax is None else (fmt.emin, fmt.emax)
+    least = fmt.base ** (fmt.precision - 1)
+    normal = [
+        Fraction(m) * Fraction(fmt.base) ** (e - fmt.precision + 1)
+        for m in range(least, fmt.base * least)
+        for e in range(emin, emax + 1)
+    ]
+    if fmt.emin is not None and fmt.subnormal:
+        normal += [Fraction(m) * Fraction(fmt.base) ** (emin - fmt.precision + 1) for m in range(1, least)]
+    return [0 * normal[0], *normal, *(-x for x in normal)]
+
+
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+@pytest.mark.parametrize("tiny", TINY, ids=str)
+def test_every_pair_of_a_small_format(tiny: FloatFormat, mode: Rounding) -> None:
+    fmt = replace(tiny, rounding=mode)
+    every = numbers(fmt)
+    assert len(set(every)) == len(every)
+    x = fmt.array(every)
+    assert x.to_fractions().tolist() == every
+    overflows = 0
+    for operation in BINARY:
+        for a in every:
+            others = [b for b in every if b or operation is not operator.truediv]
+            results = [expected(operation(a, b), fmt) for b in others]
+            held = [b for b, result in zip(others, results, strict=True) if result is not None]
+            overflows += len(others) - len(held)
+            found = operation(fmt.array(a), fmt.array(held))
+            assert found.to_fractions().tolist() == [result for result in results if result is not None]
+            exactly = operation(fmt.array(a).on_exact_backend(), fmt.array(held).on_exact_backend())
+            assert np.array_equal(found.to_fractions(), exactly.to_fractions())
+            for b in (b for b, result in zip(others, results, strict=True) if result is None):
+                with pytest.raises(OverflowError):
+                    operation(fmt.array(a), fmt.array(b))
+                break
+    assert (overflows > 0) is (fmt.emin is not None)
+
+
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+@pytest.mark.parametrize("tiny", [TINY[0], TINY[3], TINY[6]], ids=str)
+def test_fused_multiply_add_of_every_triple(tiny: FloatFormat, mode: Rounding) -> None:
+    fmt = replace(tiny, rounding=mode)
+    every = numbers(fmt)[:: 1 if fmt.base == 10 else 3]
+    x = fmt.array(every)
+    for a in every:
+        for c in every:
+            results = [expected(a * b + c, fmt) for b in every]
+            kept = np.array([result is not None for result in results])
+            found = fmt.array(a).multiply_add(x[kept], fmt.array(c))
+            assert found.to_fractions().tolist() == [result for result in results if result is not None]
+
+
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+@pytest.mark.parametrize("fmt", [named.BINARY32, named.TF32, FloatFormat(2, 40), FloatFormat(16, 6)], ids=str)
+def test_fused_multiply_add_with_cancellation(fmt: FloatFormat, mode: Rounding) -> None:
+    fmt = replace(fmt, rounding=mode)
+    rng = np.random.default_rng(7)
+    a, b = (fmt.array(rng.normal(size=300)) for _ in range(2))
+    near = fmt.array(-(a * b).to_float() * rng.choice([1, 1, 1 + 2.0**-20, 2.0**-30, 2.0**30], 300))
+    exact = [expected(p * q + r, fmt) for p, q, r in zip(*(u.to_fractions() for u in (a, b, near)), strict=True)]
+    assert a.multiply_add(b, near).to_fractions().tolist() == exact
+
+
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+def test_roots(mode: Rounding) -> None:
+    for fmt in (named.FP8_E4M3, named.BINARY16, named.DECIMAL32, FloatFormat(16, 2), FloatFormat(2, 50)):
+        fmt = replace(fmt, rounding=mode)
+        values = fmt.array([Fraction(k, 8) for k in range(1, 200)] if fmt.precision > 4 else numbers(TINY[0])[1:20])
+        for x, y in zip(values.to_fractions(), np.sqrt(values).to_fractions(), strict=True):
+            # 200 bits of the root, with a last bit for what follows: no mode needs more.
+            root = math.isqrt((x.numerator << 401) // x.denominator * 2)
+            approximate = Fraction(2 * root + (Fraction(root**2, 1 << 402) != x), 1 << 202)
+            assert y == expected(approximate, fmt)
+
+
+HARDWARE = [(named.BINARY32, np.float32), (named.BINARY64, np.float64)]
+
+
+@pytest.mark.parametrize(("fmt", "dtype"), HARDWARE, ids=["binary32", "binary64"])
+def test_binary32_and_binary64_are_those_of_the_machine(fmt: FloatFormat, dtype: Any) -> None:
+    """Random bit patterns: every exponent, subnormal numbers included."""
+    rng = np.random.default_rng(1985)
+    width = np.dtype(dtype).itemsize * 8
+    x, y = (rng.integers(0, 2**width, 3000, dtype=f"u{width // 8}").view(dtype) for _ in range(2))
+    with np.errstate(all="ignore"):
+        x = np.where(rng.random(3000) < 0.5, x, (y * dtype(1 + 2.0 ** -int(width / 3))).astype(dtype))
+        for name in ("add", "subtract", "multiply", "divide"):
+            z = getattr(np, name)(x, y)
+            kept = np.isfinite(x) & np.isfinite(y) & np.isfinite(z) & ((y != 0) | (name != "divide"))
+            assert kept.sum() > 1500
+            found = getattr(np, name)(fmt.array(x[kept]), fmt.array(y[kept]))
+            assert np.array_equal(found.to_float(), z[kept].astype(np.float64))
+            over = np.isfinite(x) & np.isfinite(y) & np.isinf(z) & (y != 0)
+            for i in np.flatnonzero(over)[:20]:
+                with pytest.raises(OverflowError, match="needed at most"):
+                    getattr(np, name)(fmt.array(x[i]), fmt.array(y[i]))
+
+
+@pytest.mark.parametrize("name", ["DECIMAL32", "DECIMAL64", "DECIMAL128"])
+@pytest.mark.parametrize(
+    ("mode", "theirs"),
+    [
+        (Rounding.EVEN, decimal.ROUND_HALF_EVEN),
+        (Rounding.NEAREST, decimal.ROUND_HALF_UP),
+        (Rounding.CHOP, decimal.ROUND_DOWN),
+        (Rounding.UP, decimal.ROUND_CEILING),
+        (Rounding.DOWN, decimal.ROUND_FLOOR),
+    ],
+)
+def test_decimal_formats_are_those_of_decimal(name: str, mode: Rounding, theirs: str) -> None:
+    fmt = replace(named.NAMED[name], rounding=mode)
+    assert fmt.emin is not None
+    assert fmt.emax is not None
+    context = decimal.Context(prec=fmt.precision, rounding=theirs, Emin=fmt.emin, Emax=fmt.emax)
+    context.traps[decimal.Overflow] = True
+    rng = np.random.default_rng(754)
+    m = [int("".join(map(str, rng.integers(0, 10, fmt.precision)))) for _ in range(400)]
+    e = rng.choice([0, 1, -3, -fmt.precision, fmt.emin // 2, fmt.emin // 2 - fmt.precision, fmt.emax // 2], 400)
+    values = [context.create_decimal(decimal.Decimal(p).scaleb(int(q))) for p, q in zip(m, e, strict=True)]
+    x, y = values[:200], [v or decimal.Decimal(1) for v in values[200:]]
+    for operation in ("add", "subtract", "multiply", "divide"):
+        pairs = []
+        for a, b in zip(x, y, strict=True):
+            try:
+                pairs.append((a, b, getattr(context, operation)(a, b)))
+            except decimal.Overflow:
+                with pytest.raises(OverflowError):
+                    getattr(np, operation)(fmt.array(a), fmt.array(b))
+        assert len(pairs) > 150
+        assert any(c.is_subnormal(context) for *_, c in pairs) or operation in ("add", "subtract", "divide")
+        a, b, c = (list(column) for column in zip(*pairs, strict=True))
+        found = getattr(np, operation)(fmt.array(a), fmt.array(b)).to_fractions()
+        assert found.tolist() == [Fraction(value) for value in c]
+
+
+def test_named_formats_have_their_published_limits() -> None:
+    def limits(fmt: FloatFormat) -> tuple[Fraction, Fraction]:
+        assert fmt.limits is not None
+        return fmt.limits.largest, Fraction(fmt.base) ** fmt.limits.emin
+
+    for fmt, dtype in ((named.BINARY16, np.float16), (named.BINARY32, np.float32), (named.BINARY64, np.float64)):
+        about = np.finfo(dtype)
+        assert limits(fmt) == (Fraction(float(about.max)), Fraction(float(about.smallest_normal)))
+        assert fmt.round(Fraction(float(about.smallest_subnormal))) == Fraction(float(about.smallest_subnormal))
+    assert limits(named.FP8_E4M3) == (448, Fraction(1, 64))
+    assert limits(named.FP8_E5M2) == (57344, Fraction(1, 2**14))
+    assert limits(named.IBM_HEX32) == (Fraction(16) ** 63 * (1 - Fraction(1, 16**6)), Fraction(1, 16**65))
+    assert limits(named.IBM_704) == (2**127 * (1 - Fraction(1, 2**27)), Fraction(1, 2**129))
+    assert limits(named.DECIMAL32) == (Fraction("9.999999e96"), Fraction("1e-95"))
+
+
+def test_overflow_names_the_operation_and_the_entry() -> None:
+    x = named.BINARY16.array([[1, 2], [60000, 4]])
+    with pytest.raises(OverflowError, match=r"addition at \[1, 0\]: got a result .* needed at most 65504 in size"):
+        x + x
+    with pytest.raises(OverflowError, match=r"entry \[1\]: got a result"):
+        named.FP8_E4M3.array([448, 465])
+    assert named.FP8_E4M3.round(464) == 448
+    assert isinstance((x[0] + x[0]).backend, LimitedFloats)
+
+
+@pytest.mark.parametrize("mode", Rounding)
+@pytest.mark.parametrize("fmt", [named.BFLOAT16, named.DECIMAL32, named.IBM_HEX32, FloatFormat(3, 5)], ids=str)
+def test_text_and_pickles_give_the_same_numbers(fmt: FloatFormat, mode: Rounding) -> None:
+    fmt = replace(fmt, rounding=mode)
+    x = fmt.array(["0.1", "-3", "1e-7", "12345.678", "1/3"])
+    if fmt.base != 3 or mode in (Rounding.NEAREST, Rounding.EVEN, Rounding.CHOP):
+        again = eval(repr(x), {"FloatFormat": FloatFormat, "Rounding": Rounding})
+        assert again.to_fractions().tolist() == x.to_fractions().tolist()
+    assert pickle.loads(pickle.dumps(x)).to_fractions().tolist() == x.to_fractions().tolist()
+
+
+def test_a_range_out_of_reach_changes_no_digit() -> None:
+    rng = np.random.default_rng(3)
+    for base, t in ((2, 24), (10, 8), (16, 6)):
+        for rounding in Rounding.documented():
+            plain, limited = FloatFormat(base, t, rounding), FloatFormat(base, t, rounding, emin=-60, emax=60)
+            values = rng.normal(size=(2, 200))
+            (x, y), (p, q) = plain.array(values), limited.array(values)
+            for operation in BINARY:
+                assert operation(x, y).to_fractions().tolist() == operation(p, q).to_fractions().tolist()
+
+
+class TestStochastic:
+    FMT = replace(named.BFLOAT16, rounding=Rounding.STOCHASTIC, seed=11)
+
+    def test_the_mean_is_exact(self) -> None:
+        count = 40_000
+        self.FMT.restart()
+        x = self.FMT.array(np.full(count, 1 + 2.0**-7 * 0.3)).to_float()
+        up = np.mean(x > 1)
+        assert set(x) == {1.0, 1 + 2.0**-7}
+        assert abs(up - 0.3) < 5 * math.sqrt(0.3 * 0.7 / count)  # five standard errors
+
+    def test_the_same_seed_gives_the_same_digits_on_either_backend(self) -> None:
+        rng = np.random.default_rng(5)
+        x = named.BFLOAT16.array(rng.normal(size=(2, 300))).to_float()
+        for operation in BINARY:
+            results = []
+            for exactly in (False, False, True):
+                self.FMT.restart()
+                a, b = (self.FMT.array(row) for row in x)
+                if exactly:
+                    a, b = a.on_exact_backend(), b.on_exact_backend()
+                self.FMT.restart()
+                results.append(operation(a, b).to_float())
+            assert np.array_equal(results[0], results[1])
+            assert np.array_equal(results[0], results[2])
+        other = replace(self.FMT, seed=12)
+        other.restart()
+        assert not np.array_equal((other.array(x[0]) * other.array(x[1])).to_float(), results[0])
+
+    def test_sums_do_not_stagnate(self) -> None:
+        """Adding 2**-10 to 1 in eight bits changes nothing to nearest."""
+        for fmt, stagnates in ((named.BFLOAT16, True), (self.FMT, False)):
+            fmt.restart()
+            total = fmt.array(np.concatenate([[1.0], np.full(1024, 2.0**-10)])).sum().to_float()
+            assert bool(total == 1) is stagnates
+            assert stagnates or abs(total - 2) < 0.5
+
+
+class TestSums:
+    def test_orders_are_those_stated(self) -> None:
+        fmt = FloatFormat(10, 3)
+        x, y = fmt.array(["1.01", "0.555", "-0.333", "7.77", "2.22"]), fmt.array([1, "1.1", 3, "0.9", 2])
+        p = [x[k] * y[k] for k in range(5)]
+        assert linalg.dot(x, y) == (((p[0] + p[1]) + p[2]) + p[3]) + p[4]
+        assert linalg.dot(x, y, "pairwise") == (p[0] + p[1]) + (p[2] + (p[3] + p[4]))
+        assert linalg.dot(x, y, "blocked", block=2) == ((p[0] + p[1]) + (p[2] + p[3])) + p[4]
+        fused = p[0]
+        for k in range(1, 5):
+            fused = x[k].multiply_add(y[k], fused)
+        assert linalg.dot(x, y, fused=True) == fused
+
+    def test_matrices_are_sums_of_their_rows_and_columns(self) -> None:
+        rng = np.random.default_rng(2)
+        a, b = named.BFLOAT16.array(rng.normal(size=(3, 7))), named.BFLOAT16.array(rng.normal(size=(7, 2)))
+        for options in ({"order": "pairwise"}, {"order": "blocked", "block": 3}, {"fused": True}):
+            c = linalg.matmul(a, b, **options)
+            for i in range(3):
+                for j in range(2):
+                    assert c[i, j] == linalg.dot(a[i], b[:, j], **options)
+        assert not np.array_equal(linalg.matmul(a, b, "pairwise"), a @ b)
+
+    def test_misuse(self) -> None:
+        x = FloatFormat(2, 8).array([1, 2])
+        for options, match in (
+            ({"order": "any"}, "needed 'left', 'pairwise' or 'blocked'"),
+            ({"order": "pairwise", "fused": True}, "pairwise sums with fused"),
+            ({"order": "blocked", "block": 0}, "block: got 0"),
+        ):
+            with pytest.raises(ValueError, match=match):
+                linalg.dot(x, x, **options)
+
+
+class TestFixed:
+    @pytest.mark.parametrize("overflow", ["raise", "saturate", "wrap"])
+    @pytest.mark.parametrize("mode", DETERMINISTIC)
+    @pytest.mark.parametrize("bits", [(1, 3), (0, 4), (3, 0), (-1, 5)])
+    def test_every_pair(self, bits: tuple[int, int], mode: Rounding, overflow: str) -> None:
+        fmt = FixedFormat(*bits, mode, overflow)
+        count = 2 ** (sum(bits) + 1)
+        every = [fmt.lowest + k * fmt.unit for k in range(count)]
+        assert every[-1] == fmt.largest
+        x = fmt.array(every)
+        assert x.to_fractions().tolist() == every
+        for operation in BINARY:
+            for a in every:
+                others = [b for b in every if b or operation is not operator.truediv]
+                results = [rounded(operation(a, b), fmt.unit, mode) for b in others]
+                inside = [fmt.lowest <= y <= fmt.largest for y in results]
+                if overflow == "raise":
+                    if not all(inside):
+                        with pytest.raises(OverflowError):
+                            operation(fmt.array(a), fmt.array(others))
+                    others = [b for b, kept in zip(others, inside, strict=True) if kept]
+                    results = [y for y, kept in zip(results, inside, strict=True) if kept]
+                elif overflow == "saturate":
+                    results = [min(max(y, fmt.lowest), fmt.largest) for y in results]
+                else:
+                    results = [(y - fmt.lowest) % (count * fmt.unit) + fmt.lowest for y in results]
+                found = operation(fmt.array(a), fmt.array(others)).to_fractions().tolist()
+                assert found == results
+
+    def test_negation_of_the_lowest_overflows(self) -> None:
+        for overflow, result in (("saturate", Fraction(7, 8)), ("wrap", Fraction(-1))):
+            fmt = FixedFormat(0, 3, overflow=overflow)
+            assert (-fmt.array(-1)).to_fractions() == result
+        with pytest.raises(OverflowError, match="negation"):
+            -FixedFormat(0, 3).array(-1)
+
+    def test_scaling_wastes_no_bit(self) -> None:
+        for values, bits in (([0.3, -0.7], 16), ([1000, -2], 16), ([1], 8), (["0.99999"], 8), ([3e-5], 16)):
+            fmt = scaling(values, bits)
+            largest = max(abs(Fraction(value)) for value in values)
+            assert 1 + fmt.integer_bits + fmt.fraction_bits == bits
+            assert fmt.largest >= largest
+            assert FixedFormat(fmt.integer_bits - 1, fmt.fraction_bits + 1).largest < largest
+
+    def test_linear_algebra(self) -> None:
+        q = FixedFormat(3, 12)
+        a = q.array([["2", "0.5"], ["0.25", "1.5"]])
+        product = linalg.inv(a) @ a
+        assert type(product) is type(a)
+        assert abs(product.to_float() - np.eye(2)).max() < 8 * float(q.unit)
+
+
+def test_misuse_is_explained() -> None:
+    for arguments, match in (
+        ({"emin": -3}, "needed both, or neither"),
+        ({"emin": 3, "emax": -3}, "needed emin <= emax"),
+        ({"subnormal": False}, "without a range"),
+        ({"emin": -3, "emax": 3, "largest": Fraction(100)}, "needed a number of the format with the exponent emax"),
+    ):
+        with pytest.raises(ValueError, match=match):
+            FloatFormat(2, 4, **arguments)
+    with pytest.raises(ValueError, match="needed one of 'raise', 'saturate', 'wrap'"):
+        FixedFormat(1, 2, overflow="clip")
+
+
+def test_compiled_where_it_can_be() -> None:
+    for fmt in (named.BINARY16, named.BFLOAT16, named.TF32, named.FP8_E4M3, named.IBM_HEX32, named.IBM_704):
+        assert isinstance(fmt.backend, LimitedFloats)
+    assert isinstance(named.DECIMAL64.backend, LimitedPairs)
+    assert isinstance(FixedFormat(0, 15).backend, Compiled)
+    assert isinstance(FixedFormat(0, 15, overflow="wrap").backend, Exact)
