@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test test-pages test-portable notebooks lint format exactness bench environment screenshots pdf serve clean
+.PHONY: help book test test-pages test-portable verify-sweeps notebooks lint format exactness bench environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -64,6 +64,9 @@ test-pages: .venv/made-for ## the built book in a real Chromium without a networ
 
 test-portable: .venv/made-for ## notebooks and numerical tests as on other machines; SETTINGS="nehalem locale-de" picks some
 	$(PY) scripts/portable.py $(SETTINGS)
+
+verify-sweeps: .venv/made-for ## a sample of every stored sweep computed again on this machine; SAMPLE=5 takes more cells
+	$(PY) -m gpbnb.sweeps verify --sample $(or $(SAMPLE),1)
 
 notebooks: .venv/made-for ## execute the notebooks in place
 	$(PY) scripts/execute_notebooks.py

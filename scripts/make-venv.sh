@@ -36,5 +36,6 @@ echo "Making .venv with $python ($version). The first time this downloads about 
 export RUSTUP_HOME="$PWD/.cache/rustup"
 rm -rf .venv
 "$python" -m venv .venv
-.venv/bin/python -m pip install --quiet --require-hashes --only-binary :all: -r environment.txt
+# Python compiles a module when it is first imported; most are never.
+.venv/bin/python -m pip install --quiet --no-compile --require-hashes --only-binary :all: -r environment.txt
 .venv/bin/python -m pip install --quiet --no-deps --no-build-isolation --no-index -e .

@@ -13,6 +13,7 @@ ROOT = Path(gpbnb.__file__).parent
 LONGEST_FILE = 500
 TOPICS = ("rounding", "inversion", "kalman", "rolling", "integration", "budget", "geometry")
 LAYERS = (
+    ("caching",),
     ("arithmetic",),
     ("display", "measurement", "sweeps"),
     TOPICS,
@@ -92,8 +93,20 @@ def names_defined(tree):
             yield node.value  # __slots__
 
 
-EXTERNAL = {"_asdict", "_fields", "_make", "_mpf_", "_print", "_replace", "_repr_html_", "_repr_markdown_"}
-"""Protocols of other libraries whose names begin with an underscore."""
+EXTERNAL = {
+    "_CacheLocator",
+    "_asdict",
+    "_cache_path",
+    "_impl",
+    "_fields",
+    "_make",
+    "_mpf_",
+    "_print",
+    "_replace",
+    "_repr_html_",
+    "_repr_markdown_",
+}
+"""Names of other libraries that begin with an underscore."""
 
 
 def test_private_names_stay_in_their_module():

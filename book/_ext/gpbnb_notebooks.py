@@ -23,10 +23,6 @@ MOST_JOBS = 8
 
 def execute(app: Sphinx) -> None:
     """Execute the notebooks whose outputs are not known, and lay executed copies of all beside the pages."""
-    if app.parallel == 1:
-        app.parallel = min(os.cpu_count() or 1, MOST_JOBS)
-    if numbering := app.extensions.get("sphinx_multitoc_numbering"):
-        numbering.parallel_read_safe = True  # it works after reading, and does not say so
     found = app.project.discover(app.config.exclude_patterns, app.config.include_patterns)
     paths = [path for each in sorted(found) if (path := Path(app.env.doc2path(each))).suffix == ".ipynb"]
     try:
@@ -54,6 +50,12 @@ def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
         copy = copies(app) / path.name
         app.env.note_dependency(str(copy))
         source[0] = copy.read_text(encoding="utf-8")
+
+
+def write_in_parallel(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Let several processes write the pages. sphinx-proof cannot be read in parallel."""
+    app.parallel = max(app.parallel, min(os.cpu_count() or 1, MOST_JOBS))
+    return []
 
 
 def outdated(app: Sphinx, env: BuildEnvironment, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
@@ -85,5 +87,6 @@ def setup(app: Sphinx) -> dict:
     app.connect("builder-inited", execute)
     app.connect("source-read", use_copy)
     app.connect("env-get-outdated", outdated)
+    app.connect("env-updated", write_in_parallel)
     app.connect("build-finished", remove_old_pages)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

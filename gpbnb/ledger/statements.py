@@ -94,6 +94,19 @@ class Statement:
         """
         return self._labelled(Words, label).printed
 
+    def claims(self, label: str, meanings: Mapping[str, bool]) -> bool:
+        """Whether the phrase that the document prints for this label is right.
+
+        Parameters
+        ----------
+        meanings : every phrase that it could print, and whether it would be right.
+
+        Raises
+        ------
+        LookupError : the form has no phrase of this label, or prints one that `meanings` does not have.
+        """
+        return meanings[self.says(label)]
+
     def _labelled(self, sort: type[_L], label: str) -> _L:
         for part in self.parts:
             if isinstance(part, sort) and part.label == label:

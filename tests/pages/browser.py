@@ -60,10 +60,14 @@ def pages() -> list[str]:
 
 
 def opened() -> list[str]:
-    """The pages that tests open: all but the listings of source, of which the longest stands for the others."""
-    listings = [address for address in pages() if address.startswith("_modules/gpbnb/")]
-    others = set(listings) - set(sorted(listings, key=lambda address: (HTML / address).stat().st_size)[-1:])
-    return [address for address in pages() if address not in others]
+    """The pages that tests open; the longest listing of source and the longest API page stand for the others."""
+    left = pages()
+    for folder in ("_modules/gpbnb/", "book/api/"):
+        alike = sorted(
+            (each for each in left if each.startswith(folder)), key=lambda each: (HTML / each).stat().st_size
+        )
+        left = [each for each in left if each not in alike[:-1]]
+    return left
 
 
 def chromium() -> str | None:

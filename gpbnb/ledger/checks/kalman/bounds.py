@@ -10,7 +10,7 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
 from gpbnb.kalman import derivation, report_bounds, smallest
 from gpbnb.ledger.checks.kalman import algebra
 from gpbnb.ledger.checks.kalman.excess import exceeded, excess
-from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR, claims
+from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.ledger.checks.kalman.steps import SIGNS
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.registry import both
@@ -103,7 +103,7 @@ def claim_of_a_bound(printed: Statement) -> Finding:
     times = excess("(125)")
     bound = times <= 1
     return compare(
-        claims(printed, "equation (125)", {"gives the bound": bound, "does not give a bound": not bound}),
+        printed.claims("equation (125)", {"gives the bound": bound, "does not give a bound": not bound}),
         f"in four digits, the error of a filter is {times:.3g} times what (125) allows",
         otherwise_note=_NO_BOUND,
         root=SIGNS,
@@ -114,7 +114,7 @@ def claim_of_a_bound(printed: Statement) -> Finding:
 def pattern(printed: Statement) -> Finding:
     found = algebra.holds(statement("hung1984.II.eq125"), algebra.norms())
     return compare(
-        claims(printed, "the general case", {"follows the pattern": found, "departs from the pattern": not found}),
+        printed.claims("the general case", {"follows the pattern": found, "departs from the pattern": not found}),
         "the coefficients of (125) are right by summation for every $k$, $n$, $m$",
         note="the pattern is right; what it is the pattern of is not",
     )
@@ -124,7 +124,7 @@ def pattern(printed: Statement) -> Finding:
 def similar_derivation(printed: Statement) -> Finding:
     found = algebra.holds(statement("hung1984.II.eq124"), algebra.norms())
     return compare(
-        claims(printed, "the same derivation", {"gives (124)": found, "does not give (124)": not found}),
+        printed.claims("the same derivation", {"gives (124)": found, "does not give (124)": not found}),
         "the coefficients of (124) follow by the same sums for $k=4$",
         note="what the derivation starts from fails",
     )
@@ -140,7 +140,7 @@ def dependence(printed: Statement) -> Finding:
     others = [value(k=4), value(n=3), value(m=2), value(x=2), value(B=2), value(beta=FOUR.unit_roundoff * 2)]
     grows = all(other > value() for other in others)
     return compare(
-        claims(printed, "the bound", {"depends on all six": grows, "is independent of some of the six": not grows}),
+        printed.claims("the bound", {"depends on all six": grows, "is independent of some of the six": not grows}),
         f"it grows with each of the {len(others)}",
         note="the error depends on more: on how far $I-KH$ cancels, which none of the six shows",
     )
@@ -149,7 +149,7 @@ def dependence(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.s12.word-interactions")
 def word(printed: Statement) -> Finding:
     return compare(
-        claims(printed, "k counts", {"interactions": False, "iterations": True}),
+        printed.claims("k counts", {"interactions": False, "iterations": True}),
         "$k$ counts the iterations of the filter",
         Verdict.MISPRINT,
         otherwise_note="iterations are meant, and an iteration period of ten seconds",
@@ -162,8 +162,7 @@ def usefulness(printed: Statement) -> Finding:
     times = smallest.ratios(seventeen, smallest.scalar(seventeen)).state
     useful = times <= 1
     return compare(
-        claims(
-            printed,
+        printed.claims(
             "equation (125)",
             {"gives a general idea of the digits": useful, "gives no idea of the digits": not useful},
         ),

@@ -9,7 +9,7 @@ from functools import cache
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.display.tables import scientific
 from gpbnb.kalman import derivation, report_bounds
-from gpbnb.ledger.checks.kalman.registry import CHECKS, claims
+from gpbnb.ledger.checks.kalman.registry import CHECKS
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
@@ -191,7 +191,7 @@ def criterion(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.s12.example-ocr-gp-beta")
 def name_of_the_experiment(printed: Statement) -> Finding:
     return compare(
-        claims(printed, "the experiment", {"GP-beta": False, "GP-B": True}),
+        printed.claims("the experiment", {"GP-beta": False, "GP-B": True}),
         "GP-B",
         Verdict.OCR,
         otherwise_note="the scan reads B as β here, and β as B in (122)",

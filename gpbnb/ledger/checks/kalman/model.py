@@ -6,7 +6,7 @@ import sympy as sp
 
 from gpbnb.kalman import exact_step, report_bounds, smallest
 from gpbnb.ledger.checks.kalman.filter_run import MEASUREMENTS, STATES, holds_exactly
-from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR, claims
+from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
@@ -38,7 +38,7 @@ def asterisk(printed: Statement) -> Finding:
     by_111 = true.transition @ case.x + true.gain @ case.z
     rounded = bool((x == by_111).all())
     return compare(
-        claims(printed, "x denotes", {"the rounded value of the estimate": rounded, "the exact estimate": not rounded}),
+        printed.claims("x denotes", {"the rounded value of the estimate": rounded, "the exact estimate": not rounded}),
         f"a step of one state in four digits gives {float(x[0]):g}, equation (111) gives {float(by_111[0]):.4g}",
         Verdict.MISPRINT,
         otherwise_note="from (111) on $x$ is the exact estimate, as (118) says, and $\\hat x$ the rounded one",

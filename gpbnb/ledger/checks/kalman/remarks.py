@@ -23,7 +23,7 @@ from gpbnb.kalman import (
     year_cases,
 )
 from gpbnb.ledger.checks.kalman.example import GOAL, SIGNAL, STEP, YEAR, M, N, coefficients
-from gpbnb.ledger.checks.kalman.registry import CHAPTER, CHECKS, FOUR, claims
+from gpbnb.ledger.checks.kalman.registry import CHAPTER, CHECKS, FOUR
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
@@ -168,7 +168,7 @@ def titles(printed: Statement) -> Finding:
         "Introduction to Numerical Computation": False,
     }
     return compare(
-        claims(printed, "title", right),
+        printed.claims("title", right),
         "both titles end in s: *Rounding Errors in Algebraic Processes*, *Introduction to Numerical Computations*",
         Verdict.MISPRINT,
         otherwise_note="an s is missing",
@@ -178,7 +178,7 @@ def titles(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.s14.reference-7")
 def reference_7(printed: Statement) -> Finding:
     return compare(
-        claims(printed, "contract", {"NA58-34426": False, "NAS8-34426": True}),
+        printed.claims("contract", {"NA58-34426": False, "NAS8-34426": True}),
         "NAS8-34426",
         Verdict.MISPRINT,
         otherwise_note="a 5 for the S that the title page has, as in chapter I; by the author or the scan. The date is "

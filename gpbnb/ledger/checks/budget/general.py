@@ -1,0 +1,229 @@
+"""The general descriptions: hung1984, ch. I, and what hung1982, ch. I, says of goal, period and contracts."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from datetime import date, datetime, timedelta
+from functools import reduce
+from operator import mul
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.linalg import dot
+from gpbnb.budget import theory
+from gpbnb.ledger.checks import rolling
+from gpbnb.ledger.checks.budget.registry import CHECKS
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.ledger.statements import Statement, load_statements, quote
+from gpbnb.measurement import ARCSEC, MAS
+
+TITLE_PAGE = "NAS8-34426"
+"""The contract, on the title page of hung1984."""
+
+
+# -- hung1984, ch. I ------------------------------------------------------------------------------
+
+
+@CHECKS.add("hung1984.I.contents")
+def contents(printed: Statement) -> Finding:
+    entries = [entry for entry in load_statements() if entry.document == "hung1984"]
+    return unverifiable(
+        f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries))}",
+        "the scan has no page numbers and no distribution list",
+    )
+
+
+@CHECKS.add("hung1984.I.two-tasks")
+def two_tasks(printed: Statement) -> Finding:
+    fixed, spoiled, left = revised_sum(), revised_product(), revised_chain()
+    made = fixed and not spoiled and not left
+    return compare(
+        printed.claims("the corrections", {"have been made": made, "have not all been made": not made}),
+        f"(18) of 1982, exceeded by the two-digit sum 5.6 + 5.9 − 11, is {'corrected' if fixed else 'not corrected'}; "
+        f"(20), right in 1982, is {'spoiled' if spoiled else 'kept'}; (31), wrong in 1982, is "
+        f"{'kept' if left else 'corrected'}",
+        otherwise_note="not all: (31) carries over to the main result; see the chapter *Rounding bounds*",
+        root="product-error-relative-to-product",
+    )
+
+
+def revised_sum() -> bool:
+    """Whether a sum that exceeds (18) of 1982 obeys (18) of 1984."""
+    fmt = FloatFormat(10, 2)
+    x = fmt.array(["5.6", "5.9", "-11"])
+    beta, terms = fmt.unit_roundoff, x.to_fractions()
+    true = sum(terms)
+    error = abs(((x[0] + x[1]) + x[2]).to_fractions() - true)
+    of_1982 = 2 * beta * abs(true)
+    of_1984 = beta * (2 * abs(true) + abs(terms[2]))
+    return bool(of_1982 < error <= of_1984)
+
+
+def revised_product() -> bool:
+    """Whether (20) of 1984, n + m + 1, differs from the count of roundings of a product of n over m, unlike 1982."""
+    n, m = 3, 2
+    count = (reduce(mul, [Roundings()] * n) / reduce(mul, [Roundings()] * m)).count
+    return count == n + m - 1 and count != n + m + 1
+
+
+@dataclass(frozen=True)
+class Roundings:
+    """A factor that stands for all numbers: it counts the products and quotients that led to it."""
+
+    count: int = 0
+
+    def __mul__(self, other: Roundings) -> Roundings:
+        return Roundings(self.count + other.count + 1)
+
+    __truediv__ = __mul__
+
+
+def revised_chain() -> bool:
+    """Whether (31), the same in both reports, is exceeded: a product of a row and a column of two that cancels."""
+    fmt = FloatFormat(10, 4)
+    row, column = fmt.array(["1.001", "-1.002"]), fmt.array(["1.001", "1"])
+    true = sum(row.to_fractions() * column.to_fractions())
+    error = abs(dot(row, column).to_fractions() - true)
+    return bool(error > 2 * fmt.unit_roundoff * abs(true))
+
+
+@CHECKS.add("hung1984.I.1-f-study")
+def one_over_f_study(printed: Statement) -> Finding:
+    entries = [entry for entry in load_statements() if entry.id.startswith("hung1984.III.")]
+    left = [entry for entry in entries if entry.kind == "open"]
+    count = sum(rolling.CHECKS.run(entry).verdict is Verdict.ANSWERED for entry in left)
+    return answer(
+        bool(left) and count == len(left),
+        f"of the {len(left)} studies that ch. III leaves open, {count} are answered here",
+        "the ledger of hung1984, ch. III",
+    )
+
+
+def period(printed: Statement) -> tuple[int, int]:
+    """Whole months and days of a printed period, the last day included; ValueError if it is no period."""
+    start, end = (
+        date(*(int(printed.number(f"{word} {part}").value) for part in ("year", "month", "day")))
+        for word in ("from", "to")
+    )
+    return span(start, end + timedelta(days=1))
+
+
+@CHECKS.add("hung1984.I.report-period")
+def period_1984(printed: Statement) -> Finding:
+    months, days = period(printed)
+    return compare(
+        months == printed.number("duration").value and days == 0,
+        f"{months} months and {days} days, the last day included",
+    )
+
+
+@CHECKS.add("hung1984.I.contract")
+def contract(printed: Statement) -> Finding:
+    return compare(
+        printed.says("contract") == TITLE_PAGE,
+        TITLE_PAGE,
+        Verdict.MISPRINT,
+        otherwise_note="the title page and hung1982 have an S, where this page, or its scan, has a 5",
+    )
+
+
+# -- hung1982, ch. I ------------------------------------------------------------------------------
+
+
+@CHECKS.add("hung1982.I.drift-rate")
+def drift_rate(printed: Statement) -> Finding:
+    limit = float(printed.number("drift rate").value) * ARCSEC / MAS
+    others = math.sqrt(max(theory.GOAL**2 - limit**2, 0.0))
+    return unverifiable(
+        f"at this limit the gyro alone uses up the goal: {others:g} milliarcseconds are left for all other sources",
+        "the documents hold no data on the drift of the gyros",
+    )
+
+
+@CHECKS.add("hung1982.I.design-goal")
+def design_goal(printed: Statement) -> Finding:
+    goal = float(printed.number("goal").value) * ARCSEC / MAS
+    return given(
+        f"the goal of the experiment, {goal:g} milliarcsecond a year, as in the basis of Figure II-2, which restores "
+        "the decimal point that the scan lost"
+    )
+
+
+@CHECKS.add("hung1982.II.rss-basis")
+def rss_basis(printed: Statement) -> Finding:
+    return given(f"the total that Figure II-2 assumes, {printed.number('total').literal} milliarcsecond")
+
+
+@CHECKS.add("hung1982.I.history", "hung1982.I.apparatus")
+def history(printed: Statement) -> Finding:
+    return unverifiable("", "told without a source, and nothing in the analysis rests on it")
+
+
+@CHECKS.add("hung1982.I.previous-contract")
+def previous_contract(printed: Statement) -> Finding:
+    listed = quote("hung1982.II.references")
+    numbers = re.findall(r"NAS8-\d+", listed)
+    award = datetime.strptime(printed.says("award"), "%B %Y").date()
+    end, start = date(1981, 2, 18), date(1981, 6, 24)
+    return compare(
+        "18 February 1981" in listed and [printed.says("contract")] == numbers and award < end < start,
+        f"its final report, the first reference of ch. II, has the number {' and '.join(numbers)}; it came "
+        f"{span(award, end)[0]} months after the award, and {span(end, start)[0]} months before this contract's period",
+    )
+
+
+@CHECKS.add("hung1982.I.contract")
+def contract_1982(printed: Statement) -> Finding:
+    return compare(
+        printed.says("contract") == TITLE_PAGE,
+        f"{TITLE_PAGE}, as on the title page of hung1984",
+        Verdict.INCONSISTENT,
+    )
+
+
+@CHECKS.add("hung1982.I.chapters-ii-and-iii")
+def chapters(printed: Statement) -> Finding:
+    where = {entry.item: entry.chapter for entry in load_statements() if entry.document == "hung1982"}
+    found = [where["classification by statistics"], where["main result"]]
+    return compare(
+        [printed.says("classifications"), printed.says("error analysis")] == found,
+        f"they are chapters {' and '.join(found)}",
+        Verdict.INCONSISTENT,
+    )
+
+
+@CHECKS.add("hung1982.I.references", "hung1982.II.references")
+def references(printed: Statement) -> Finding:
+    return unverifiable("", "the works are not among the documents; all but the first of ch. II are lost from the scan")
+
+
+@CHECKS.add("hung1982.I.chapter-reference")
+def chapter_reference(printed: Statement) -> Finding:
+    entries = [entry for entry in load_statements() if entry.document == "hung1982"]
+    (where,) = {entry.chapter for entry in entries if entry.item == "six frames"}
+    return compare(
+        printed.says("chapter") == where,
+        f"the measurement geometry is chapter {where}",
+        Verdict.MISPRINT,
+        otherwise_note="two letters changed places; there is no chapter VI",
+    )
+
+
+@CHECKS.add("hung1982.I.report-period")
+def period_1982(printed: Statement) -> Finding:
+    months, days = period(printed)
+    restored = span(date(1981, 6, 24), date(1982, 9, 1))
+    return compare(
+        months == printed.number("duration").value,
+        f"from the printed year {months} months and {days} days; from 1981 {restored[0]} months and {restored[1]} days",
+        Verdict.OCR,
+        otherwise_note="1981, read as 1987",
+    )
+
+
+def span(start: date, end: date) -> tuple[int, int]:
+    """Whole months and the days beyond them, from `start` to `end`."""
+    months = 12 * (end.year - start.year) + end.month - start.month - (end.day < start.day)
+    later = start.year * 12 + start.month - 1 + months
+    return months, (end - date(later // 12, later % 12 + 1, start.day)).days

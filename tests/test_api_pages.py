@@ -1,0 +1,23 @@
+"""The API reference has a page for each public module, and no other."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def writer():
+    spec = importlib.util.spec_from_file_location("write_api_pages", ROOT / "scripts" / "write_api_pages.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_each_public_module_has_its_page_and_its_docstring():
+    found = writer()
+    modules = found.public_modules()
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in found.PAGES.glob("*.md")}
+    assert pages == {module: found.page(module) for module in modules}, "run scripts/write_api_pages.py"
+    assert [module for module, summary in modules.items() if not summary] == []
