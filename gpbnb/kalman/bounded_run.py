@@ -80,7 +80,7 @@ class BoundedRun(Run):
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped or not len(z):
             return
-        packed = self.packed(z)
+        packed = self.as_packed(z)
         values = double_doubles(self.exactly(packed))
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         outputs = (self.checkpoint_steps, (self.X, self.G, self.C), self.bounds, self.notes)

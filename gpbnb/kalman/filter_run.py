@@ -57,11 +57,11 @@ class Run:
             )
         #: In which arithmetic the compiled loops work.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused)
-        Phi, H, Q, R = (self.packed(each) for each in (model.Phi, model.H, model.Q, model.R))
+        Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
-        identity = self.packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
-        self.x, self.P = self.packed(model.x0.reshape(n, 1)), self.packed(model.P0)
+        identity = self.as_packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
+        self.x, self.P = self.as_packed(model.x0.reshape(n, 1)), self.as_packed(model.P0)
         RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, 1), (n, m), (n, n))
@@ -99,7 +99,7 @@ class Run:
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped:
             return
-        packed = self.packed(z)
+        packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
@@ -107,7 +107,7 @@ class Run:
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1
 
-    def packed(self, values: Any) -> NDArray[Any]:
+    def as_packed(self, values: Any) -> NDArray[Any]:
         """Numbers, each rounded into the format, as the compiled loops take them."""
         if self.fmt is None:
             entries = np.asarray(values)

@@ -52,10 +52,10 @@ class Records(Run):
         if np.shape(H)[1:] != (self.model.m, self.model.n):
             raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
         if decimals is not None and self.fmt is not None and self.fmt.base == 10:
-            packed = self.packed(np.rint(H * 10.0**decimals))
+            packed = self.as_packed(np.rint(H * 10.0**decimals))
             packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
         else:
-            packed = self.packed(H)
+            packed = self.as_packed(H)
         transposed = np.ascontiguousarray(np.swapaxes(packed, 1, 2))
         self.matrices = (*self.matrices[:2], packed, transposed, *self.matrices[4:])
 
@@ -79,7 +79,9 @@ class Records(Run):
         before = self.steps
         kept = (self.checkpoint_steps, (self.X, self.G, self.C), self.notes)
         try:
-            advance_records(self.tag, int(self.form), self.matrices, self.packed(z), before, self.x, self.P, *kept, out)
+            advance_records(
+                self.tag, int(self.form), self.matrices, self.as_packed(z), before, self.x, self.P, *kept, out
+            )
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1
         out[self.steps - before :] = np.nan

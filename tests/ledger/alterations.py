@@ -51,7 +51,7 @@ def _of_literal(literal: str) -> Iterator[tuple[str, str]]:
 
 
 def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
-    """The usual alterations; where they are few, dropped factors as well."""
+    """The usual alterations; where they are few, dropped factors and the opposite sign as well."""
     usual = dict(_usual(relation))
     yield from usual.items()
     if len(usual) < 3:
@@ -61,6 +61,9 @@ def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
                 new = copy.deepcopy(tree)
                 _substitute(new, list(ast.walk(new))[k], node.left)
                 yield f"dropped factor at {k}", ast.unparse(new)
+        if "twice the last side" in usual and isinstance(tree, ast.Compare):
+            tree.comparators[-1] = ast.UnaryOp(ast.USub(), tree.comparators[-1])
+            yield "minus the last side", ast.unparse(tree)
 
 
 def _usual(relation: Relation) -> Iterator[tuple[str, str]]:

@@ -61,7 +61,8 @@ def test_no_altered_statement_is_judged_right(statement):
 @pytest.mark.parametrize("statement", WITH_FORM, ids=lambda statement: statement.id)
 def test_a_statement_has_enough_alterations(statement):
     words_alone = all("|" in part.text for part in statement.parts)
-    assert len(dict(altered(statement))) >= (1 if words_alone else 3)
+    enough = len(dict(altered(statement))) >= (1 if words_alone else 3)
+    assert enough or judged(statement).verdict is Verdict.GIVEN
 
 
 def test_each_exception_is_an_alteration_with_its_reason():

@@ -1,0 +1,129 @@
+"""Checks of hung1982, ch. IV: claims about angles after (6), and the use of the model."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import sympy as sp
+
+from gpbnb.geometry import derivation, experiment, theory
+from gpbnb.geometry.derivation import ALPHA
+from gpbnb.ledger.checks.geometry.frames import boresight_offset
+from gpbnb.ledger.checks.geometry.registry import CHAPTER, CHECKS, MINUTE
+from gpbnb.ledger.finding import Finding, Verdict, answer, compare
+from gpbnb.ledger.statements import Statement
+from gpbnb.measurement import ARCSEC, MAS, apply, roll, rotation, spin_in_readout, star_in_telescope, theta_of
+
+
+@CHECKS.add("hung1982.IV.theta1-alpha1")
+def first_angles(printed: Statement) -> Finding:
+    _, y, z = derivation.aligned(derivation.star())
+    absent = sp.diff(y, ALPHA[0]) == 0 and sp.diff(z, ALPHA[0]) == 0
+    h = 1e-6
+    base = np.array([0.1, 0.2, 0.3])
+    columns = [
+        star_in_telescope(base + step, np.zeros(3), 0.4) - star_in_telescope(base - step, np.zeros(3), 0.4)
+        for step in h * np.eye(3)
+    ]
+    rank = int(np.linalg.matrix_rank(np.array(columns) / h, tol=1e-6))
+    return compare(
+        printed.says("angles") == ("cannot be determined" if absent and rank == 2 else "can be determined"),
+        f"no trace of $\\alpha_1$ to first order; exactly, the direction of one star fixes {rank} of three angles",
+        note="so exact equations would not help: it takes a second star, as for the roll phase",
+    )
+
+
+@CHECKS.add("hung1982.IV.axes-colinear")
+def colinear(printed: Statement) -> Finding:
+    apart = [boresight_offset(np.array([0.0, size, size])) for size in (0.0, MINUTE)]
+    return compare(
+        printed.says("axes") == ("colinear" if apart[0] == 0 < apart[1] else "perpendicular"),
+        "$x_t$ and $x_r$ are "
+        + " and ".join(
+            f"{offset / ARCSEC:.0f} arcseconds apart with $\\gamma_2=\\gamma_3={size}$"
+            for size, offset in zip(("0", "60''"), apart, strict=True)
+        ),
+        note="so under the ideal condition that (3) to (7) rest on, and not otherwise",
+    )
+
+
+@CHECKS.add("hung1982.IV.identity-transformation")
+def identity(printed: Statement) -> Finding:
+    block = derivation.printed_small(ALPHA)[1:, 1:]
+    without = block.subs(ALPHA[0], 0) == sp.eye(2)
+    error = experiment.small_angle_errors("alpha1", MINUTE, (theory.GEODETIC, theory.MOTIONAL))[0]
+    limit = theory.twist_limit(MAS)
+    return compare(
+        printed.says("matrix")
+        == ("an identity matrix" if without and error < MAS else "a matrix that is not the identity"),
+        f"$\\alpha_1$ of 60 arcseconds moves {error / MAS:.2f} milliarcseconds of a year's drift of 6.6 arcseconds "
+        "across",
+        otherwise_note="that $\\alpha_1$ cannot be determined does not make it zero; it must be known to "
+        f"{limit / ARCSEC:.0f} arcseconds for one milliarcsecond",
+        root="undetermined-roll-angle-taken-for-zero",
+    )
+
+
+@CHECKS.add("hung1982.IV.phi-frame")
+def phi_frame(printed: Statement) -> Finding:
+    phi = np.array([0.0, 5.0, 0.0]) * ARCSEC
+    against = {name: abs(theta_of(phi, np.array([0.0, a, 0.0]) * ARCSEC)[1]) for name, a in (("a", 0.0), ("i", 4.0))}
+    # right-handed: a positive turn of the gyro about y carries its x axis towards -z
+    stands = float(rotation(phi)[2, 0])
+    return compare(
+        bool(abs(against[printed.says("frame")[0]] - phi[1]) < MAS and stands < 0),
+        f"$\\varphi_2$ of 5 arcseconds at a pointing of 4: the gyro is turned by {against['i'] / ARCSEC:.0f} against "
+        f"the intermediate frame and by {against['a'] / ARCSEC:.0f} against the absolute one, and its axis stands at "
+        f"$z={'+' if stands > 0 else '-'}{abs(stands) / ARCSEC:.0f}$",
+        Verdict.INCONSISTENT,
+        otherwise_note="φ is the drift against the absolute frame, with the sign reversed: as (2) is set up it turns "
+        "the gyro frame into the absolute one",
+    )
+
+
+@CHECKS.add("hung1982.IV.known-misalignments")
+def known(printed: Statement) -> Finding:
+    left = compensated()
+    return compare(
+        printed.says("effect") == ("can be compensated" if left < 1e-6 * MAS else "cannot be compensated"),
+        "the readings turned back through known β and γ leave the drift without error",
+        note="for a telescope and a gyro that both give y and z",
+    )
+
+
+def compensated() -> float:
+    """Largest error of the spin axis in the intermediate frame after turning back through known angles; radians."""
+    theta, beta, gamma = np.array([[0, 9.0, 4.0], [30.0, 20.0, -10.0], [-25.0, 15.0, 5.0]]) * MINUTE
+    phase = np.linspace(0, 6, 11)
+    read = spin_in_readout(theta, beta, gamma, phase)
+    back = apply(roll(-phase) @ rotation(beta).T @ rotation(gamma).T, read)
+    return float(np.abs(back - rotation(theta)[:, 0]).max())
+
+
+@CHECKS.add("hung1982.IV.use-of-model")
+def use_of_model() -> Finding:
+    size = 20 * ARCSEC
+    cases = {name: theory.Case().with_angle(name, size) for name in ("alpha1", "beta1", "beta3", "gamma1", "gamma3")}
+    cases["gamma1, alpha2"] = cases["gamma1"].with_angle("alpha2", size)
+    holds, shown = True, []
+    for name, case in cases.items():
+        found, analysed = experiment.year(case, step=200.0).error, theory.effect(case, True)
+        gap = float(np.hypot(*(np.array(found.drift) - analysed.drift)))
+        holds = (
+            holds
+            and gap < THIRD_ORDER * size**2 * theory.GEODETIC
+            and math.isclose(found.line, analysed.line, abs_tol=0.1 * MAS)
+        )
+        if name in ("beta3", "gamma1"):
+            shown.append(f"{name[:-1]}{name[-1]} {np.hypot(*found.drift) / MAS:.2f}")
+    first = derivation.first_order_effects().holds and derivation.second_order_effects().holds
+    return answer(
+        holds and first,
+        "error of a year's drift for 20 arcseconds, rolling, in milliarcseconds: " + ", ".join(shown),
+        f"{CHAPTER}: analysis to second order, and a simulated year with exact rotations that agrees",
+    )
+
+
+THIRD_ORDER = 4.0
+"""Bound of the third-order coefficients of a case with two angles of one size, for drift smaller than they."""

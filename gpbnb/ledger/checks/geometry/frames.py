@@ -1,0 +1,165 @@
+"""Checks of hung1982, ch. IV: what the report says of its frames and angles before (1)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gpbnb.geometry import derivation, theory
+from gpbnb.ledger.checks.geometry.registry import CHAPTER, CHECKS, MINUTE
+from gpbnb.ledger.finding import Finding, Verdict, compare, unverifiable
+from gpbnb.ledger.statements import Statement
+from gpbnb.measurement import (
+    ARCSEC,
+    MAS,
+    angles_of,
+    deroll,
+    roll,
+    rotation,
+    spin_in_readout,
+    star_in_telescope,
+    theta_of,
+)
+
+
+@CHECKS.add("hung1982.IV.figure-iv-1", "hung1982.IV.figure-iv-2")
+def pictures() -> Finding:
+    return unverifiable(
+        "drawn again from the definitions of the frames", f"the picture is missing from the scan; {CHAPTER}"
+    )
+
+
+_COUNTS = {"five": 5, "six": 6, "seven": 7}
+
+
+@CHECKS.add("hung1982.IV.six-frames")
+def six_frames(printed: Statement) -> Finding:
+    count = len(np.unique(frames_of_a_case().round(9), axis=0))
+    return compare(
+        count == _COUNTS[printed.says("frames")],
+        f"with all angles nonzero the definitions give {count} different frames",
+    )
+
+
+@CHECKS.add("hung1982.IV.absolute-frame")
+def absolute_frame(printed: Statement) -> Finding:
+    year, orbit = theory.aberration(640e3)
+    line = theory.line_fit_leak(year, 1)
+    return compare(
+        printed.says("frame") == ("stationary in orientation" if year + orbit < MAS else "moving with the aberration"),
+        f"starlight is aberrated: the line of sight moves by up to {year / ARCSEC:.1f} arcseconds in a year and "
+        f"{orbit / ARCSEC:.1f} in an orbit at 640 km; a straight line through a year of (7) would be off by up to "
+        f"{line / ARCSEC:.0f} arcseconds a year",
+        Verdict.INCONSISTENT,
+        otherwise_note="it cannot stand still and follow the line of sight. (1) keeps the star at (1, 0, 0): "
+        "(7) gives the drift against the apparent star, and the report does not mention aberration; from the "
+        "known velocities it can be taken out",
+    )
+
+
+@CHECKS.add("hung1982.IV.intermediate-frame")
+def intermediate_frame(printed: Statement) -> Finding:
+    phi = np.array([0.0, 5.0, 3.0]) * ARCSEC
+    pointings, phases = np.array([[0.0, -2.0, 4.0], [0.0, 7.0, -1.0]]) * ARCSEC, (0.3, 2.1)
+    turned = boresight_offset(pointings[1] - pointings[0])
+    none = np.zeros(3)
+    drifts = [
+        deroll(
+            (spin_in_readout(theta_of(phi, alpha), none, none, phase) - star_in_telescope(alpha, none, phase))[1:],
+            phase,
+        )
+        for alpha, phase in zip(pointings, phases, strict=True)
+    ]
+    apart = float(np.abs(np.array(drifts) - [-phi[2], phi[1]]).max())
+    return compare(
+        printed.says("frame") == ("stationary in orientation" if turned < 1e-9 else "turning with the roll axis"),
+        f"pointings of (−2, 4) and (7, −1) arcseconds turn it by {turned / ARCSEC:.1f}; at both (7) gives the drift to "
+        f"{apart / MAS:.0e} milliarcseconds",
+        Verdict.MISPRINT if apart < 1e-3 * MAS else Verdict.WRONG,
+        otherwise_note="it stands still only as long as the roll axis does; (5) to (7) are of one instant and do not "
+        "ask it to",
+    )
+
+
+def frames_of_a_case() -> np.ndarray:
+    """Matrices (6, 3, 3) from the absolute to each frame, for angles that are all different and not zero."""
+    A, F = rotation([0.01, 0.02, 0.03]), rotation([0.0, 0.04, 0.05])
+    R = roll(0.6) @ A
+    T = rotation([0.07, 0.08, 0.09]) @ R
+    return np.stack([np.eye(3), A, R, T, rotation([0.10, 0.11, 0.12]) @ T, F.T])
+
+
+def gyro_to_readout(phase: float) -> np.ndarray:
+    """The angles δ of a gyro that points along the roll axis, without misalignments; radians."""
+    return angles_of(roll(phase) @ rotation([0.0, 0.0, 0.0]))
+
+
+@CHECKS.add("hung1982.IV.deltas-zero")
+def deltas(printed: Statement) -> Finding:
+    return turning_delta(printed.says("angles") == "zero", 1e-9)
+
+
+@CHECKS.add("hung1982.IV.all-small")
+def all_small(printed: Statement) -> Finding:
+    return turning_delta(printed.says("angles") == "sufficiently small", 0.1)
+
+
+def turning_delta(claimed: bool, limit: float) -> Finding:
+    """Whether δ stays below a limit, in radians, without misalignment and drift."""
+    turned = [abs(gyro_to_readout(phase)[0]) for phase in (0.0, math.pi / 4, math.pi / 2)]
+    degrees = ", ".join(f"{math.degrees(angle):.0f}" for angle in turned)
+    return compare(
+        bool(claimed and max(turned) < limit),
+        f"with no misalignment and no drift $\\delta_1$ is {degrees} degrees after 0, an eighth and a quarter of a "
+        "roll",
+        Verdict.INCONSISTENT,
+        otherwise_note="the readout frame rolls and the gyro frame does not, so that δ contains the roll; no equation "
+        "uses δ",
+    )
+
+
+@CHECKS.add("hung1982.IV.readout-normal")
+def readout_normal(printed: Statement) -> Finding:
+    spin = spin_in_readout(np.zeros(3), np.zeros(3), np.zeros(3), 0.3)
+    to_normal, to_axis = (math.degrees(math.acos(min(spin[k], 1.0))) for k in (2, 0))
+    alone = derivation.one_ring().holds
+    return compare(
+        to_normal < 1 if printed.says("reference") == "the readout normal zᵣ" else to_axis < 1,
+        f"aligned, the spin axis is {to_normal:.0f} degrees from the normal $z_r$ and {to_axis:.0f} from $x_r$",
+        Verdict.INCONSISTENT,
+        otherwise_note="(6) is about $x_r$. A ring with the normal $z_r$ reads the component $z_r$ alone, while (6) "
+        "and (9) also need $y_r$: a second ring"
+        + (", or the mean over a roll, which tells both angles" if alone else ""),
+    )
+
+
+@CHECKS.add("hung1982.IV.alphas-boresight")
+def boresight(printed: Statement) -> Finding:
+    off = boresight_offset(np.array([0.0, MINUTE, 0.0]))
+    return compare(
+        off < 1e-9 if printed.says("axis") == "telescope's boresight" else off > 1e-9,
+        f"with $\\beta_2$ of 60 arcseconds boresight and roll axis are {off / ARCSEC:.0f} arcseconds apart",
+        Verdict.INCONSISTENT,
+        otherwise_note="α belongs to the roll axis, by the definition of the intermediate frame; of the boresight only "
+        "where β is zero",
+    )
+
+
+def boresight_offset(angles: np.ndarray) -> float:
+    """Angle between the x axes of two frames that these angles separate, as boresight and roll axis; radians."""
+    return float(math.asin(min(1.0, np.hypot(*rotation(angles)[1:, 0]))))
+
+
+@CHECKS.add("hung1982.IV.thetas-drift")
+def thetas(printed: Statement) -> Finding:
+    phi, alpha = np.array([0.0, 5.0, 3.0]) * ARCSEC, np.array([0.0, -2.0, 4.0]) * ARCSEC
+    theta = theta_of(phi, alpha)
+    meant = phi if printed.says("thetas") == "the relativistic drift angles" else phi + alpha
+    return compare(
+        bool(np.allclose(theta, meant, atol=MAS)),
+        "for drift angles (5, 3) and pointing (−2, 4) arcseconds θ is "
+        f"({theta[1] / ARCSEC:.0f}, {theta[2] / ARCSEC:.0f})",
+        Verdict.INCONSISTENT,
+        otherwise_note="θ is drift and pointing together; the drift is $\\varphi=\\theta-\\alpha$, as (7) says",
+    )

@@ -1,0 +1,107 @@
+"""Checks of hung1982, ch. I: the two precessions, and the progress that the report announces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import sympy as sp
+
+from gpbnb.geometry import derivation, theory
+from gpbnb.ledger.checks.geometry.registry import CHAPTER, CHECKS
+from gpbnb.ledger.finding import Finding, answer, compare, unverifiable
+from gpbnb.ledger.statements import Statement
+from gpbnb.measurement import ARCSEC, deroll
+
+
+@CHECKS.add("hung1982.I.figure-i-1")
+def picture() -> Finding:
+    return unverifiable(
+        "drawn again for a star in the plane of a polar orbit", f"the picture is missing from the scan; {CHAPTER}"
+    )
+
+
+@CHECKS.add("hung1982.I.geodetic-motional-geometry")
+def two_precessions(printed: Statement) -> Finding:
+    holds = derivation.precessions().holds
+    return compare(
+        holds and printed.says("geodetic") == "in a plane of orbit" and printed.says("motional") == "perpendicular to",
+        "for a star in the plane of a polar orbit: geodetic drift in this plane, motional drift along its normal, "
+        "which is across the Earth's axis; their inner product is 0",
+    )
+
+
+@CHECKS.add("hung1982.I.larger-effect")
+def larger_effect(printed: Statement) -> Finding:
+    ratios = [geodetic / motional for geodetic, motional in map(theory.precession_rates, np.arange(0, 3.6e7, 2e5))]
+    geodetic, motional = theory.precession_rates(640e3)
+    larger = "geodetic" if min(ratios) > 1 else "motional"
+    return compare(
+        printed.says("larger") == larger,
+        f"{geodetic / ARCSEC:.2f} and {motional / ARCSEC:.3f} arcseconds a year at 640 km; at least "
+        f"{min(ratios):.0f} times larger from the ground to 36000 km",
+    )
+
+
+RIGEL = math.radians(-8.2)
+"""Declination of the star, which is not in the documents."""
+
+
+@CHECKS.add("hung1982.I.approximately-parallel")
+def approximately_parallel(printed: Statement) -> Finding:
+    off = math.degrees(angle_to_axis(RIGEL))
+    direction = "approximately parallel to" if off < 10 else "perpendicular to" if off > 80 else "oblique to"
+    return compare(
+        printed.says("direction") == direction,
+        f"the drift of a gyro that points to Rigel makes {off:.1f} degrees with the Earth's axis, as "
+        "much as the star is off the equator",
+        note="if it is said of the plane: that of a polar orbit contains the axis",
+    )
+
+
+def angle_to_axis(declination: float) -> float:
+    """Angle between the Earth's axis and the geodetic drift for a star in the plane of the orbit; radians."""
+    star = np.array([math.cos(declination), 0.0, math.sin(declination)])
+    drift = np.cross([0.0, 1.0, 0.0], star)  # about the normal of the orbit
+    return float(math.acos(abs(drift[2]) / np.hypot(drift[0], drift[2])))
+
+
+@CHECKS.add("hung1982.I.theories-differ")
+def theories_differ(printed: Statement) -> Finding:
+    omega = sp.Symbol("omega", positive=True)
+    ratio = geodetic_of_brans_dicke(omega)
+    difference = sp.simplify(1 - ratio)
+    differ = difference != 0 and sp.limit(ratio, omega, sp.oo) == 1
+    return compare(
+        printed.says("magnitudes") == ("vary from theory to theory" if differ else "are the same in every theory"),
+        f"in the Brans-Dicke theory the geodetic drift is ${sp.latex(sp.factor(ratio))}$ of Einstein's, with its "
+        f"parameter $\\omega$: {float(difference.subs(omega, 6)):.0%} less for $\\omega=6$, and the same in the limit",
+        note="procession is a slip for precession",
+    )
+
+
+def geodetic_of_brans_dicke(omega: sp.Symbol) -> sp.Expr:
+    """Geodetic drift over that of general relativity: (1 + 2γ)/3, γ the curvature of space by unit mass."""
+    gamma = (1 + omega) / (2 + omega)
+    return sp.together((1 + 2 * gamma) / 3)
+
+
+@CHECKS.add("hung1982.I.progress-report")
+def progress_report() -> Finding:
+    as_printed, corrected = deroll_errors()
+    return answer(
+        corrected < 1e-12 * ARCSEC < as_printed,
+        f"over a roll (8) as printed is off by up to {as_printed / ARCSEC:.0f} arcseconds for a pointing of 17, and "
+        "by none when corrected",
+        f"this project: errors corrected and announced work done; for this chapter in the {CHAPTER}",
+    )
+
+
+def deroll_errors() -> tuple[float, float]:
+    """Largest error of (8) as printed, and of (5), over a roll, for α of 15 and 8 arcseconds; radians."""
+    phase = np.linspace(0, 2 * np.pi, 37)
+    inertial = np.array([-15.0, 8.0]) * ARCSEC
+    readings = deroll(np.broadcast_to(inertial, (37, 2)), -phase)
+    back = (theory.printed_deroll(readings, phase), deroll(readings, phase))
+    as_printed, corrected = (float(np.hypot(*(each - inertial).T).max()) for each in back)
+    return as_printed, corrected

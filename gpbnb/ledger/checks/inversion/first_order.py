@@ -1,0 +1,128 @@
+"""Numbers and matrices to first order in the rounding error ε: ``value + slope ε`` with ε² = 0, in exact Fractions."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
+
+
+class FirstOrder:
+    """A number, or a matrix, and the coefficient of ε in it; ``*`` of two matrices is their matrix product.
+
+    Parameters
+    ----------
+    value : the number (Fraction) or matrix (object array of Fractions) without rounding errors.
+    slope : the coefficient of ε, of the same shape; zero by default.
+    """
+
+    __hash__ = None  # type: ignore[assignment]
+    __array_ufunc__ = None  # NumPy leaves mixed operations to this class
+
+    def __init__(self, value: Any, slope: Any = None) -> None:
+        self.value = value
+        self.slope = value * 0 if slope is None else slope
+
+    def __add__(self, other: Any) -> FirstOrder:
+        other = quantity(other)
+        return FirstOrder(self.value + other.value, self.slope + other.slope)
+
+    def __neg__(self) -> FirstOrder:
+        return FirstOrder(-self.value, -self.slope)
+
+    def __sub__(self, other: Any) -> FirstOrder:
+        return self + -quantity(other)
+
+    def __rsub__(self, other: Any) -> FirstOrder:
+        return quantity(other) - self
+
+    def __mul__(self, other: Any) -> FirstOrder:
+        other = quantity(other)
+        return FirstOrder(
+            _product(self.value, other.value), _product(self.value, other.slope) + _product(self.slope, other.value)
+        )
+
+    def __rmul__(self, other: Any) -> FirstOrder:
+        return quantity(other) * self
+
+    def inv(self) -> FirstOrder:
+        """The inverse of a matrix, or of a number."""
+        inverse = 1 / self.value if isinstance(self.value, Fraction) else inverse_of(self.value)
+        return FirstOrder(inverse, -_product(_product(inverse, self.slope), inverse))
+
+    def __truediv__(self, other: Any) -> FirstOrder:
+        return self * quantity(other).inv()
+
+    def __rtruediv__(self, other: Any) -> FirstOrder:
+        return quantity(other) / self
+
+    def __pow__(self, exponent: Any) -> FirstOrder:
+        if exponent != int(exponent) or exponent < 1:
+            raise ValueError(f"got the exponent {exponent}; needed a whole number from 1")
+        return self if exponent == 1 else self * self ** (exponent - 1)
+
+    __radd__ = __add__
+
+    @property
+    def T(self) -> FirstOrder:
+        """The transpose."""
+        return FirstOrder(self.value.T, self.slope.T)
+
+    def __abs__(self) -> FirstOrder:
+        if np.any(self.slope) and np.any(self.value):
+            raise ValueError("got a quantity with a rounding error; needed an exact one, or an error alone")
+        return FirstOrder(abs(self.value), abs(self.slope))
+
+    def __eq__(self, other: object) -> bool:
+        found = quantity(other)
+        return bool(
+            np.shape(self.value) == np.shape(found.value)
+            and np.all(self.value == found.value)
+            and np.all(self.slope == found.slope)
+        )
+
+    def __le__(self, other: Any) -> bool:
+        """Whether no entry is larger: first the values count, then the slopes, as for a small positive ε."""
+        found = quantity(other)
+        equal = self.value == found.value
+        return bool(np.all((self.value < found.value) | (equal & (self.slope <= found.slope))))
+
+    def norm(self) -> FirstOrder:
+        """Largest column sum of sizes, (22), and of a column its largest entry, (21)."""
+        sizes = abs(self)
+        largest = (lambda x: x.max()) if sizes.value.shape[1] == 1 else column_sum_norm
+        return FirstOrder(largest(sizes.value), largest(sizes.slope))
+
+
+def quantity(x: Any) -> FirstOrder:
+    """A number or matrix, given in any form, with its rounding error."""
+    if isinstance(x, FirstOrder):
+        return x
+    if isinstance(x, np.ndarray):
+        return FirstOrder(exact(x))
+    return FirstOrder(Fraction(x))
+
+
+def matrix(rows: list[Any]) -> FirstOrder:
+    """The matrix with these rows of numbers; a flat list is a row."""
+    table = [[quantity(cell) for cell in (row if isinstance(row, list) else rows)] for row in rows]
+    table = table if isinstance(rows[0], list) else table[:1]
+    return FirstOrder(
+        np.array([[cell.value for cell in row] for row in table], dtype=object),
+        np.array([[cell.slope for cell in row] for row in table], dtype=object),
+    )
+
+
+def joined(columns: list[FirstOrder]) -> FirstOrder:
+    """The matrix with these columns."""
+    return FirstOrder(np.hstack([c.value for c in columns]), np.hstack([c.slope for c in columns]))
+
+
+EPSILON = FirstOrder(Fraction(0), Fraction(1))
+
+
+def _product(a: Any, b: Any) -> Any:
+    return a @ b if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) else a * b
