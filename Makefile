@@ -82,6 +82,7 @@ format: .venv/made-for ## let ruff lay out the code and mend what it can
 
 exactness: .venv/made-for ## forty million operations compared with independent arithmetic, digit for digit
 	$(PY) -m benchmarks.exactness
+	$(PY) -m benchmarks.processors
 
 # pychop has no wheel.
 bench: .venv/made-for ## timings against peers, side by side

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from benchmarks.timing import Row, medians, rows
+from gpbnb.arithmetic import named
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
@@ -141,6 +142,17 @@ def measure() -> list[Row]:
     step = {"gpbnb": (times["gpbnb"] - times["empty"]) / STEPS}
     step |= medians({"numpy, unrounded": lambda: numpy_step(given, x0, P0)}, 2000)
     table = rows("Kalman step, 24 bits", step, "gpbnb", {"numpy, unrounded": 1})
+    ranged, _ = compiled(named.BINARY32)
+    times = medians(
+        {
+            "gpbnb": partial(ranged, 10 * STEPS),
+            "empty": partial(ranged, 0),
+            "gpbnb, 24 bits, no range": partial(run, 10 * STEPS),
+        },
+        200,
+    )
+    step = {name: (times[name] - times["empty"]) / (10 * STEPS) for name in times if name != "empty"}
+    table += rows("Kalman step, binary32, ties to even", step, "gpbnb", {"gpbnb, 24 bits, no range": 1 / 1.2})
     for precision, least in ((8, 30), (17, 10)):
         run, operands = compiled(FloatFormat(10, precision))
         exact = [[[as_decimal(x) for x in row] for row in a] for a in operands]

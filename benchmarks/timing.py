@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import NamedTuple
 
-PACKAGES = ("numpy", "scipy", "numba", "gfloat", "pychop", "mpmath")
+PACKAGES = ("numpy", "scipy", "numba", "ml_dtypes", "gfloat", "pychop", "mpmath")
 
 
 class Row(NamedTuple):

@@ -16,7 +16,7 @@ import sympy as sp
 
 from gpbnb import ledger
 from gpbnb.display.derivation import Derivation
-from gpbnb.ledger.checking import Row
+from gpbnb.ledger.checking import Row, examine_once
 from gpbnb.ledger.finding import Finding, Verdict
 from gpbnb.ledger.registry import Checks
 
@@ -35,7 +35,7 @@ def functions(checks: Checks) -> dict[str, Callable[[], Finding]]:
 
 def examined(entries: Iterable[ledger.Statement]) -> tuple[Row, ...]:
     """What the checks of all topics find of some entries; none fails and none is missing."""
-    rows = ledger.examine(entries)
+    rows = examine_once(entries)
     assert [row.statement.id for row in rows if row.error is not None or row.finding is None] == []
     return rows
 

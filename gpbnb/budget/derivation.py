@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, held, over
+from gpbnb.display.derivation import Derivation, Step, over, unevaluated
 
 N, J = sp.symbols("N j", integer=True, positive=True)
 E, T, TAU, B = sp.symbols("e T tau b", positive=True)
@@ -42,7 +42,7 @@ def averages() -> Derivation:
             ),
             Step(
                 "noise with the correlation $\\mathrm{e}^{-u/\\tau}$: variance of its mean",
-                2 * sp.Integral(held(T - u) * correlation, (u, 0, T)) / T**2,
+                2 * sp.Integral(unevaluated(T - u) * correlation, (u, 0, T)) / T**2,
                 2 * (h - 1 + sp.exp(-h)) / h**2,
             ),
         )

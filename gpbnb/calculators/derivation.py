@@ -117,7 +117,7 @@ def forgotten() -> Derivation:
     )
 
 
-MENDED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
+CORRECTED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
     (name, sp.factor(kalman.count_start(c, g)), sp.factor(kalman.second_coefficient(c, d, g, sign)))
     for name, (c, d), g, sign in (
         ("as printed", kalman.TWICE, sp.S.Zero, -1),
@@ -131,10 +131,10 @@ MENDED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
 
 @cache
 def kalman_bound() -> Definitions:
-    """(125) as printed, mended three times, and with inputs forgotten: coefficients, bound, and digits for a goal."""
+    """(125) as printed, corrected, and with inputs forgotten: coefficients, bound, and digits for a tolerance."""
     f, k, x, u, beta, digits = map(symbol, ("f", "k", "x", "u", "beta", "digits"))
     result = [Definition("beta", unit())]
-    pairs = [(named(a, k="k", n="n", m="m"), named(b, k="k", n="n", m="m")) for _, a, b in MENDED]
+    pairs = [(named(a, k="k", n="n", m="m"), named(b, k="k", n="n", m="m")) for _, a, b in CORRECTED]
     memory = sp.Piecewise((-expm1(k * sp.log(f)) / (1 - f), f < 1), (k, True))
     result.append(Definition("memory", memory, shown=(1 - f**k) / (1 - f)))
     pairs.append((pairs[-1][0], sp.Min(symbol("b4"), 2 * symbol("a5") * symbol("memory"))))

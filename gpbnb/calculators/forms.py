@@ -232,7 +232,7 @@ KALMAN = Calculator(
     lines=tuple(
         Line(name, (f"a{i}", f"b{i}", f"bound{i}", f"digits{i}")) for i, name in enumerate(_KALMAN_NAMES, 1)
     ),
-    sentence="As printed, (125) gives {bound1} and asks for {digits1} digits; with its faults mended {bound4} and "
+    sentence="As printed, (125) gives {bound1} and asks for {digits1} digits; with its faults corrected {bound4} and "
     "{digits4}; with old inputs forgotten {bound5} and {digits5}.",
     figure=Figure(
         "k",
@@ -260,7 +260,7 @@ KALMAN = Calculator(
     },
     shown={
         "k": "k", "n": "n", "m": "m", "x": "‖xₖ‖", "u": "‖u‖", "f": "‖F‖", "b": "b", "t": "t", "goal": "granted",
-        "bound1": "as printed", "digits1": "digits", "bound4": "mended", "digits4": "digits",
+        "bound1": "as printed", "digits1": "digits", "bound4": "corrected", "digits4": "digits",
         "bound5": "forgotten", "digits5": "digits",
     },
     reference=_kalman_reference,

@@ -22,7 +22,7 @@ def first_order(expression: sp.Expr, eps: Sequence[sp.Symbol]) -> sp.Expr:
     return sp.expand(sp.diff(scaled, _ORDER).subs(_ORDER, 0))
 
 
-def held(expression: sp.Expr) -> sp.Expr:
+def unevaluated(expression: sp.Expr) -> sp.Expr:
     """Keep a factor together, so that a step shows where it comes from."""
     return sp.UnevaluatedExpr(expression)
 
@@ -44,7 +44,7 @@ class Step:
     Parameters
     ----------
     name : what the step shows, a few words; ``$...$`` is typeset.
-    left, right : sympy expressions; what is held back from evaluation (UnevaluatedExpr, Sum,
+    left, right : sympy expressions; what is kept unevaluated (UnevaluatedExpr, Sum,
         Limit) is shown so, and evaluated for the check.
     rest : an expression that is seen to be nonnegative under the assumptions of its symbols.
     """

@@ -66,7 +66,7 @@ def colours(count: int, palette: Sequence[str] = COLOURS) -> Sequence[str]:
     return palette[:count]
 
 
-def looks(count: int, markers: str = MARKERS) -> list[tuple[str, str]]:
+def line_styles(count: int, markers: str = MARKERS) -> list[tuple[str, str]]:
     """Marker and colour of each of some curves; see :func:`colours`."""
     return list(zip(markers, colours(count), strict=False))
 

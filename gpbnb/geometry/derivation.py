@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, held, over
+from gpbnb.display.derivation import Derivation, Step, over, unevaluated
 
 P = sp.Symbol("psi", real=True)
 """The roll phase ωt."""
@@ -128,12 +128,26 @@ def deroll() -> Derivation:
     y, z = r[1] - t[1], r[2] - t[2]
     return Derivation(
         (
-            RollStep("(5), first row", held(C) * held(t[1]) - held(S) * held(t[2]), -ALPHA[2]),
-            RollStep("(5), second row", held(S) * held(t[1]) + held(C) * held(t[2]), ALPHA[1]),
-            RollStep("(6), first row", held(C) * held(r[1]) - held(S) * held(r[2]), -THETA[2]),
-            RollStep("(6), second row", held(S) * held(r[1]) + held(C) * held(r[2]), THETA[1]),
-            RollStep("(7), first row", held(C) * held(y) - held(S) * held(z), ALPHA[2] - THETA[2]),
-            RollStep("(7), second row", held(S) * held(y) + held(C) * held(z), THETA[1] - ALPHA[1]),
+            RollStep(
+                "(5), first row", unevaluated(C) * unevaluated(t[1]) - unevaluated(S) * unevaluated(t[2]), -ALPHA[2]
+            ),
+            RollStep(
+                "(5), second row", unevaluated(S) * unevaluated(t[1]) + unevaluated(C) * unevaluated(t[2]), ALPHA[1]
+            ),
+            RollStep(
+                "(6), first row", unevaluated(C) * unevaluated(r[1]) - unevaluated(S) * unevaluated(r[2]), -THETA[2]
+            ),
+            RollStep(
+                "(6), second row", unevaluated(S) * unevaluated(r[1]) + unevaluated(C) * unevaluated(r[2]), THETA[1]
+            ),
+            RollStep(
+                "(7), first row", unevaluated(C) * unevaluated(y) - unevaluated(S) * unevaluated(z), ALPHA[2] - THETA[2]
+            ),
+            RollStep(
+                "(7), second row",
+                unevaluated(S) * unevaluated(y) + unevaluated(C) * unevaluated(z),
+                THETA[1] - ALPHA[1],
+            ),
         )
     )
 
@@ -155,12 +169,12 @@ def printed_deroll() -> Derivation:
         (
             RollStep(
                 "(8), first row, should be $\\alpha_3$",
-                held(C) * held(y) + held(S) * held(z),
+                unevaluated(C) * unevaluated(y) + unevaluated(S) * unevaluated(z),
                 -twice[0] * ALPHA[2] + twice[1] * ALPHA[1],
             ),
             RollStep(
                 "(8), second row, times $-1$, should be $\\alpha_2$",
-                held(S) * held(y) - held(C) * held(z),
+                unevaluated(S) * unevaluated(y) - unevaluated(C) * unevaluated(z),
                 -twice[1] * ALPHA[2] - twice[0] * ALPHA[1],
             ),
             RollStep("mean of the first row over a roll", mean(sp.expand(third)), sp.S.Zero),
@@ -238,22 +252,22 @@ def first_order_effects() -> Derivation:
         (
             RollStep(
                 "telescope, first row: β stands still in the spacecraft, so that the deroll turns it",
-                held(C) * held(t[1]) - held(S) * held(t[2]),
+                unevaluated(C) * unevaluated(t[1]) - unevaluated(S) * unevaluated(t[2]),
                 -ALPHA[2] + sp.expand(derolled(-BETA[2], BETA[1])[0]),
             ),
             RollStep(
                 "gyro, first row: β and γ",
-                held(C) * held(r[1]) - held(S) * held(r[2]),
+                unevaluated(C) * unevaluated(r[1]) - unevaluated(S) * unevaluated(r[2]),
                 -THETA[2] + both,
             ),
             RollStep(
                 "gyro less telescope, with $\\varphi=\\theta-\\alpha$, first row: β cancels, γ does not",
-                held(C) * held(y) - held(S) * held(z),
+                unevaluated(C) * unevaluated(y) - unevaluated(S) * unevaluated(z),
                 -PHI[2] + turned[0],
             ),
             RollStep(
                 "gyro less telescope, second row",
-                held(S) * held(y) + held(C) * held(z),
+                unevaluated(S) * unevaluated(y) + unevaluated(C) * unevaluated(z),
                 PHI[1] + turned[1],
             ),
             RollStep("mean over a roll of what γ leaves, first row", mean(turned[0]), sp.S.Zero),
@@ -271,7 +285,7 @@ def second_order_effects() -> Derivation:
             RollStep(
                 f"{name} row of the difference, mean of its error",
                 mean(sp.collect(error, (C, S, phi))),
-                held(twist) * phi + GAMMA[0] * alpha,
+                unevaluated(twist) * phi + GAMMA[0] * alpha,
             )
             for name, error, phi, alpha in (
                 ("first", errors[0], PHI[1], ALPHA[1]),

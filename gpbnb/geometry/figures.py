@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
+from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, line_styles, loglog
 from gpbnb.geometry import theory
 from gpbnb.geometry.experiment import Year
 from gpbnb.measurement import ARCSEC, MAS, deroll, roll, rotation, theta_of
@@ -178,7 +178,7 @@ def first_rolls(still: Year, rolled: Year, ax: Axes) -> list[Artist]:
 def year_errors(results: Mapping[str, Year], ax: Axes, component: int) -> list[Artist]:
     """Error of φ2 (0) or φ3 (1) over a year, simulated means (points) beside the analysis (lines)."""
     artists: list[Artist] = []
-    for (marker, colour), (name, result) in zip(looks(len(results)), results.items(), strict=True):
+    for (marker, colour), (name, result) in zip(line_styles(len(results)), results.items(), strict=True):
         some = np.linspace(0, len(result.time) - 1, 13).astype(int)
         time = result.time[some]
         simulated = result.phi[some, component] - result.case.drift[component] * time

@@ -9,7 +9,7 @@ from functools import cache
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, held, over, together
+from gpbnb.display.derivation import Derivation, Step, over, together, unevaluated
 
 OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
 MU = sp.Symbol("mu", positive=True)
@@ -347,11 +347,11 @@ def small_mu() -> Derivation:
             Step(
                 "(37), numerator: its cubic term is $\\frac1{12}\\mu^3$, printed $\\frac16\\mu^3$",
                 together(1, cubic),
-                sp.Mul(2, held(1 - MU / 2 + MU**2 / 4 - MU**3 / 12), evaluate=False),
+                sp.Mul(2, unevaluated(1 - MU / 2 + MU**2 / 4 - MU**3 / 12), evaluate=False),
             ),
             Step("(37), result", sp.Limit(walk() / MU, MU, 0), sp.Rational(1, 6)),
             Step("the next term", sp.Limit((walk() - MU / 6) / MU**3, MU, 0), sp.Rational(-1, 360)),
-            Step("(38) to (39)", sigma * sp.sqrt(held(OMEGA / f) / (6 * f)), sp.sqrt(OMEGA / 6) / f * sigma),
+            Step("(38) to (39)", sigma * sp.sqrt(unevaluated(OMEGA / f) / (6 * f)), sp.sqrt(OMEGA / 6) / f * sigma),
         )
     )
 

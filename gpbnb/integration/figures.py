@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.display.style import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend, loglog, looks
+from gpbnb.display.style import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend, line_styles, loglog
 from gpbnb.display.tables import arithmetic
 from gpbnb.integration import theory
 from gpbnb.integration.experiment import Accuracy, Meeting, Simulation, Sweep
@@ -162,7 +162,7 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
     n = np.geomspace(1, max(run.n[-1] for run in runs), 200)
     unit = runs[0].process.sigma / runs[0].f_c
     walk = n * float(theory.walk_factor(mu))
-    for run, (marker, colour) in zip(runs, looks(len(runs)), strict=True):
+    for run, (marker, colour) in zip(runs, line_styles(len(runs)), strict=True):
         artists += ax.plot(run.n, np.sqrt(run.variance) / unit, marker, color=colour, label=run.rule.name)
     artists += ax.plot(n, np.sqrt(theory.error_variance(n, mu)), color=BOUND, label="exact, trapezoidal")
     artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=BOUND, ls=":", label="rectangular")
@@ -216,7 +216,9 @@ def meeting(result: Meeting, ax: Axes) -> list[Artist]:
     artists: list[Artist] = []
     artists += ax.plot(result.rates, result.discretization[0], "o", color=REFERENCE, label="discretization")
     artists += ax.plot(rates, result.theory(result.formats[0], rates)[0], color=REFERENCE)
-    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, looks(len(result.formats), "sD^vo"), strict=True)):
+    for i, (fmt, (marker, colour)) in enumerate(
+        zip(result.formats, line_styles(len(result.formats), "sD^vo"), strict=True)
+    ):
         artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {arithmetic(fmt)}")
         artists += ax.plot(rates, result.theory(fmt, rates)[1], color=colour, lw=1)
     loglog(ax)
@@ -230,7 +232,9 @@ def totals(result: Meeting, ax: Axes) -> list[Artist]:
     """Both errors together, and the best rate (star) of each format."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     artists: list[Artist] = []
-    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, looks(len(result.formats), "sD^vo"), strict=True)):
+    for i, (fmt, (marker, colour)) in enumerate(
+        zip(result.formats, line_styles(len(result.formats), "sD^vo"), strict=True)
+    ):
         artists += ax.plot(result.rates, result.total[i], marker, color=colour, label=arithmetic(fmt))
         artists += ax.plot(rates, result.theory(fmt, rates)[2], color=colour, lw=1)
         best = theory.best_rate(result.omega_bw, result.duration, fmt)

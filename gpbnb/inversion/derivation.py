@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, errors, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, errors, first_order, over, together, unevaluated
 
 EPSILON = sp.Symbol("epsilon")
 N, J, K = sp.symbols("n j k", integer=True, positive=True)
@@ -37,21 +37,25 @@ def first_approach() -> Derivation:
     matrix_residual = (A + DELTA) * (inverse + ERROR) - 1
     return Derivation(
         (
-            Step("(35), from $r = A\\hat h - u$ and $u = Ah$", inverse * held(residual), H_HAT - H),
-            Step("(38): the same for all columns, $\\hat h_j$ those of $A^{-1}+E$", inverse * held(A * ERROR), ERROR),
+            Step("(35), from $r = A\\hat h - u$ and $u = Ah$", inverse * unevaluated(residual), H_HAT - H),
+            Step(
+                "(38): the same for all columns, $\\hat h_j$ those of $A^{-1}+E$",
+                inverse * unevaluated(A * ERROR),
+                ERROR,
+            ),
             Step(
                 "(42), from $r = (A+\\Delta)\\hat h - u$",
-                inverse * held(changed) - inverse * DELTA * H_HAT,
+                inverse * unevaluated(changed) - inverse * DELTA * H_HAT,
                 H_HAT - H,
             ),
             Step(
                 "before (43), from $R = (A+\\Delta)(A^{-1}+E) - I$: exact with the computed inverse $A^{-1}+E$",
-                inverse * held(matrix_residual) - inverse * DELTA * held(inverse + ERROR),
+                inverse * unevaluated(matrix_residual) - inverse * DELTA * unevaluated(inverse + ERROR),
                 ERROR,
             ),
             Step(
                 "what $\\approx$ drops, of second order",
-                inverse * DELTA * held(inverse + ERROR) - inverse * DELTA * inverse,
+                inverse * DELTA * unevaluated(inverse + ERROR) - inverse * DELTA * inverse,
                 inverse * DELTA * ERROR,
             ),
         )
@@ -78,7 +82,7 @@ def first_approach_norms() -> Derivation:
             ),
             Step(
                 "from the computed inverse alone: $e = (x + e)\\,\\rho$, since $E = A^{-1}R$ and $a \\le x + e$",
-                held(x + posterior) * rho,
+                unevaluated(x + posterior) * rho,
                 posterior,
             ),
         )
@@ -131,13 +135,13 @@ def one_step() -> Derivation:
         (
             Step(
                 "(47) with one $\\epsilon$ for all, as printed",
-                together(old * (1 + EPSILON), minus(held(product) * (1 + 3 * EPSILON))),
+                together(old * (1 + EPSILON), minus(unevaluated(product) * (1 + 3 * EPSILON))),
                 new + 3 * EPSILON * new - 2 * EPSILON * old,
             ),
             Step(
                 "the same with an error for each rounding",
                 entry_error(),
-                together(new * held(e1 + e2 + e3), minus(old * held(e1 + e2))),
+                together(new * unevaluated(e1 + e2 + e3), minus(old * unevaluated(e1 + e2))),
             ),
             Step(
                 "where $3a(1) = 2a(0)$, (47) is zero and the error is not",
@@ -146,14 +150,14 @@ def one_step() -> Derivation:
             ),
             Step(
                 "its bound $|a(1)| + 2|p|$ is at most that of (61): let $|p| = |a(0)| + |a(1)| - w$, $w\\ge0$",
-                3 * size + 2 * held(p + w - size),
+                3 * size + 2 * unevaluated(p + w - size),
                 size + 2 * p,
                 2 * w,
             ),
             Step(
                 "to every order, $a(0)$ written with the computed $\\hat a(1)$: its error",
                 together(done, minus(before - exact)),
-                together(over(done * e3, 1 + e3), minus(exact * held((1 + e1) * (1 + e2) - 1))),
+                together(over(done * e3, 1 + e3), minus(exact * unevaluated((1 + e1) * (1 + e2) - 1))),
             ),
         )
     )
@@ -176,18 +180,18 @@ def reductions() -> Derivation:
         (
             Step(
                 "one step; in brackets its $\\tilde a_{ij}(k)$",
-                together(row, -column, held(column - row + product)),
+                together(row, -column, unevaluated(column - row + product)),
                 product,
             ),
             Step(
                 "$s(r) = a(0) - \\hat a(r) + \\tilde s(r)$ with $\\tilde s(r) = \\tilde a(1)+\\dots+\\tilde a(r)$, "
                 "from $r$ to $r+1$",
-                together(held(so_far), held(a(r) - a(r + 1) + change(r + 1))),
-                together(a(0) - a(r + 1), held(total(r) + change(r + 1))),
+                together(unevaluated(so_far), unevaluated(a(r) - a(r + 1) + change(r + 1))),
+                together(a(0) - a(r + 1), unevaluated(total(r) + change(r + 1))),
             ),
             Step(
                 "entry $(i,j)$ of $L\\hat A_T$: the last product, of $r = \\min(i,j)-1$, is $\\hat a_{ij}(r)$ itself",
-                together(held(so_far), a(r)),
+                together(unevaluated(so_far), a(r)),
                 a(0) + total(r),
             ),
         )
@@ -242,18 +246,18 @@ def perturbed_system() -> Derivation:
         (
             Step(
                 "(68), exact with $A^{-1}$ and the computed solution",
-                A**-1 * together(held(change), minus(DELTA * solved)),
+                A**-1 * together(unevaluated(change), minus(DELTA * solved)),
                 D_X,
             ),
             Step(
                 "(68), exact with $\\hat A^{-1} = (A+\\Delta)^{-1}$ and the true solution, cleared of the inverse",
-                together(held(change), minus(DELTA * X)),
+                together(unevaluated(change), minus(DELTA * X)),
                 hat * D_X,
             ),
             Step(
                 "(68) as printed, with $\\hat A^{-1}$ and the computed solution, lacks "
                 "$\\hat A^{-1}\\Delta\\,\\Delta x$, of second order",
-                together(held(change), minus(DELTA * solved)),
+                together(unevaluated(change), minus(DELTA * solved)),
                 together(hat * D_X, minus(DELTA * D_X)),
             ),
         )
@@ -266,17 +270,17 @@ def two_systems() -> Derivation:
     :math:`L A_T = A + \tilde A` and :math:`L b_T = b + \tilde b`, all of it computed but L; back substitution solves
     :math:`(A_T + \Delta A)\hat x = b_T + \Delta b` exactly.
     """
-    upper, right = L**-1 * held(A + A_TILDE), L**-1 * held(B + B_TILDE)
+    upper, right = L**-1 * unevaluated(A + A_TILDE), L**-1 * unevaluated(B + B_TILDE)
     in_a = together(B_TILDE + L * DELTA_B, minus((A_TILDE + L * DELTA_A) * X_HAT))
     in_t = together(L**-1 * B_TILDE + DELTA_B, minus((L**-1 * A_TILDE + DELTA_A) * X_HAT))
     return Derivation(
         (
             Step(
                 "(91) as it must be: the matrix whose solution was found",
-                L * held(upper + DELTA_A),
+                L * unevaluated(upper + DELTA_A),
                 A + A_TILDE + L * DELTA_A,
             ),
-            Step("(92) as it must be: its right side", L * held(right + DELTA_B), B + B_TILDE + L * DELTA_B),
+            Step("(92) as it must be: its right side", L * unevaluated(right + DELTA_B), B + B_TILDE + L * DELTA_B),
             Step(
                 "what (91) leaves out",
                 together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)),
@@ -287,7 +291,7 @@ def two_systems() -> Derivation:
                 together(upper, DELTA_A, minus(L**-1 * A)),
                 L**-1 * A_TILDE + DELTA_A,
             ),
-            Step("either way, (94) is the same", A**-1 * in_a, A**-1 * L * held(in_t)),
+            Step("either way, (94) is the same", A**-1 * in_a, A**-1 * L * unevaluated(in_t)),
         )
     )
 
@@ -305,7 +309,7 @@ def transfer_cost() -> Derivation:
             Step(
                 "a term of the size of (59) has room for two products, $u = |\\hat a(k-1)|$, $v = |\\hat a(k)|$",
                 3 * new + 2 * old,
-                2 * held(new + old - w),
+                2 * unevaluated(new + old - w),
                 new + 2 * w,
             ),
             Step(
@@ -332,7 +336,7 @@ def inverse_norms() -> Derivation:
             Step("(97): (96) over $x$", over(x * c, x), c),
             Step(
                 "(96) to every order: $e = (x + e)\\,c$, since $\\|A^{-1}\\| \\le x + e$, has this solution",
-                held(x + strict) * c,
+                unevaluated(x + strict) * c,
                 strict,
             ),
             Step("what (96) leaves out, relative to it", over(strict - x * c, x * c), c / (1 - c)),
@@ -441,14 +445,20 @@ def linear(expression: sp.Expr) -> sp.Expr:
 def printed_75() -> sp.Expr:
     """First-order error of x̂_2, (75)."""
     a, (_, _, x3), b, _ = triangle()
-    return EPSILON * (2 * held(b[1]) - 4 * a[1, 2] * x3) / a[1, 1]
+    return EPSILON * (2 * unevaluated(b[1]) - 4 * a[1, 2] * x3) / a[1, 1]
 
 
 def printed_before_78() -> sp.Expr:
     """First-order error of x̂_1, before (78)."""
     a, (_, x2, x3), b, _ = triangle()
     a12, a13, a22, a23 = a[0, 1], a[0, 2], a[1, 1], a[1, 2]
-    inside = 3 * held(b[0]) - 4 * a12 * x2 - 2 * a12 / a22 * held(b[1]) + 4 * a12 * a23 / a22 * x3 - 4 * a13 * x3
+    inside = (
+        3 * unevaluated(b[0])
+        - 4 * a12 * x2
+        - 2 * a12 / a22 * unevaluated(b[1])
+        + 4 * a12 * a23 / a22 * x3
+        - 4 * a13 * x3
+    )
     return EPSILON * inside / a[0, 0]
 
 
@@ -482,7 +492,7 @@ def back_substitution() -> Derivation:
     e = 1 + EPSILON
     return Derivation(
         (
-            Step("(72)-(74): the last row", a[2, 2] * held(b3 * e / a[2, 2]), b3 * e),
+            Step("(72)-(74): the last row", a[2, 2] * unevaluated(b3 * e / a[2, 2]), b3 * e),
             Step("(75): error of $\\hat x_2$, to first order", linear(y2 - x[1]), printed_75()),
             Step(
                 "(77) with nothing dropped: $a_{22}\\hat x_2$; to first order the powers are $1+2\\epsilon$, "

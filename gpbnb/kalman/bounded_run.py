@@ -59,7 +59,7 @@ class BoundedRun(Run):
         self.stored = model if fmt is None else model.rounded(fmt)
         given = self.stored.to_float()
         self._plain = given["Phi"], given["H"], given["Q"], given["R"]
-        self._exact = Run(self.stored, None, Form.INNOVATION, ())._matrices
+        self._exact = Run(self.stored, None, Form.INNOVATION, ()).matrices
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
         zero_n, size = np.zeros(n), np.zeros((n, n))
@@ -80,11 +80,11 @@ class BoundedRun(Run):
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped or not len(z):
             return
-        packed = self._packed(z)
+        packed = self.as_packed(z)
         values = double_doubles(self.exactly(packed))
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         outputs = (self.checkpoint_steps, (self.X, self.G, self.C), self.bounds, self.notes)
-        inputs = (self.tag, int(self.form), self._matrices, self._exact, self._plain)
+        inputs = (self.tag, int(self.form), self.matrices, self._exact, self._plain)
         try:
             self.bound = advance_bounded(
                 *inputs, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *outputs

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, first_order, over, together, unevaluated
 
 N, M, K = sp.symbols("n m k", integer=True, positive=True)
 NTH, J = sp.symbols("i j", integer=True, positive=True)
@@ -105,7 +105,7 @@ def propagated() -> Derivation:
             Step(
                 "(111) of step $k+1$ on $x_k = \\Psi_k x_0 + s_k$: $\\Psi_{k+1} = F_{k+1}\\Psi_k$, "
                 "$s_{k+1} = F_{k+1}s_k + u_{k+1}$",
-                F * held(psi * x0 + s) + u,
+                F * unevaluated(psi * x0 + s) + u,
                 together(F * psi * x0, F * s + u),
             ),
         )
@@ -148,8 +148,8 @@ def general() -> Derivation:
     return Derivation(
         (
             Step("what follows (118): $n+1$ more roundings of each loop", c, together(ONCE[0], N + 1)),
-            Step("(119), $x_0$", 3 * held(c), 3 * (7 * N + 3 * M + 6)),
-            Step("(119), $u_1$", together(2 * held(c), d), 18 * N + 9 * M + 17),
+            Step("(119), $x_0$", 3 * unevaluated(c), 3 * (7 * N + 3 * M + 6)),
+            Step("(119), $u_1$", together(2 * unevaluated(c), d), 18 * N + 9 * M + 17),
             Step("(119), $u_2$", together(c, d), 11 * N + 6 * M + 11),
             Step("(119), $u_3$", together(ONCE[1], 1), 4 * N + 3 * M + 5),
             *(
@@ -160,7 +160,7 @@ def general() -> Derivation:
             Step(
                 "(124): the second coefficient",
                 second_coefficient(c, d).subs(K, 4),
-                together(4 * held(3 * N + 1), 6 * held(7 * N + 3 * M + 6)),
+                together(4 * unevaluated(3 * N + 1), 6 * unevaluated(7 * N + 3 * M + 6)),
             ),
             Step("(125), first coefficient, every $k$", start, first),
             Step("(125), second coefficient, every $k$", second_coefficient(c, d), second),
@@ -180,7 +180,7 @@ def corrected() -> Derivation:
         (
             Step(
                 "errors of their own: with $T_0 = x_k - T_i$, the worst is $a_0|x_k| + (a_0+a_i)|T_i|$",
-                one * held(x - t) + own * t,
+                one * unevaluated(x - t) + own * t,
                 together(one * x, (own - one) * t),
             ),
             Step("counted once: first coefficient", count_start(c), K * ONCE[0]),
@@ -202,7 +202,7 @@ def corrected() -> Derivation:
             Step(
                 "and second: of third order in $k$",
                 sp.limit(second_coefficient(c, d, GROWTH) / K**3, K, sp.oo),
-                held(GROWTH) / 6,
+                unevaluated(GROWTH) / 6,
             ),
         )
     )
@@ -223,7 +223,7 @@ def scalar_conditions() -> Derivation:
     allowed = n + m + 1
 
     def may(kappa: sp.Expr) -> sp.Expr:
-        return over(together(n + 1, (n + m + 1) * held(kappa)), together(1, -kappa))
+        return over(together(n + 1, (n + m + 1) * unevaluated(kappa)), together(1, -kappa))
 
     return Derivation(
         (
@@ -234,7 +234,7 @@ def scalar_conditions() -> Derivation:
             ),
             Step(
                 "and not beyond: possible minus allowed, times $1-\\kappa$",
-                held(together(may(kappa), -allowed)) * held(1 - kappa),
+                unevaluated(together(may(kappa), -allowed)) * unevaluated(1 - kappa),
                 6 * kappa - 1,
             ),
             Step(
@@ -257,7 +257,7 @@ def smallest() -> Derivation:
     p, gain = 1 - 1 / (1 + r), 1 / (1 + r)
     return Derivation(
         (
-            Step("exact covariance", held(1) - over(1, 1 + r), r / (1 + r)),
+            Step("exact covariance", unevaluated(1) - over(1, 1 + r), r / (1 + r)),
             Step("both forms of (99) agree", over(p, r), gain),
             Step("(105): error of $\\hat P = 0$ over its bound", over(p, 6 * BETA * p), 1 / (6 * BETA)),
             Step("(108): error of $\\hat K = 0$ over its bound", over(gain, 9 * BETA * gain), 1 / (9 * BETA)),
@@ -286,31 +286,37 @@ def contraction() -> Derivation:
     one = sp.S.One
     s = h * a * ht + r
     after_a, after_b = a - k * h * a, b - b * ht * lt
-    zero_k = held(after_a * ht - k * r)
-    zero_l = held(h * after_b - r * lt)
+    zero_k = unevaluated(after_a * ht - k * r)
+    zero_l = unevaluated(h * after_b - r * lt)
     return Derivation(
         (
             Step("the two forms of (99) are one: $AH'-KS$ is zero where $(A-KHA)H'-KR$ is", a * ht - k * s, zero_k),
-            Step("and $HB-TL'$ where $H(B-BH'L')-RL'$ is", h * b - held(h * b * ht + r) * lt, zero_l),
+            Step("and $HB-TL'$ where $H(B-BH'L')-RL'$ is", h * b - unevaluated(h * b * ht + r) * lt, zero_l),
             Step(
                 "two updates, subtracted; the last two terms are zero",
-                after_a - after_b,  # sympy sets a held difference without its brackets
-                together(held(one - k * h) * held(a - b) * held(one - ht * lt), zero_k * lt, -k * zero_l),
+                after_a - after_b,  # sympy sets an unevaluated difference without its brackets
+                together(
+                    unevaluated(one - k * h) * unevaluated(a - b) * unevaluated(one - ht * lt), zero_k * lt, -k * zero_l
+                ),
             ),
             Step(
                 "two gains, subtracted; the last two terms are zero",
-                held(one - o * h) * held(a - b) * ht,
-                together(held(k - o) * held(s), held(a * ht - k * s), held(o * r - (b - o * h * b) * ht)),
+                unevaluated(one - o * h) * unevaluated(a - b) * ht,
+                together(
+                    unevaluated(k - o) * unevaluated(s),
+                    unevaluated(a * ht - k * s),
+                    unevaluated(o * r - (b - o * h * b) * ht),
+                ),
             ),
             Step(
                 "two closed loops, subtracted: $F_k - A_k = (K-L)H\\Phi = F_kE_{k-1}G_k$",
-                held(one - o * h) * phi - held(one - k * h) * phi,
-                held(k - o) * h * phi,
+                unevaluated(one - o * h) * phi - unevaluated(one - k * h) * phi,
+                unevaluated(k - o) * h * phi,
             ),
             Step(
                 "two states, $\\Phi\\hat x + K\\hat\\nu$ and $\\Phi(\\hat x-e) + L(\\hat\\nu + H\\Phi e)$, subtracted",
-                together(k * nu, phi * e, -o * held(nu + h * phi * e)),
-                together(held(one - o * h) * phi * e, held(k - o) * nu),
+                together(k * nu, phi * e, -o * unevaluated(nu + h * phi * e)),
+                together(unevaluated(one - o * h) * phi * e, unevaluated(k - o) * nu),
             ),
         )
     )

@@ -57,11 +57,11 @@ class Run:
             )
         #: In which arithmetic the compiled loops work.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused)
-        Phi, H, Q, R = (self._packed(each) for each in (model.Phi, model.H, model.Q, model.R))
+        Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
-        identity = self._packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
-        self.x, self.P = self._packed(model.x0.reshape(n, 1)), self._packed(model.P0)
+        identity = self.as_packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
+        self.x, self.P = self.as_packed(model.x0.reshape(n, 1)), self.as_packed(model.P0)
         RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, 1), (n, m), (n, n))
@@ -76,7 +76,7 @@ class Run:
                 f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
                 "this format; use more digits, or add a little to the diagonals of Q and P0"
             )
-        self._matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
+        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
 
     @property
     def steps(self) -> int:
@@ -99,15 +99,15 @@ class Run:
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped:
             return
-        packed = self._packed(z)
+        packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
-            advance(self.tag, int(self.form), self._matrices, packed, self.steps, self.x, self.P, *outputs)
+            advance(self.tag, int(self.form), self.matrices, packed, self.steps, self.x, self.P, *outputs)
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1
 
-    def _packed(self, values: Any) -> NDArray[Any]:
+    def as_packed(self, values: Any) -> NDArray[Any]:
         """Numbers, each rounded into the format, as the compiled loops take them."""
         if self.fmt is None:
             entries = np.asarray(values)
@@ -144,7 +144,7 @@ class Run:
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Gains and covariances that the factors, and the gains of one measurement after the other, stand for."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
-        H, UR, n = self.exactly(self._matrices[2]), self.exactly(self.UR), self.model.n
+        H, UR, n = self.exactly(self.matrices[2]), self.exactly(self.UR), self.model.n
         unit = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
         for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
             h, ur = H[step % len(H)], UR[step % len(UR)]

@@ -1,11 +1,11 @@
-"""How many digits does a filter of one's own need?"""
+"""The number of digits that your own filter needs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,13 @@ from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee.bound import guarantee
+from gpbnb.kalman.guarantee.envelope import Limits
+from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation
 
-Basis = Literal["emulation", "bound"]
+Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,7 @@ def required_precision(
     z: Any = None,
     seed: int = 0,
     progress: bool = False,
+    within: Limits | None = None,
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a tolerance.
 
@@ -83,7 +87,11 @@ def required_precision(
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
         the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
         contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
-        asks for more digits.
+        asks for more digits. "guarantee" bounds the error for every measurement sequence within limits, and for ever
+        (:mod:`gpbnb.kalman.guarantee`); "probable" takes three standard deviations of the error that independent
+        roundings would cause. Neither depends on `z` or `steps`.
+    within : limits on the filter without rounding, for "guarantee" and "probable"; see
+        :func:`gpbnb.kalman.guarantee.bound.limits`.
     z : (steps, m), measurements; by default simulated by the model, from its first estimate.
     seed : of the simulation.
     progress : show a bar, a tick a precision.
@@ -96,6 +104,9 @@ def required_precision(
     tolerances = _checked(model, tolerance, base, form, basis)
     if not isinstance(steps, (int, np.integer)) or steps < 1:
         raise ValueError(f"got {steps!r} steps; needed a whole number, at least 1")
+    for_ever = basis in ("guarantee", "probable")
+    if for_ever and within is None:
+        raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
     if z is None:
         z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
@@ -104,11 +115,13 @@ def required_precision(
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
 
         def meets(fmt: FloatFormat) -> bool:
-            tried[fmt.precision], why[fmt.precision] = _error_over_tolerance(
-                model, measured, fmt, form, checkpoint_steps, true, tolerances
-            )
+            if within is not None and for_ever:
+                ratio, reason = _guaranteed(model, fmt, form, within, tolerances, basis)
+            else:
+                ratio, reason = _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)
+            tried[fmt.precision], why[fmt.precision] = ratio, reason
             bar.update()
-            return tried[fmt.precision] <= 1
+            return ratio <= 1
 
         found = smallest_precision(meets, base, rounding, least=2, largest=LARGEST_PRECISION[base])
     reasons = [f"in {digits} digits {reason}" for digits, reason in sorted(why.items()) if reason]
@@ -136,6 +149,8 @@ def survey(
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
     tolerances, measured = _checked(model, tolerance, base, form, basis), _measured(model, z)
+    if basis not in ("emulation", "bound"):
+        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
     if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION[base]]:
         raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION[base]}")
@@ -160,8 +175,8 @@ def _checked(model: LinearModel, tolerance: Any, base: int, form: Form, basis: s
         )
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
-    if basis not in ("emulation", "bound"):
-        raise ValueError(f'got basis {basis!r}; needed "emulation" or "bound"')
+    if basis not in get_args(Basis):
+        raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
     if base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     if not isinstance(form, Form):
@@ -213,3 +228,23 @@ def _error_over_tolerance(
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
     ratio = float((np.abs(errors[:, asked]) / tolerances[asked]).max())
     return ratio, "the bound says nothing" if math.isinf(ratio) else ""
+
+
+def _guaranteed(
+    model: LinearModel,
+    fmt: FloatFormat,
+    form: Form,
+    within: Limits,
+    tolerances: NDArray[np.float64],
+    basis: Basis,
+) -> tuple[float, str]:
+    """Guaranteed error, or three times the probable one, over tolerance; infinity and the reason if there is none."""
+    asked = np.isfinite(tolerances)
+    try:
+        found = guarantee(model, fmt, within, form, horizon=1)
+    except ValueError as error:
+        return math.inf, str(error)
+    if not found.for_ever:
+        return math.inf, found.why
+    errors = found.bound if basis == "guarantee" else 3 * probable_error(found)
+    return float((errors[asked] / tolerances[asked]).max()), ""

@@ -52,12 +52,12 @@ class Records(Run):
         if np.shape(H)[1:] != (self.model.m, self.model.n):
             raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
         if decimals is not None and self.fmt is not None and self.fmt.base == 10:
-            packed = self._packed(np.rint(H * 10.0**decimals))
+            packed = self.as_packed(np.rint(H * 10.0**decimals))
             packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
         else:
-            packed = self._packed(H)
+            packed = self.as_packed(H)
         transposed = np.ascontiguousarray(np.swapaxes(packed, 1, 2))
-        self._matrices = (*self._matrices[:2], packed, transposed, *self._matrices[4:])
+        self.matrices = (*self.matrices[:2], packed, transposed, *self.matrices[4:])
 
     def carry(self, z: NDArray[np.float64], states: int) -> NDArray[np.float64]:
         """Take the next measurements of all records.
@@ -80,7 +80,7 @@ class Records(Run):
         kept = (self.checkpoint_steps, (self.X, self.G, self.C), self.notes)
         try:
             advance_records(
-                self.tag, int(self.form), self._matrices, self._packed(z), before, self.x, self.P, *kept, out
+                self.tag, int(self.form), self.matrices, self.as_packed(z), before, self.x, self.P, *kept, out
             )
         except (OverflowError, ZeroDivisionError):
             self.notes[STOPPED] = self.steps + 1

@@ -113,7 +113,7 @@ _KEY_COLUMNS = (
     Column("model", "text", choices=MODELS),
     Column("base", "integer", 2, 16),
     Column("precision", "integer", 0, 53),
-    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding)),
+    Column("rounding", "text", choices=tuple(rounding.value for rounding in Rounding.documented())),
     Column("form", "text", choices=tuple(form.name.lower() for form in Form)),
     Column("step", "integer", 1, YEAR),
 )

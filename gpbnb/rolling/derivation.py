@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, held
+from gpbnb.display.derivation import Derivation, Step, unevaluated
 
 T = sp.Symbol("T", positive=True)
 TIME, THETA = sp.symbols("t theta", real=True)
@@ -30,7 +30,7 @@ def one_dimension() -> Derivation:
         (
             Step(
                 "(3), first against last line; the middle one lacks $\\cos\\omega_rt$",
-                held(rolled) * held(sp.cos(phi + THETA)),
+                unevaluated(rolled) * unevaluated(sp.cos(phi + THETA)),
                 SIGNAL * sp.cos(THETA) / 2 + SIGNAL * sp.cos(2 * phi + THETA) / 2 + NOISE * sp.cos(phi + THETA),
             ),
             Step(
@@ -42,7 +42,7 @@ def one_dimension() -> Derivation:
             ),
             Step(
                 "(10), from which (11) keeps the first term",
-                held(rolled) * held(sp.cos(phi + OFF * TIME)),
+                unevaluated(rolled) * unevaluated(sp.cos(phi + OFF * TIME)),
                 SIGNAL * sp.cos(OFF * TIME) / 2
                 + SIGNAL * sp.cos(2 * phi + OFF * TIME) / 2
                 + NOISE * sp.cos(phi + OFF * TIME),
@@ -137,12 +137,12 @@ def filters() -> Derivation:
             Step(
                 "so lag and noise of the single pole, by its bandwidth",
                 (k * tau) ** 2 + n0 / (4 * tau),
-                error.subs(b, held(1 / (4 * tau))),
+                error.subs(b, unevaluated(1 / (4 * tau))),
             ),
             Step(
                 "and of the moving average: the same function",
                 (k * length / 2) ** 2 + n0 / (2 * length),
-                error.subs(b, held(1 / (2 * length))),
+                error.subs(b, unevaluated(1 / (2 * length))),
             ),
             Step(
                 "never less than at $B=B_0$, where $k^2 = 8N_0B_0^3$",
@@ -152,7 +152,7 @@ def filters() -> Derivation:
             ),
             Step(
                 "which is",
-                sp.Rational(3, 2) * n0 * held(sp.cbrt(k**2 / (8 * n0))),
+                sp.Rational(3, 2) * n0 * unevaluated(sp.cbrt(k**2 / (8 * n0))),
                 sp.Rational(3, 4) * sp.cbrt(k * n0) ** 2,
             ),
         )
@@ -174,15 +174,15 @@ def ramp_spectrum() -> Derivation:
                 sp.Integral(k * TIME * sp.exp(-s * TIME), (TIME, 0, sp.oo)),
                 k / s**2,
             ),
-            Step("its sign at $s = i\\omega$", k / held(sp.I * w) ** 2, -k / w**2),
+            Step("its sign at $s = i\\omega$", k / unevaluated(sp.I * w) ** 2, -k / w**2),
             Step(
                 "a record of length $T$, with $z=\\omega T/2$",
-                held(real) ** 2 + held(imaginary) ** 2,
+                unevaluated(real) ** 2 + unevaluated(imaginary) ** 2,
                 T**4 / 4 * (j0**2 + j1**2),
             ),
             Step(
                 "at a whole number $m$ of cycles, $z=\\pi m$: it falls as $\\omega^{-2}$",
-                (T**4 / 4 * (j0**2 + j1**2)).subs(z, held(sp.pi * m)),
+                (T**4 / 4 * (j0**2 + j1**2)).subs(z, unevaluated(sp.pi * m)),
                 T**4 / (4 * sp.pi**2 * m**2),
             ),
         )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, errors, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, errors, first_order, over, together, unevaluated
 
 BETA = sp.Symbol("beta", positive=True)
 N, M, J, K = sp.symbols("n m j k", integer=True, positive=True)
@@ -146,7 +146,7 @@ def roundings() -> Derivation:
             Step(
                 "chopping, from $k$ to $k+1$: $(1-k\\beta)(1-\\beta) \\ge 1-(k+1)\\beta$, so that the"
                 " error $1 - (1-\\beta)^k$ is never above $k\\beta$",
-                held(1 - K * BETA) * held(1 - BETA),
+                unevaluated(1 - K * BETA) * unevaluated(1 - BETA),
                 1 - (K + 1) * BETA,
                 K * BETA**2,
             ),
@@ -164,12 +164,12 @@ def roundings() -> Derivation:
             Step(
                 "$(1+\\gamma_k)(1+\\beta) \\le 1+\\gamma_{k+1}$, cleared of denominators",
                 1 - K * BETA,
-                held(1 + BETA) * held(1 - (K + 1) * BETA),
+                unevaluated(1 + BETA) * unevaluated(1 - (K + 1) * BETA),
                 (K + 1) * BETA**2,
             ),
             Step(
                 "$(1+\\gamma_j)(1+\\gamma_k) \\le 1+\\gamma_{j+k}$, cleared of denominators",
-                held(1 - j * BETA) * held(1 - K * BETA),
+                unevaluated(1 - j * BETA) * unevaluated(1 - K * BETA),
                 1 - (j + K) * BETA,
                 j * K * BETA**2,
             ),
@@ -203,7 +203,7 @@ def matrix_sums() -> Derivation:
             Step(
                 "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, without anything left out",
                 BETA * c,
-                held(c) * held(BETA - w),
+                unevaluated(c) * unevaluated(BETA - w),
                 c * w,
             ),
         )
@@ -268,7 +268,7 @@ def chains() -> Derivation:
     d_i β times the norm of what was computed.
     """
     d, before = sp.symbols("d s", positive=True)
-    so_far = held(BETA * before)
+    so_far = unevaluated(BETA * before)
     return Derivation(
         (
             Step(
@@ -297,7 +297,7 @@ def examples() -> Derivation:
         (
             Step(
                 "the computed result; the last term is of second order",
-                held(abc + e + d) * (1 + eps),
+                unevaluated(abc + e + d) * (1 + eps),
                 abc + d + e + (abc + d) * eps + e * eps,
             ),
         )

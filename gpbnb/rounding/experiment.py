@@ -1,6 +1,6 @@
-"""What does happen: sums and products computed in a format, beside the bounds of their errors.
+"""Sums and products computed in an emulated format, compared with the bounds of their errors.
 
-Errors and bounds are compared as exact Fractions: a violation is one, however small.
+Errors and bounds are compared as exact Fractions, so even the smallest violation counts.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, integers
 from gpbnb.rounding import theory
+from gpbnb.rounding.paths import best_path, exact_terms, sum_table
 
 Bounds = Mapping[str, Callable[[], Fraction]]
 
@@ -392,7 +393,7 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
     log_error = np.concatenate([np.zeros((1, states)), log_error])
     trials = []
     for sign in (1, -1):  # errors upwards, errors downwards
-        path = _best_path([sign * log_error] * factors, end)
+        path = best_path([sign * log_error] * factors, end)
         trials.append(product_trial(fmt.array([int(start[i]) for i in path]), fmt.array([])))
     return max(trials, key=lambda trial: trial.error)
 
@@ -417,18 +418,18 @@ def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: 
     """
     if terms < 2 or not len(exponents):
         raise ValueError(f"got {terms} terms, {len(exponents)} exponents; needed at least 2 and 1")
-    factors = _terms(fmt, exponents, products)
+    factors = exact_terms(fmt, exponents, products)
     exact = np.array(list(factors), dtype=object)
     choices = fmt.array(exact)
     size = abs(exact).astype(np.float64)
     own_error = (choices.to_fractions() - exact).astype(np.float64)
-    end, error = _sum_table(choices, terms)
+    end, error = sum_table(choices, terms)
     weights = theory.dot_weights(terms) if products else theory.sum_weights(terms)
     bound = "(26)" if products else "weights"
     best: Trial | None = None
     while True:
         price = float(fmt.unit_roundoff) * (best.ratio(bound) if best else 0.0)
-        path = _best_path([error + own_error - price * w * size for w in weights], end)
+        path = best_path([error + own_error - price * w * size for w in weights], end)
         pairs = [factors[exact[choice]] for choice in path]
         if products:
             trial = dot_trial(*(fmt.array(list(side)) for side in zip(*pairs, strict=True)))
@@ -437,66 +438,6 @@ def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: 
         if best and trial.ratio(bound) <= best.ratio(bound):
             return best
         best = trial
-
-
-def _terms(fmt: FloatFormat, exponents: Sequence[int], products: bool) -> dict[Fraction, tuple[Fraction, int]]:
-    """Exact terms and two numbers of the format that each is the product of."""
-    significands = range(fmt.base ** (fmt.precision - 1), fmt.base**fmt.precision)
-    terms: dict[Fraction, tuple[Fraction, int]] = {Fraction(0): (Fraction(0), 0)}
-    for e in exponents:
-        for m in significands:
-            for k in significands if products else [1]:
-                for sign in (1, -1):
-                    x = sign * m * Fraction(fmt.base) ** e
-                    terms.setdefault(x * k, (x, k))
-    return terms
-
-
-def _sum_table(choices: FloatArray, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Where adding each choice to each partial sum leads, and the error of the addition.
-
-    Row 0 is the sum of nothing; rows that only the last addition reaches are left out of the
-    table, being ends.
-    """
-    index = {Fraction(0): 0}
-    ends, errors, fresh = [], [], choices.format.array([0])
-    for _ in range(terms):
-        if not len(fresh):
-            break
-        values = (fresh[:, np.newaxis] + choices).to_fractions()
-        exact = np.add.outer(fresh.to_fractions(), choices.to_fractions())
-        errors.append((values - exact).astype(np.float64))
-        new = list(dict.fromkeys(value for value in values.ravel() if value not in index))
-        index |= {value: i for i, value in enumerate(new, start=len(index))}
-        ends.append(np.frompyfunc(index.__getitem__, 1, 1)(values).astype(np.intp))
-        fresh = choices.format.array(new)
-    return np.concatenate(ends), np.concatenate(errors)
-
-
-def _best_path(rewards: Sequence[NDArray[np.float64]], end: NDArray[np.intp]) -> list[int]:
-    """The choices of largest total reward, from state 0 on.
-
-    From state i, choice j earns ``reward[i, j]`` and leads to state ``end[i, j]``.
-    """
-    states, choices = end.shape
-    target = end.ravel()
-    value = np.full(max(states, end.max() + 1), -np.inf)
-    value[0] = 0.0
-    came_from = []
-    for reward in rewards:
-        candidates = (value[:states, np.newaxis] + reward).ravel()
-        value = np.full(len(value), -np.inf)
-        np.maximum.at(value, target, candidates)
-        winners = np.flatnonzero(candidates == value[target])[::-1]  # of equals, the first
-        origin = np.zeros(len(value), dtype=np.intp)
-        origin[target[winners]] = winners
-        came_from.append(origin)
-    state = int(np.argmax(value))
-    path: list[int] = []
-    for origin in reversed(came_from):
-        state, choice = divmod(int(origin[state]), choices)
-        path.append(choice)
-    return path[::-1]
 
 
 def tie_sum(fmt: FloatFormat, terms: int) -> Trial:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from gpbnb.arithmetic.formats import Rounding
 from gpbnb.arithmetic.rational import column_sum_norm
-from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, loglog, looks
+from gpbnb.display.style import BOUND, OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, label, legend, line_styles, loglog
 from gpbnb.display.tables import digits
 from gpbnb.rounding import theory
 from gpbnb.rounding.experiment import Growth, Sawtooth, Trial
@@ -37,7 +37,7 @@ def worst_ratios(
 ) -> list[Artist]:
     """Largest error over a first-order bound, against the number of operands, a curve a format."""
     artists: list[Artist] = []
-    for (marker, colour), curve in zip(looks(len(curves)), curves, strict=True):
+    for (marker, colour), curve in zip(line_styles(len(curves)), curves, strict=True):
         n = [len(trial.inputs[0]) for trial in curve]
         ratio = [trial.ratio(bound) for trial in curve]
         name = digits(curve[0].fmt)
@@ -51,7 +51,7 @@ def worst_ratios(
 def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
     """Median (points) and largest error (thin lines) of sums of ever more terms, beside both laws."""
     artists: list[Artist] = []
-    for (marker, colour), result in zip(looks(len(results)), results, strict=True):
+    for (marker, colour), result in zip(line_styles(len(results)), results, strict=True):
         size, n = np.abs(result.errors), np.array(result.lengths)
         name = f"{result.kind}, {result.fmt.rounding.value}"
         artists += ax.plot(n, np.median(size, axis=1), marker, color=colour, label=name)

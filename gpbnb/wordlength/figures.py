@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, looks
+from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, line_styles
 from gpbnb.wordlength.examples import STANDARD
 
 #: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).
@@ -44,7 +44,7 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
 def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
     """Error (points) and bound (lines) over the tolerance against the bits, one colour per form, finite values only."""
     artists: list[Artist] = []
-    for (name, curve), (marker, colour) in zip(emulated.items(), looks(len(emulated), "os^Dv"), strict=True):
+    for (name, curve), (marker, colour) in zip(emulated.items(), line_styles(len(emulated), "os^Dv"), strict=True):
         points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]
         artists += ax.plot(*zip(*points, strict=True), marker, color=colour, label=name)
         lines = [(t, ratio) for t, ratio in bounded.get(name, ()) if ratio < math.inf]
@@ -61,7 +61,7 @@ def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes
 def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) -> list[Artist]:
     """Bits (points: observed; lines: bounds and formulas) against the number of steps."""
     artists: list[Artist] = []
-    for (name, curve), (marker, colour) in zip(points.items(), looks(len(points), "os^Dv"), strict=True):
+    for (name, curve), (marker, colour) in zip(points.items(), line_styles(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
     for (name, curve), style in zip(lines.items(), ("-", "--", "-.", ":"), strict=False):
         artists += ax.plot(*zip(*curve, strict=True), style, color=BOUND, label=name)

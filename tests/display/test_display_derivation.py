@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, errors, first_order, held, over, together
+from gpbnb.display.derivation import Derivation, Step, errors, first_order, over, together, unevaluated
 
 X, Y = sp.symbols("x y")
 N = sp.Symbol("n", integer=True, positive=True)
@@ -13,7 +13,7 @@ B = sp.Symbol("beta", positive=True)
 
 HOLD = [
     Step("expansion", (X + Y) ** 2, X**2 + 2 * X * Y + Y**2),
-    Step("held back", held(1 - B) * held(1 + B), 1 - B**2),
+    Step("held back", unevaluated(1 - B) * unevaluated(1 + B), 1 - B**2),
     Step("a sum", sp.Sum(N, (N, 1, 4)), sp.Integer(10)),
     Step("a limit", sp.Limit(sp.sin(X) / X, X, 0), sp.Integer(1)),
     Step("a quotient", over(X * Y, Y), X),
@@ -23,7 +23,7 @@ HOLD = [
 ]
 FAIL = [
     Step("a wrong equality", (X + Y) ** 2, X**2 + Y**2),
-    Step("a wrong sign", held(1 - B) * held(1 + B), 1 + B**2),
+    Step("a wrong sign", unevaluated(1 - B) * unevaluated(1 + B), 1 + B**2),
     Step("a wrong coefficient", sp.Sum(N, (N, 1, 4)), sp.Integer(11)),
     Step("a negative rest", 1 + B, 1 + 2 * B, -B),
     Step("a rest of either sign", X + Y, Y, X),
@@ -81,8 +81,8 @@ def test_a_step_writes_its_rest():
 def test_what_is_kept_apart_is_shown_so():
     assert str(together(N, 1)) == "n + 1"
     assert sp.latex(over(X * Y, Y)) == r"\frac{x y}{y}"
-    assert held(N - 1) * X != (N - 1) * X
-    assert (held(N - 1) * X).doit() == (N - 1) * X
+    assert unevaluated(N - 1) * X != (N - 1) * X
+    assert (unevaluated(N - 1) * X).doit() == (N - 1) * X
     assert over(X * Y, Y) != X
 
 

@@ -61,13 +61,13 @@ def test_no_two_colours_are_alike_and_all_stand_out_from_white():
 
 
 def test_every_curve_has_a_colour_and_a_marker_of_its_own():
-    looks = style.looks(5)
+    looks = style.line_styles(5)
     assert looks[0] == ("o", style.OBSERVED)
     assert len({marker for marker, _ in looks}) == len({colour for _, colour in looks}) == 5
-    assert style.looks(2, "sD") == [("s", style.OBSERVED), ("D", style.OBSERVED_OTHERS[0])]
+    assert style.line_styles(2, "sD") == [("s", style.OBSERVED), ("D", style.OBSERVED_OTHERS[0])]
     assert style.colours(2, ("red", "blue", "green")) == ("red", "blue")
     with pytest.raises(ValueError, match="got 6 curves; needed at most 5, or colours repeat; draw two figures"):
-        style.looks(6)
+        style.line_styles(6)
 
 
 def test_both_axes_become_logarithmic():

@@ -301,7 +301,8 @@ def _read_only(a: Array) -> Array:
 
 
 def _flat(part: Array, shape: tuple[int, ...]) -> Array:
-    flat = (part if part.shape == shape else np.broadcast_to(part, shape)).reshape(-1)
+    # In one piece, whatever it was: compiled loops need be made for one layout only.
+    flat = np.ascontiguousarray(part if part.shape == shape else np.broadcast_to(part, shape)).reshape(-1)
     flat.flags.writeable = False
     return flat
 

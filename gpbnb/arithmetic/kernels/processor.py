@@ -23,6 +23,7 @@ from gpbnb.arithmetic.kernels.tags import Away, Down, Even, Odd, Random, Sixteen
 
 EXACT_PRODUCT = 26  # digits up to which a product has at most 53
 _ONE = np.int64(1)
+_SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
 _LARGEST_32 = float(np.finfo(np.float32).max)
 _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _DRAWN = np.uint64(64 - DRAW_BITS)
@@ -47,7 +48,8 @@ def _away(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
 
 def _even(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
     unit = _ONE << k
-    return (u + ((unit >> 1) - 1) + (((u >> k) & 1) | np.int64(sticky))) & -unit
+    # The last digit by a mask: there are no vector instructions that shift signed numbers.
+    return (u + ((unit >> 1) - 1) + np.int64(((u & unit) != 0) | sticky)) & -unit
 
 
 def _zero(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
@@ -147,7 +149,8 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
 
     @njit(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
-        return fit(fmt, x, 0.0, x == 0.0)
+        y = fit(fmt, x, 0.0, x == 0.0)
+        return y if abs(x) < np.inf else np.nan
 
     @njit(forceinline=True)
     def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
@@ -160,9 +163,27 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         "multiply": multiply,
         "divide": divide,
         "sqrt": sqrt,
-        "round_": round_,
+        "round_": _round_even if (digits, mode) == (Two, Even) else round_,
         "fused": fused,
     }
+
+
+@njit(forceinline=True)
+def _round_even(fmt: Any, x: Any) -> Any:
+    """Round a float64 in as few vector instructions as there can be; the result is that of the general way."""
+    u = bits(x)
+    m = u & _MAGNITUDE
+    unit = _ONE << (np.int64(53) - fmt.precision)
+    a = from_bits(m)
+    y = from_bits((m + ((unit >> 1) - 1) + np.int64((m & unit) != 0)) & -unit)
+    # The float64 between this number and its double have the spacing of the subnormal numbers, and ties go to even.
+    large = fmt.gradual * np.float64(unit)
+    y = (a + large) - large if a < fmt.gradual else y
+    y = y if (y >= fmt.least) | (a == 0.0) else fmt.below
+    y = from_bits(bits(y) | (u & _SIGN)) + 0.0  # no negative zero
+    y = fmt.over if y > fmt.largest else y
+    y = fmt.under if y < fmt.lowest else y
+    return y if a < np.inf else np.nan
 
 
 @njit(forceinline=True)

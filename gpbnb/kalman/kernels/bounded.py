@@ -40,12 +40,12 @@ _INNOVATION, _UD = int(Form.INNOVATION), int(Form.UD)
 _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 
-def _widened(fmt: Any, a: Any) -> Any:
+def widened(fmt: Any, a: Any) -> Any:
     """A number of a format as a double-double: exact in base 2 and 16; within four roundings in base 10."""
-    raise TypeError("got a call of _widened from Python; needed one from a function compiled by numba")
+    raise TypeError("got a call of widened from Python; needed one from a function compiled by numba")
 
 
-@overload(_widened, strict=False, jit_options={"forceinline": True})
+@overload(widened, strict=False, jit_options={"forceinline": True})
 def _overloaded_widened(fmt: Any, a: Any) -> Any:
     tag = getattr(fmt, "instance_class", None)
 
@@ -76,15 +76,15 @@ def _widen(fmt: Any, form: int, a: Any, c: Any, U: Any, UD: Any) -> None:
     if form == _UD:
         for i in range(n):
             for j in range(n):
-                d = _widened(fmt, load(fmt, a, (j, j)))
-                u = _widened(fmt, load(fmt, a, (i, j))) if i < j else one(exactly) if i == j else zero(exactly)
+                d = widened(fmt, load(fmt, a, (j, j)))
+                u = widened(fmt, load(fmt, a, (i, j))) if i < j else one(exactly) if i == j else zero(exactly)
                 put(exactly, U, (j, i), u)
                 put(exactly, UD, (i, j), multiply(exactly, u, d))
         product(exactly, UD, U, c)
         return
     for i in range(n):
         for j in range(i + 1):
-            x = add(exactly, _widened(fmt, load(fmt, a, (i, j))), _widened(fmt, load(fmt, a, (j, i))))
+            x = add(exactly, widened(fmt, load(fmt, a, (i, j))), widened(fmt, load(fmt, a, (j, i))))
             x = multiply(exactly, x, half)
             put(exactly, c, (i, j), x)
             put(exactly, c, (j, i), x)
@@ -107,12 +107,12 @@ def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U
     exactly = DoubleDouble()
     for i in range(n):
         for j in range(m):
-            put(exactly, c, (i, j), _widened(fmt, load(fmt, K, (i, j))))
+            put(exactly, c, (i, j), widened(fmt, load(fmt, K, (i, j))))
     if form != _UD:
         return
     for i in range(m):
         for j in range(m):
-            put(exactly, U, (i, j), _widened(fmt, load(fmt, UR, (i, j))))
+            put(exactly, U, (i, j), widened(fmt, load(fmt, UR, (i, j))))
     decorrelate(exactly, U, H, HD)
     for i in range(m):
         for j in range(i):
@@ -120,7 +120,7 @@ def _whole_gain(fmt: Any, form: int, K: Any, H: Any, UR: Any, c: Any, HD: Any, U
             for k in range(n):
                 s = add(exactly, s, multiply(exactly, load(exactly, HD, (i, k)), load(exactly, c, (k, j))))
             for k in range(n):
-                x = multiply(exactly, _widened(fmt, load(fmt, K, (k, i))), s)
+                x = multiply(exactly, widened(fmt, load(fmt, K, (k, i))), s)
                 put(exactly, c, (k, j), subtract(exactly, load(exactly, c, (k, j)), x))
     for j in range(1, m):
         for i in range(j):
@@ -166,7 +166,7 @@ def advance_bounded(
     for step in range(z.shape[0]):
         k = first + step
         for i in range(n):
-            put(exactly, xe, (i, 0), _widened(fmt, load(fmt, x, (i, 0))))
+            put(exactly, xe, (i, 0), widened(fmt, load(fmt, x, (i, 0))))
         _widen(fmt, form, P, Pe, U, UD)
         before = xe[:, 0, 0].copy()
         for i in range(n):
@@ -184,7 +184,7 @@ def advance_bounded(
             return bound
         _widen(fmt, form, P, xn, U, UD)
         for i in range(n):
-            q[i] = subtract(exactly, _widened(fmt, load(fmt, x, (i, 0))), load(exactly, xe, (i, 0)))[0]
+            q[i] = subtract(exactly, widened(fmt, load(fmt, x, (i, 0))), load(exactly, xe, (i, 0)))[0]
             for j in range(n):
                 T[i, j] = subtract(exactly, load(exactly, xn, (i, j)), load(exactly, Pe, (i, j)))[0]
             for j in range(m):

@@ -64,8 +64,8 @@ def _value(printed: Statement) -> Fraction:
 @CHECKS.add(*both("s12.example-first-coefficient"))
 def first_coefficient(printed: Statement) -> Finding:
     value = coefficients()[0]
-    slips = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, printed.number("value").literal)
-    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in slips) or "no change of one digit"
+    misprints = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, printed.number("value").literal)
+    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in misprints) or "no change of one digit"
     return compare(
         _value(printed) == value and _number(printed, "value", value),
         scientific(value, 5),
@@ -83,7 +83,7 @@ def second_coefficient(printed: Statement) -> Finding:
         scientific(value, 5),
         otherwise_note="the printed number is $k(3n+1)\\cdot0.5(k-1)\\cdot84$: times for plus, and 84 for 82"
         if _number(printed, "value", product)
-        else "no slip was found that leads to the printed number",
+        else "no misprint was found that leads to the printed number",
         root=_SECOND,
     )
 

@@ -1,0 +1,324 @@
+"""How sharp a guarantee is: choose admissible measurements so that every rounding pushes the same way.
+
+After each step, the measurement is taken, among some admissible ones, whose roundings push the error furthest along the
+response of one state at one later step. A plan keeps the state large, and the search steers the last digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numba import njit
+from numba.extending import overload
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.scalar import load, put, round_
+from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
+from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
+from gpbnb.kalman.guarantee.gains import Schedule, pack
+from gpbnb.kalman.guarantee.program import execute
+from gpbnb.kalman.kernels.bounded import widened
+
+
+@dataclass(frozen=True, eq=False)
+class Attack:
+    """Runs of a filter against measurements that were chosen, and its largest errors.
+
+    Parameters
+    ----------
+    errors : (n,), the largest error of each state in any run, at any step.
+    ratio : largest of these over their bounds; a guarantee is violated above 1.
+    ratios : (n,), the ratio of each state.
+    runs, steps : how many were tried, and steps of each.
+    z : (steps, m), measurements of the run with the largest ratio, numbers of the format, in float64.
+    admissible : whether the exact filter stayed within its limits in all of them.
+    """
+
+    errors: NDArray[np.float64]
+    ratio: float
+    ratios: NDArray[np.float64]
+    runs: int
+    steps: int
+    z: NDArray[np.float64]
+    admissible: bool
+
+
+def number(fmt: Any, x: Any) -> Any:
+    """A float64 rounded into a format; in base 10, its first decimals."""
+    raise TypeError("got a call of number from Python; needed one from a function compiled by numba")
+
+
+@overload(number, strict=False, jit_options={"forceinline": True})
+def _overloaded_number(fmt: Any, x: Any) -> Any:
+    if getattr(fmt, "instance_class", None) in (Decimal, ShortDecimal):
+        return lambda fmt, x: round_(fmt, _scaled(x))
+    return lambda fmt, x: round_(fmt, x)
+
+
+@njit
+def _scaled(x: float) -> Any:
+    e = 0
+    while x != 0.0 and abs(x) < 1e15:
+        x *= 10.0
+        e -= 1
+    while abs(x) > 1e17:
+        x /= 10.0
+        e += 1
+    return np.int64(x), np.int64(e)
+
+
+@njit(cache=True, nogil=True)
+def greedy(
+    fmt: Any,
+    operations: Any,
+    outputs: Any,
+    coefficients: Any,
+    Phi: Any,
+    HPhi: Any,
+    K: Any,
+    first: int,
+    rows: Any,
+    pool: Any,
+    x: Any,
+    x_exact: Any,
+    limits: Any,
+    steer: Any,
+    by_range: bool,
+    ramp: float,
+    chosen: Any,
+    errors: Any,
+) -> Any:
+    """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
+
+    Parameters
+    ----------
+    rows : (steps, n), what an error after each step is worth.
+    pool : (steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
+    x, x_exact : the first estimate, packed and double-double.
+    limits : of the exact filter.
+    steer : (m, n + 1), with `by_range`: what is added to innovations is steer (x_predicted, share), within their limit;
+        the share rises from 0 to 1 in `ramp` steps.
+    chosen : (steps, m[, 2]), the measurements taken, packed.
+
+    Returns
+    -------
+    violations : steps at which no candidate kept the exact filter within its limits.
+    """
+    exactly = DoubleDouble()
+    n, m, steps = Phi.shape[1], HPhi.shape[1], rows.shape[0]
+    count = Phi.shape[0]
+    trial, best = np.empty_like(x), np.empty_like(x)
+    values = np.empty((n + m + operations.shape[0], *x.shape[1:]), x.dtype)
+    z, taken = np.empty((m, *x.shape[1:]), x.dtype), np.empty((m, *x.shape[1:]), x.dtype)
+    predicted, following, best_exact = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
+    seen, nu, pull = np.empty((m, 2)), np.empty((m, 2)), np.zeros(m)
+    violations = 0
+    for k in range(steps):
+        at = k if k < count else first + (k - first) % (count - first)
+        for i in range(n):
+            s = (0.0, 0.0)
+            for j in range(n):
+                p = doubledouble.multiply(exactly, load(exactly, Phi[at], (i, j)), load(exactly, x_exact, j))
+                s = doubledouble.add(exactly, s, p)
+            put(exactly, predicted, i, s)
+        for r in range(m):
+            s = (0.0, 0.0)
+            for j in range(n):
+                p = doubledouble.multiply(exactly, load(exactly, HPhi[at], (r, j)), load(exactly, x_exact, j))
+                s = doubledouble.add(exactly, s, p)
+            put(exactly, seen, r, s)
+            if by_range:
+                pull[r] = steer[r, n] * min(1.0, k / ramp)
+                for j in range(n):
+                    pull[r] += steer[r, j] * predicted[j, 0]
+        largest, found = -np.inf, -1
+        for q in range(pool.shape[1]):
+            excess = 0.0
+            for r in range(m):
+                value = pool[k, q, r]
+                if by_range:
+                    most = limits.innovation[r]
+                    value = seen[r, 0] + min(max(pull[r] + value, -most), most) * (1 - 1e-6)
+                c = number(fmt, value)
+                put(fmt, z, r, c)
+                c_exact = widened(fmt, c)
+                put(exactly, nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
+                excess = max(excess, abs(nu[r, 0]) / limits.innovation[r])
+                excess = max(excess, abs(c_exact[0]) / limits.measurement[r])
+            for i in range(n):
+                s = load(exactly, predicted, i)
+                for r in range(m):
+                    p = doubledouble.multiply(exactly, load(exactly, K[at], (i, r)), load(exactly, nu, r))
+                    s = doubledouble.add(exactly, s, p)
+                put(exactly, following, i, s)
+                excess = max(excess, abs(s[0]) / limits.state[i])
+            trial[:] = x
+            execute(fmt, operations, outputs, coefficients[at], trial, z, values)
+            score = 0.0
+            for i in range(n):
+                e = doubledouble.subtract(exactly, widened(fmt, load(fmt, trial, i)), load(exactly, following, i))
+                score += rows[k, i] * e[0]
+            if excess > 1.0:
+                score = -1e300 * excess
+            if score > largest or found < 0:
+                largest, found = score, q
+                best[:] = trial
+                best_exact[:] = following
+                taken[:] = z
+        if largest <= -1e299:
+            violations += 1
+        x[:] = best
+        x_exact[:] = best_exact
+        chosen[k] = taken
+        for i in range(n):
+            e = doubledouble.subtract(exactly, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
+            errors[k, i] = e[0]
+    return violations
+
+
+def responses(given: Schedule, F: NDArray[np.float64], state: int, steps: int) -> NDArray[np.float64]:
+    """What an error after each step adds to the error of one state after the last, (steps, n)."""
+    rows = np.zeros((steps, given.program.n))
+    c = np.eye(given.program.n)[state]
+    for k in range(steps - 1, -1, -1):
+        rows[k] = c
+        at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
+        c = c @ F[at]
+    return rows
+
+
+def attack(
+    found: Guarantee,
+    steps: int = 1_000,
+    candidates: int = 200,
+    seed: int = 0,
+    states: Any = None,
+    center: Any = None,
+    plans: int = 6,
+    ramp: float | None = None,
+) -> Attack:
+    """Attack a guarantee with measurements chosen step by step, within its limits.
+
+    Parameters
+    ----------
+    steps : of each run; the response of each state is aimed at the last.
+    candidates : to choose from at each step.
+    states : which to aim at; all by default.
+    center : (n,), for limits on state and innovation: where the exact filter is to stay; by default near the limits.
+    plans : courses of the measurements to try for each state.
+    """
+    given, rng = found.schedule, np.random.default_rng(seed)
+    n, m = given.program.n, given.program.m
+    by_range = not np.isfinite(found.limits.measurement).all()
+    errors, best, best_z, allowed, runs = np.zeros(n), 0.0, np.zeros((steps, m)), True, 0
+    F = closed_loops(given)
+    for state in range(n) if states is None else states:
+        rows = responses(given, F, state, steps)
+        for plan in range(plans):
+            pool = _pool(found, F, state, steps, candidates, plan, by_range, rng)
+            steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
+            outcome = run_against(found, rows, pool, steer, by_range, steps / 2 if ramp is None else ramp)
+            runs += 1
+            allowed = allowed and not outcome[0]
+            if outcome[0]:
+                continue
+            errors = np.maximum(errors, np.abs(outcome[2]).max(axis=0))
+            ratio = float((np.abs(outcome[2][:, state]) / found.bound[state]).max())
+            if ratio > best:
+                best, best_z = ratio, outcome[1]
+    ratios = errors / found.bound
+    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, allowed)
+
+
+def run_against(
+    found: Guarantee,
+    rows: NDArray[np.float64],
+    pool: NDArray[np.float64],
+    steer: NDArray[np.float64],
+    by_range: bool,
+    ramp: float = 1.0,
+) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
+    """One run of :func:`greedy`: steps outside the limits, measurements in float64, and errors (steps, n)."""
+    given, program = found.schedule, found.schedule.program
+    backend = cast(Compiled, given.fmt.backend)
+    steps = len(rows)
+    x = pack(given.fmt, given.x0)
+    chosen, errors = np.zeros((steps, program.m, *x.shape[1:]), x.dtype), np.zeros((steps, program.n))
+    outside = greedy(
+        backend.tag,
+        program.operations,
+        program.outputs,
+        given.packed,
+        given.Phi,
+        given.HPhi,
+        given.exact,
+        given.first,
+        rows,
+        pool,
+        x,
+        double_doubles(given.x0),
+        found.limits,
+        steer,
+        by_range,
+        ramp,
+        chosen,
+        errors,
+    )
+    z = chosen if x.dtype == np.float64 else chosen[..., 0] * 10.0 ** chosen[..., 1]
+    return outside, z, errors
+
+
+def _pool(
+    found: Guarantee,
+    F: NDArray[np.float64],
+    state: int,
+    steps: int,
+    candidates: int,
+    plan: int,
+    by_range: bool,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Candidates at each step: near the largest measurements of one sign, of a response, or anywhere."""
+    m = found.schedule.program.m
+    if by_range:
+        share = (1.0, 0.3, 0.05)[plan % 3]
+        return share * found.limits.innovation * rng.uniform(-1, 1, (steps, candidates, m))
+    Z = found.limits.measurement
+    width = (0.05, 0.5, 1.0, 2.0)[plan % 4]
+    signs = rng.choice((-1.0, 1.0), m) if plan < 4 else 1.0
+    course = np.ones((steps, m)) * signs
+    if plan >= 4:  # the worst case of the peak gain of a state
+        given = found.schedule
+        back = responses(given, F, (state + plan) % given.program.n, steps)
+        at = np.array(
+            [
+                k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
+                for k in range(steps)
+            ]
+        )
+        course = np.sign(np.einsum("ki,kim->km", back, given.exact[at][..., 0]))
+    low = np.clip(course - width, -1, 1)[:, None, :]
+    high = np.clip(course + width, -1, 1)[:, None, :]
+    return Z * (1 - 1e-9) * (low + (high - low) * rng.uniform(0, 1, (steps, candidates, m)))
+
+
+def _steering(found: Guarantee, center: Any) -> NDArray[np.float64]:
+    """Innovations that bring the exact filter to a place: a regulator for the pair of transition and gain."""
+    given, n, m = found.schedule, found.schedule.program.n, found.schedule.program.m
+    Phi, K = given.Phi[-1, :, :, 0], given.exact[-1, :, :, 0]
+    limits = np.where(np.isfinite(found.limits.state), found.limits.state, 1.0)
+    place = np.zeros(n) if center is None else np.asarray(center, dtype=np.float64)
+    # x = p + K nu; take nu that makes |x - place| / limits least, over a few steps, by a regulator.
+    P = np.diag(limits**-2.0)
+    weight = np.diag(found.limits.innovation**-2.0) * 1e-2
+    for _ in range(2000):
+        gain = np.linalg.solve(weight + K.T @ P @ K, K.T @ P)
+        following = Phi.T @ (P - P @ K @ gain) @ Phi + np.diag(limits**-2.0)
+        if np.allclose(following, P, rtol=1e-12):
+            break
+        P = following
+    return np.hstack([-gain, (gain @ place).reshape(m, 1)])

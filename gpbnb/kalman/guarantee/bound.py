@@ -1,0 +1,348 @@
+r"""The guarantee: rounding never moves the estimate by more than this, whatever the measurements within their limits.
+
+Let the program of a step compute, with coefficients that are known exactly, the linear function
+:math:`\hat F_k x + \hat K_k z` up to its roundings, and let the exact filter be
+:math:`x_k = F_k x_{k-1} + K_k z_k`, :math:`F_k = (I - K_kH_k)\Phi_k`, with innovation
+:math:`\nu_k = z_k - H_k\Phi_kx_{k-1}`. Then :math:`e_k = \hat x_k - x_k` obeys, exactly,
+
+.. math:: e_k = \hat F_k e_{k-1} + \Delta F_k x_{k-1} + (\hat K_k - K_k)\nu_k + \Gamma_k\rho_k, \qquad
+    \Delta F_k = \hat F_k - (I - \hat K_kH_k)\Phi_k,
+
+with the rounding errors ρ of the operations and, in the columns of Γ, what each of them does to the result. See
+:func:`gpbnb.kalman.guarantee.derivation.recursion` for the algebra and :mod:`gpbnb.kalman.guarantee.envelope` for the
+sums over all earlier steps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee.envelope import (
+    GAIN,
+    LOOP,
+    ROUNDING,
+    START,
+    Disturbances,
+    Limits,
+    certify,
+    disturbances,
+    peaks,
+    transient,
+    units,
+)
+from gpbnb.kalman.guarantee.gains import Schedule, schedule
+from gpbnb.kalman.guarantee.program import functionals
+from gpbnb.kalman.model import LinearModel
+
+PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
+"""Names of the parts of a bound, in the order of :attr:`Guarantee.parts`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Guarantee:
+    """A bound on what rounding does to an estimate.
+
+    Parameters
+    ----------
+    bound : (n,), bounds the error of each state after every step; infinite where there is none.
+    steps : None if the bound holds for ever; else, after how many steps it ends.
+    why : if it does not hold for ever, why not.
+    history : (k, n), bounds after each of the first steps.
+    parts : (n, 4), the bound of the state at the step where it is largest, part by part; see :data:`PARTS`.
+    limits : on the filter without rounding, with what follows from those that were given.
+    schedule : the filter's coefficients.
+    lags : how many steps back the sums go.
+    radius : growth of an error in a step, on average over a period.
+    """
+
+    bound: NDArray[np.float64]
+    steps: int | None
+    why: str
+    history: NDArray[np.float64]
+    parts: NDArray[np.float64]
+    limits: Limits
+    schedule: Schedule
+    lags: int
+    radius: float
+
+    @property
+    def for_ever(self) -> bool:
+        return self.steps is None
+
+    def __str__(self) -> str:
+        numbers = ", ".join(f"{b:.3g}" for b in self.bound)
+        if self.steps is None:
+            at = f"; its gain repeats from step {self.schedule.repeat}" if self.schedule.repeat is not None else ""
+            return f"within {numbers} for ever ({self.schedule.fmt}{at})"
+        return f"within {numbers} for {self.steps} steps only, for {self.why} ({self.schedule.fmt})"
+
+
+def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf) -> Limits:
+    """Limits on the filter without rounding, each one number or one for each entry.
+
+    Raises
+    ------
+    ValueError : a limit that is negative or NaN; too few of them finite.
+    """
+    X, V, Z = (
+        np.array(np.broadcast_to(np.asarray(each, dtype=np.float64), (size,)))
+        for each, size in ((state, n), (innovation, m), (measurement, m))
+    )
+    for name, each in (("state", X), ("innovation", V), ("measurement", Z)):
+        if np.isnan(each).any() or (each < 0).any():
+            raise ValueError(f"got a limit {each} on the {name}; needed numbers that are not negative")
+    if not np.isfinite(Z).all() and not (np.isfinite(X).all() and np.isfinite(V).all()):
+        raise ValueError(
+            f"got limits {X} on the state, {V} on the innovation and {Z} on the measurement; needed a finite limit for "
+            "each measurement, or for each state and each innovation"
+        )
+    return Limits(X, V, Z)
+
+
+def guarantee(
+    model: LinearModel,
+    fmt: FloatFormat,
+    within: Limits,
+    form: Form = Form.INNOVATION,
+    most: int = 20_000,
+    horizon: int = 1_000,
+) -> Guarantee:
+    """Bound what rounding does to the estimates of a Kalman filter, for every admissible measurement sequence.
+
+    Parameters
+    ----------
+    model, fmt, form : the filter. It is compared with the exact filter of the same stored model and measurements.
+    within : limits on the exact filter, from :func:`limits`.
+    most : how many steps to emulate until the gain settles.
+    horizon : for how many steps to give a bound where there is none for ever.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops, or in which a covariance is not definite.
+    """
+    return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon)
+
+
+def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000) -> Guarantee:
+    """As :func:`guarantee`, of a filter whose coefficients are known; for linear filters of any origin."""
+    n = given.program.n
+    why, radius = given.why, _radius(given)
+    for_ever = given.settled and radius < 1
+    if given.settled and radius >= 1:
+        why = f"the closed loop is not stable: an error grows by a factor of {radius:.6g} a step"
+    steps = min(horizon, given.steps) if not given.settled else horizon
+    period = given.steps - given.first
+    most = _enough_lags(radius, period) if for_ever else steps
+    b, known, caps = np.zeros(n), within, None
+    if not np.isfinite(within.state).all() or not np.isfinite(within.innovation).all():
+        known = _from_measurements(given, within, most, for_ever, steps)
+        caps = _caps(given, known, most) if for_ever and given.first == 0 else None
+    for _ in range(40):
+        found = _disturbances(given, known, b, caps)
+        history, parts, lags = _sums(given, found, b, most, for_ever, steps)
+        new = history.max(axis=0)
+        if (new <= b).all() or not np.isfinite(new).all():
+            break
+        b = new * (1 + 2.0**-30)
+    else:
+        new = np.full(n, math.inf)
+    ended = None if for_ever else (steps if np.isfinite(new).all() else 0)
+    at = history.argmax(axis=0)
+    worst = np.array([parts[at[i], i] for i in range(n)])
+    return Guarantee(b if np.isfinite(new).all() else new, ended, why, history, worst, known, given, lags, radius)
+
+
+def _disturbances(
+    given: Schedule, within: Limits, b: NDArray[np.float64], caps: NDArray[np.float64] | None = None
+) -> Disturbances:
+    program = given.program
+    if caps is None:
+        caps = np.full(len(program.operations), math.inf)
+    return Disturbances(
+        *disturbances(
+            program.operations,
+            program.outputs,
+            program.groups,
+            program.roots,
+            given.coefficients,
+            units(given.fmt),
+            given.Phi,
+            given.HPhi,
+            given.exact,
+            given.dK,
+            within,
+            b,
+            caps,
+        )
+    )
+
+
+def disturbances_of(found: Guarantee) -> Disturbances:
+    """Closed loops and disturbances behind a guarantee that holds for ever."""
+    return _disturbances(found.schedule, found.limits, found.bound)
+
+
+def _parts_of(given: Schedule) -> NDArray[np.int64]:
+    """Which part of a bound each column of the disturbances belongs to."""
+    n, m, groups = given.program.n, given.program.m, len(given.program.roots)
+    return np.array([ROUNDING] * groups + [LOOP] * n + [GAIN] * m)
+
+
+def closed_loops(given: Schedule) -> NDArray[np.float64]:
+    """Closed loop of each step of a schedule, (steps, n, n), in float64."""
+    known = Limits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
+    return _disturbances(given, known, np.zeros(given.program.n)).F
+
+
+def _radius(given: Schedule) -> float:
+    """Spectral radius of the closed loop over a period, as a factor a step; an estimate that only steers."""
+    if not given.settled:
+        return math.nan
+    F = closed_loops(given)[given.first :]
+    whole = np.eye(given.program.n)
+    for each in F:
+        whole = each @ whole
+    return float(np.abs(np.linalg.eigvals(whole)).max() ** (1 / len(F)))
+
+
+def _enough_lags(radius: float, period: int) -> int:
+    lags = math.ceil(math.log(1e-8) / math.log(max(radius, 1e-3))) + 16
+    return -(-lags // period) * period
+
+
+def _gap(given: Schedule, steps: int, lags: int) -> int:
+    """How far apart checkpoints are whose bounds go back all the way: at every step if that is cheap."""
+    n, columns = given.program.n, len(_parts_of(given))
+    cost = steps * min(steps, lags) * n * n * (n + columns)
+    return 1 if cost < 2e10 else 2 ** min(12, math.ceil(math.log2(cost / 2e10)))
+
+
+def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], float]:
+    """What a lag is worth at most, and from where on it no longer matters; it only steers."""
+    each = (np.abs(found.G) * np.where(found.G == 0, 0, found.limits[:, None, :])).sum(axis=2) + found.slack
+    size = each.max(axis=0)
+    grown = size / (1 - radius) if radius < 1 else size
+    positive = size[size > 0]
+    return grown, 1e-7 * float(positive.min()) if len(positive) else 0.0
+
+
+def _sums(
+    given: Schedule, found: Disturbances, b: NDArray[np.float64], most: int, for_ever: bool, steps: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
+    """Bounds after each step, and their parts; the last rows are those of the period."""
+    n, part = given.program.n, _parts_of(given)
+    arrays = (found.F, found.spread, found.G, found.limits, found.slack, part)
+    scale, small = _scale(found, _radius(given) if for_ever else math.nan)
+    if not for_ever:
+        return transient(*arrays, given.first, steps, steps, _gap(given, steps, steps), scale, 0.0)
+    period, sums = given.steps - given.first, []
+    lags = 1
+    for phase in range(1, period + 1):
+        certificate = certify(*arrays, np.eye(n), phase, given.first, True, most, scale, small)
+        sums.append(certificate)
+        lags = max(lags, certificate.lags)
+    early = given.first + lags if given.first else 0  # without a beginning of its own, sums of fewer terms
+    history, parts, _ = transient(*arrays, given.first, early, most, _gap(given, early, lags), scale, small)
+    largest = np.maximum(b, history.max(axis=0, initial=0.0))
+    rows, row_parts = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
+    for _ in range(200):  # the error of the last steps is carried on: raise the bound until it bounds itself
+        rows, row_parts = [], []
+        for certificate in sums:
+            carried = (certificate.residual + certificate.tail) @ largest
+            each = np.array(certificate.sums)
+            each[:, START] += carried
+            row_parts.append(each)
+            rows.append(each.sum(axis=1) * (1 + 2.0**-48))
+        new = np.max(rows, axis=0)
+        if (new <= largest).all():
+            break
+        largest = np.maximum(largest, new * (1 + 2.0**-40))
+    else:
+        rows = [np.full(n, math.inf)]
+        row_parts = [np.full((n, 4), math.inf)]
+    return np.concatenate([history, np.array(rows)]), np.concatenate([parts, np.array(row_parts)]), lags
+
+
+def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: bool, steps: int) -> Limits:
+    r"""Limits on state and innovation of the exact filter that follow from those on the measurements.
+
+    The exact filter obeys :math:`x_k = \hat F x_{k-1} + \hat K z_k - \Delta F x_{k-1} - (\hat K - K)\nu_k`, with small
+    last terms: its worst-case peak gain, by the certificate of the error bound.
+    """
+    n, m = given.program.n, given.program.m
+    ones = Limits(np.ones(n), np.ones(m), np.ones(m))
+    found = _disturbances(given, ones, np.zeros(n))
+    G = np.concatenate([found.K, found.loop, found.gain], axis=2)
+    part = np.array([ROUNDING] * m + [LOOP] * n + [GAIN] * m)
+    X, V = np.zeros(n), np.array(within.measurement)
+    x0 = np.abs(given.x0.astype(np.float64)) * (1 + 2.0**-50)
+    HPhi = np.ascontiguousarray(given.HPhi[..., 0])
+    early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
+    for _ in range(60):
+        limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
+        slack = 2.0**-48 * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
+        slack += (2.0**-48 * np.abs(found.loop) + found.spread) @ X
+        arrays = (found.F, found.spread, G, limit, slack, part)
+        scale = (np.abs(G) * limit[:, None, :]).sum(axis=2).max(axis=0) + 1e-300
+        peak_x, peak_v = peaks(
+            *arrays,
+            HPhi,
+            X,
+            V,
+            within.measurement,
+            x0,
+            given.first,
+            early,
+            for_ever,
+            most,
+            scale,
+            1e-9 * float(scale.max()),
+        )
+        peak_x, peak_v = np.minimum(peak_x, within.state), np.minimum(peak_v, within.innovation)
+        if (peak_x <= X).all() and (peak_v <= V).all():
+            return Limits(X, V, within.measurement)
+        X, V = np.maximum(X, peak_x * (1 + 2.0**-30)), np.maximum(V, peak_v * (1 + 2.0**-30))
+    return Limits(np.full(n, math.inf), np.full(m, math.inf), within.measurement)
+
+
+def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
+    """Peak of each operation's own linear function: less than what the peaks of the states allow it.
+
+    For a filter whose coefficients never change; the exact filter then is the program without roundings.
+    """
+    program, first = given.program, given.program.n + given.program.m
+    if given.steps != 1 or given.HPhi.any():
+        return np.full(len(program.operations), math.inf)
+    rows = np.empty((first + len(program.operations), first, 2))
+    sizes = np.empty(rows.shape[:2])
+    functionals(program.operations, given.coefficients[0], first, rows, sizes)
+    of_state, of_input = rows[first:, : program.n, 0], np.abs(rows[first:, program.n :, 0])
+    found = _disturbances(given, within, np.zeros(program.n))
+    limit = np.array(within.measurement)[None, :]
+    slack = 2.0**-48 * np.abs(found.K) @ within.measurement + found.spread @ within.state
+    size = np.abs(found.K[0]) @ within.measurement + 1e-300
+    peak = certify(
+        found.F,
+        found.spread,
+        found.K,
+        limit,
+        slack,
+        np.zeros(program.m, dtype=np.int64),
+        np.ascontiguousarray(of_state),
+        1,
+        0,
+        True,
+        most,
+        size,
+        1e-9 * float(size.max()),
+    )
+    total = peak.sums.sum(axis=1) + (peak.residual + peak.tail) @ within.state + of_input @ within.measurement
+    total += 2.0**-50 * sizes[first:] @ np.concatenate([within.state, within.measurement])
+    return np.asarray(total * (1 + 2.0**-40))

@@ -1,0 +1,68 @@
+r"""The algebra of the guarantee, checked by sympy; matrices are symbols that do not commute."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from gpbnb.display.derivation import Derivation, Step, held, over, together
+
+
+def recursion() -> Derivation:
+    r"""The recursion of the error, for every n and m, and every program that is linear but for its roundings.
+
+    :math:`\hat F, \hat K` are what the program computes with, F and K those of the exact filter; w is what the
+    roundings of the step add, p the exact estimate before it.
+    """
+    phi, h, k, known, loop = sp.symbols(r"\Phi H K \hat{K} \hat{F}", commutative=False)
+    e, p, z, w = sp.symbols("e p z w", commutative=False)
+    one = sp.S.One
+    exact_loop, stored = held(one - k * h) * phi, loop - held(one - known * h) * phi
+    innovation = z - h * phi * p
+    computed = loop * (p + e) + known * z + w
+    return Derivation(
+        (
+            Step(
+                "computed minus exact estimate after a step",
+                sp.expand(computed) - (exact_loop * p + k * z),
+                together(loop * e, stored * p, held(known - k) * held(innovation), w),
+            ),
+            Step(
+                "the exact estimate, by the computed loop: $\\hat F p + \\hat K z$ less what separates them",
+                exact_loop * p + k * z,
+                together(loop * p, known * z, -(stored * p), -(held(known - k) * held(innovation))),
+            ),
+        )
+    )
+
+
+def telescope() -> Derivation:
+    r"""Two lags of the certificate: with :math:`r_l = c_lF - c_{l+1}`, rows need not be exact."""
+    f, g = sp.symbols("F G", commutative=False)
+    c0, c1, c2 = sp.symbols("c_0 c_1 c_2", commutative=False)
+    e, v, w = sp.symbols("e v w", commutative=False)  # error two steps before; disturbances of the two steps
+    before = g * e + v
+    return Derivation(
+        (
+            Step(
+                "$c_0$ times the error after two steps",
+                sp.expand(c0 * (f * before + w)),
+                together(c0 * w, c1 * v, held(c0 * f - c1) * before, held(c1 * g - c2) * e, c2 * e),
+            ),
+        )
+    )
+
+
+def induction() -> Derivation:
+    r"""One state: a bound that bounds itself, from sums cut after L steps with what is left over, ρ = |F|^L."""
+    f, w = sp.symbols("F w", positive=True)
+    lags = sp.Symbol("L", integer=True, positive=True)
+    cut = w * over(1 - f**lags, 1 - f)
+    return Derivation(
+        (
+            Step(
+                "the bound b with $b = \\sum_{l<L}F^lw + F^Lb$ is the infinite sum, wherever it is cut",
+                together(cut, f**lags * over(w, 1 - f)),
+                over(w, 1 - f),
+            ),
+        )
+    )

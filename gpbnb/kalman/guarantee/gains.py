@@ -1,0 +1,336 @@
+"""Coefficients of a filter for all time: emulate the covariance until it repeats, and enclose the exact gain beside it.
+
+In t digits the recursion of the covariance is a map of a finite set of numbers that never sees a measurement. When the
+computed covariance is digit for digit what it was a whole number of cycles of the model before, everything after
+repeats as well: a proof by exhaustion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from flint import arb, arb_mat
+from numba import njit
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
+from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee.program import Program, innovation_program, loop_program, sequential_program
+from gpbnb.kalman.model import LinearModel
+
+
+@dataclass(frozen=True, eq=False)
+class Schedule:
+    """Coefficients of each step of a linear filter, and the exact filter that it stands for.
+
+    Row k of each array is for step k + 1; the rows from `first` on repeat for ever if `settled`.
+
+    Parameters
+    ----------
+    program : operations of a step.
+    fmt : their format.
+    coefficients : (steps, c, 2), double-double.
+    packed : the same as the compiled loops of the format take them.
+    Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), the model as stored, double-double.
+    exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain and a bound of its error.
+    x0 : (n,), the first estimate as stored.
+    first : where the period begins. settled : whether the rows after it repeat for ever.
+    repeat, period : step at which the computed covariance was first what it would be again, `period` steps later.
+    why : if not settled, why not.
+    """
+
+    program: Program
+    fmt: FloatFormat
+    coefficients: NDArray[np.float64]
+    packed: NDArray[Any]
+    Phi: NDArray[np.float64]
+    HPhi: NDArray[np.float64]
+    exact: NDArray[np.float64]
+    dK: NDArray[np.float64]
+    x0: NDArray[Any]
+    first: int
+    settled: bool
+    repeat: int | None
+    period: int | None
+    why: str = ""
+
+    @property
+    def steps(self) -> int:
+        return len(self.coefficients)
+
+
+@njit(cache=True, nogil=True)
+def _stored_loops(fmt: Any, K: Any, H: Any, Phi: Any, identity: Any, F: Any) -> None:
+    """Closed loops (I - KH)Φ of some steps, with every operation rounded, in the order of the filter."""
+    T, W = np.empty_like(identity), np.empty_like(identity)
+    for k in range(K.shape[0]):
+        product_by_sparse(fmt, K[k], H[k % H.shape[0]], T)
+        difference(fmt, identity, T, W)
+        product_by_sparse(fmt, W, Phi[k % Phi.shape[0]], F[k])
+
+
+@njit(cache=True, nogil=True)
+def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
+    """D = the inverse of the unit upper triangle U times H, by back substitution, for each step."""
+    for k in range(D.shape[0]):
+        u, h = U[k % U.shape[0]], H[k % H.shape[0]]
+        for j in range(D.shape[2]):
+            for i in range(D.shape[1] - 1, -1, -1):
+                s = load(fmt, h, (i, j))
+                for r in range(i + 1, D.shape[1]):
+                    c = load(fmt, u, (i, r))
+                    if not is_zero(fmt, c):
+                        s = subtract(fmt, s, multiply(fmt, c, load(fmt, D[k], (r, j))))
+                store(fmt, D[k], (i, j), s)
+
+
+def schedule(
+    model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_000, horizon: int | None = None
+) -> Schedule:
+    """Coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
+
+    Parameters
+    ----------
+    model, fmt, form : as for a run of the filter. The exact filter has model and measurements as the format stores
+        them.
+    most : steps to try.
+    horizon : steps to give where the gain does not settle; by default all that were tried.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops, or in which a covariance is not definite.
+    """
+    stored = replace(model.rounded(fmt), x0=np.array([Fraction(0)] * model.n, dtype=object))
+    run, repeat, period = _emulated(stored, fmt, form, most)
+    bad = run.stopped or run.indefinite
+    if run.stopped:
+        why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
+    elif run.indefinite:
+        why = f"the computed covariance lost definiteness at step {run.indefinite}"
+    elif repeat is None:
+        why = f"the computed gain did not settle within {run.steps} steps"
+    else:
+        why = ""
+    end = max(bad - bool(run.stopped), 0) if bad else run.steps if repeat is None or period is None else repeat + period
+    if end == 0:
+        raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed: {why}")
+    if repeat is None or period is None or why:
+        end = end if horizon is None else min(end, horizon)
+        K, dK, settled, first = _exact_gains(stored, end, None, most, fmt)[:4]
+        repeat = period = None
+    else:
+        K, dK, settled, first = _exact_gains(stored, repeat, period, most, fmt)
+        if not settled:
+            why = f"the exact gain did not settle within {len(K)} steps"
+    steps = len(K)
+    rows = _rows(steps, repeat, period)
+    program, packed = packed_coefficients(run, fmt, form, rows)
+    phases = np.arange(steps)
+    Phi = double_doubles(stored.Phi)[phases % len(stored.Phi)]
+    cycle = np.lcm(len(stored.H), len(stored.Phi))
+    products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
+    HPhi = double_doubles(products)[phases % cycle]
+    x0 = model.rounded(fmt).x0
+    coefficients = widened_array(packed)
+    return Schedule(program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why)
+
+
+def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int64]:
+    """Which emulated step has the coefficients of each step."""
+    k = np.arange(steps)
+    if repeat is None or period is None:
+        return k
+    return np.where(k < repeat + period, k, repeat + (k - repeat) % period)
+
+
+def _emulated(stored: LinearModel, fmt: FloatFormat, form: Form, most: int) -> tuple[Run, int | None, int | None]:
+    """A run that keeps every gain, and after how many steps the computed covariance first was what it is again."""
+    steps = min(most, max(128, 2 * stored.cycle))
+    while True:
+        run = Run(stored, fmt, form, range(1, steps + 1))
+        start = np.array(run.P)
+        run.take(np.zeros((steps, stored.m)))
+        done = run.steps
+        seen: dict[tuple[int, bytes], int] = {(0, start.tobytes()): 0}
+        for k in range(1, done + 1):
+            key = (k % stored.cycle, (run.C[k - 1] + 0).tobytes())
+            if key in seen:
+                return run, seen[key], k - seen[key]
+            seen[key] = k
+        if done < steps or steps >= most:
+            return run, None, None
+        steps = min(most, 4 * steps)
+
+
+def packed_coefficients(
+    run: Run, fmt: FloatFormat, form: Form, rows: NDArray[np.int64]
+) -> tuple[Program, NDArray[Any]]:
+    """The program of a form and its coefficients, row by row, as the run had them."""
+    n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
+    Phi, H, identity = (pack(fmt, each) for each in (run.model.Phi, run.model.H, np.eye(n, dtype=np.int64)))
+    K = np.ascontiguousarray(run.G[:last])
+    tail = K.shape[3:]
+
+    def flat(matrices: NDArray[Any]) -> NDArray[Any]:
+        """Entries of the matrix of each step, a row a step."""
+        return matrices[rows].reshape(len(rows), -1, *tail)
+
+    if form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
+        F = np.empty((last, n, n, *tail), K.dtype)
+        _stored_loops(run.tag, K, H, Phi, identity, F)
+        return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
+    if form == Form.UD:
+        cycle = int(np.lcm(len(H), len(run.UR)))
+        D = np.empty((cycle, m, n, *tail), K.dtype)
+        _decorrelated(run.tag, run.UR, H, D)
+        U = np.array(run.UR)
+        for i in range(m):  # the diagonal holds variances, and ones are meant there
+            U[:, i, : i + 1] = 0
+        parts = [_of_cycle(each, rows, tail) for each in (Phi, U, D)]
+        return sequential_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
+    parts = [_of_cycle(each, rows, tail) for each in (Phi, H)]
+    return innovation_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
+
+
+def pack(fmt: FloatFormat, values: Any) -> NDArray[Any]:
+    """Numbers as the compiled loops of a format take them."""
+    array = fmt.array(values)
+    if not isinstance(array.backend, Compiled):
+        raise OverflowError(f"got numbers beyond the range of the compiled loops of {fmt}; scale the states")
+    return array.backend.pack(array.components)
+
+
+def _of_cycle(matrices: NDArray[Any], rows: NDArray[np.int64], tail: tuple[int, ...]) -> NDArray[Any]:
+    return matrices[rows % len(matrices)].reshape(len(rows), -1, *tail)
+
+
+def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Packed numbers of any format as double-double: exact in base 2 and 16, the nearest in base 10."""
+    if packed.dtype == np.float64:
+        return np.stack([packed, np.zeros_like(packed)], axis=-1)
+    significands, exponents = packed[..., 0], packed[..., 1]
+    out = np.empty((*significands.shape, 2))
+    known: dict[tuple[int, int], tuple[float, float]] = {}
+    for index in np.ndindex(significands.shape):
+        pair = int(significands[index]), int(exponents[index])
+        if pair not in known:
+            value = Fraction(pair[0]) * Fraction(10) ** pair[1]
+            high = float(value)
+            known[pair] = high, float(value - Fraction(high))
+        out[index] = known[pair]
+    return out
+
+
+# -- the exact gain ---------------------------------------------------------------------------------------------------
+
+
+def _exact_gains(
+    stored: LinearModel, repeat: int, period: int | None, most: int, fmt: FloatFormat
+) -> tuple[NDArray[np.float64], NDArray[np.float64], bool, int]:
+    """The exact filter's gain in double-double, a bound of its error, whether it holds for ever, and from which row.
+
+    Without a period, of the first `repeat` steps. With one, until the exact gain is periodic too: if the exact
+    covariance is within some distance of the computed one at the beginning of a period, measured in the norm of the
+    contraction bound, and within the same distance of the same one at its end, then so it is for ever.
+    """
+    n, m = stored.n, stored.m
+    if period is None:
+        run = _bounded_run(stored, repeat)
+        return run.G.reshape(repeat, n, m, 2), run.bounds[1], False, repeat
+    unit = float(fmt.unit_roundoff)
+    steps = repeat + 2 * period
+    while True:
+        run = _bounded_run(stored, steps)
+        first = steps - period
+        K = run.G.reshape(steps, n, m, 2)
+        change = np.abs(K[first:, :, :, 0] - K[first - period : first, :, :, 0])
+        size = np.abs(K[first:, :, :, 0]).max(axis=(0, 1), keepdims=True)
+        if (change <= 1e-5 * unit * size).all() or steps >= most:
+            break
+        steps = min(max(most, repeat + 2 * period), repeat + period * (2 + 2 * ((steps - repeat) // period)))
+    for _ in range(6):
+        # The invariant distance, by trial.
+        for larger in (4.0, 1e3, 1e6, 1e9):
+            closed = _closes(stored, run, first, period, larger, most)
+            if closed is not None:
+                extended, dK = closed
+                return extended.G.reshape(-1, n, m, 2), dK, True, first + period
+        if steps + period > most:
+            break
+        steps = min(most, 2 * steps - repeat)
+        steps = repeat + (steps - repeat) // period * period
+        run = _bounded_run(stored, steps)
+        first = steps - period
+    return K, run.bounds[1], False, len(K)
+
+
+def _bounded_run(stored: LinearModel, steps: int) -> BoundedRun:
+    run = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
+    run.take(np.zeros((steps, stored.m)))
+    if run.stopped:
+        raise ArithmeticError(f"{stored.name}: the exact filter stopped at step {run.stopped}; scale the model")
+    return run
+
+
+def _closes(
+    stored: LinearModel, run: BoundedRun, first: int, period: int, larger: float, most: int
+) -> tuple[BoundedRun, NDArray[np.float64]] | None:
+    """Follow one more period from a distance that is to be invariant; the longer run and its bounds, or None."""
+    steps = run.steps + period
+    longer = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
+    longer.take(np.zeros((run.steps, stored.m)))
+    begin, P_begin = longer.bound, _symmetric(longer)
+    weights = arb_mat([[arb(float(a)) for a in row] for row in begin.L])
+    inverse = weights.inv()
+    last = _symmetric_of(run, run.steps - 1 - period) if run.steps > period else P_begin
+    wrap = _distance(inverse, P_begin - last)
+    trial = max(larger * begin.zeta, larger * wrap, 1e-28)
+    longer.bound = begin._replace(zeta=trial)
+    longer.take(np.zeros((period, stored.m)))
+    end = longer.bound
+    if not np.isfinite(end.zeta):
+        return None
+    turned = inverse * arb_mat([[arb(float(a)) for a in row] for row in end.L])
+    kappa = _frobenius_to_identity(turned)
+    total = (1 + kappa) ** 2 * arb(float(end.zeta)) + arb(_distance(inverse, _symmetric(longer) - P_begin))
+    return (longer, longer.bounds[1]) if total <= arb(float(trial)) else None
+
+
+def _symmetric(run: BoundedRun) -> NDArray[Any]:
+    P = run.exactly(run.P)
+    return np.asarray((P + P.T) / 2)
+
+
+def _symmetric_of(run: BoundedRun, row: int) -> NDArray[Any]:
+    P = run.exactly(run.C[row])
+    return np.asarray((P + P.T) / 2)
+
+
+def _distance(inverse: Any, change: NDArray[Any]) -> float:
+    """Upper bound of the norm of a change of the covariance in the units of the weights, float64."""
+    D = arb_mat([[arb(a.numerator) / arb(a.denominator) for a in row] for row in change])
+    X = inverse * D * inverse.transpose()
+    return _upper(_norm(X.entries()))
+
+
+def _frobenius_to_identity(X: Any) -> Any:
+    n = X.nrows()
+    return _norm(X[i, j] - int(i == j) for i in range(n) for j in range(n))
+
+
+def _norm(balls: Iterable[Any]) -> Any:
+    """Upper bound of the root of the sum of squares; a ball around zero has no square root of its own."""
+    return sum((arb(x.abs_upper()) ** 2 for x in balls), arb(0)).sqrt()
+
+
+def _upper(x: Any) -> float:
+    return float(x.upper()) * (1 + 2.0**-50)

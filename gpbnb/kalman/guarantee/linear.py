@@ -1,0 +1,218 @@
+r"""Linear filters and controllers with fixed coefficients: the case without a covariance.
+
+A filter :math:`x_k = Ax_{k-1} + Bz_k,\ y_k = Cx_{k-1} + Dz_k` has its coefficients from the start, so that the
+guarantee needs no emulation of a gain. Its outputs become states that nothing else uses. The exact filter has the same
+stored coefficients: the bound is on what rounding in the computation does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.guarantee.gains import Schedule, pack, widened_array
+from gpbnb.kalman.guarantee.program import (
+    Program,
+    biquad_program,
+    controller_program,
+    functionals,
+    state_space_program,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFilter:
+    """A linear filter: the operations of a step, and its coefficients, exact.
+
+    Parameters
+    ----------
+    program : operations of a step.
+    coefficients : (c,), as a designer gives them; a format stores each rounded.
+    name : what tables call it.
+    """
+
+    program: Program
+    coefficients: NDArray[Any]
+    name: str = "a linear filter"
+
+    def schedule(self, fmt: FloatFormat) -> Schedule:
+        """The filter in a format, as :func:`gpbnb.kalman.guarantee.bound.from_schedule` takes it."""
+        program, first = self.program, self.program.n + self.program.m
+        packed = pack(fmt, self.coefficients.reshape(1, -1))
+        coefficients = widened_array(packed)
+        count = first + len(program.operations)
+        rows, sizes = np.empty((count, first, 2)), np.empty((count, first))
+        functionals(program.operations, coefficients[0], first, rows, sizes)
+        whole = rows[program.outputs]
+        n, m = program.n, program.m
+        return Schedule(
+            program,
+            fmt,
+            coefficients,
+            packed,
+            np.ascontiguousarray(whole[None, :, :n]),
+            np.zeros((1, m, n, 2)),
+            np.ascontiguousarray(whole[None, :, n:]),
+            np.zeros((1, n, m)),
+            np.array([Fraction(0)] * n, dtype=object),
+            first=0,
+            settled=True,
+            repeat=None,
+            period=None,
+        )
+
+
+def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
+    """A filter given by its matrices; with C and D, outputs follow the states.
+
+    Raises
+    ------
+    ValueError : shapes that do not fit.
+    """
+    A, B = exact(A), exact(B)
+    n, m = B.shape
+    outputs = 0 if C is None else len(exact(C))
+    if A.shape != (n, n) or (C is not None and (exact(C).shape != (outputs, n) or exact(D).shape != (outputs, m))):
+        raise ValueError(
+            f"got A of shape {A.shape} and B of shape {B.shape}; needed (n, n) and (n, m), C (p, n), D (p, m)"
+        )
+    if C is not None:
+        nothing = np.full((n + outputs, outputs), Fraction(0), dtype=object)
+        A = np.hstack([np.vstack([A, exact(C)]), nothing])
+        B = np.vstack([B, exact(D)])
+    coefficients = np.concatenate([A.reshape(-1), B.reshape(-1)])
+    return LinearFilter(state_space_program(n + outputs, m), coefficients, name)
+
+
+def biquad(b0: Any, b1: Any, b2: Any, a1: Any, a2: Any, name: str = "a second-order section") -> LinearFilter:
+    """A second-order section (b0 + b1/z + b2/z²)/(1 + a1/z + a2/z²) in transposed direct form II; output is state 2."""
+    return LinearFilter(biquad_program(), exact([b0, b1, b2, a1, a2]), name)
+
+
+def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any, name: str = "a PID controller") -> LinearFilter:
+    """A PID controller whose integral forgets by the factor `leak` a step; the input is the error, output is state 2.
+
+    With leak = 1 the integral keeps every rounding error, and there is no bound for all time.
+    """
+    return LinearFilter(controller_program(), exact([leak, Ki, Kp, Kd]), name)
+
+
+class Enclosure(NamedTuple):
+    """Lower and upper bounds, float64."""
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
+    r"""Worst-case peak gain :math:`|D| + \sum_{l\ge0}|CA^lB|`, in ball arithmetic; (p, m).
+
+    Balls grow at each product, by the norm of |A| rather than that of A: the bits are doubled until both ends agree to
+    2**-40. See :func:`_peak_gain`.
+
+    Raises
+    ------
+    ValueError : no power up to 2**20 has a norm below 1.
+    """
+    bits = 256
+    while True:
+        found = _peak_gain(A, B, C, D, bits)
+        if (found.high - found.low <= 2.0**-40 * found.high).all():
+            return found
+        bits *= 2
+
+
+def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> Enclosure:
+    r"""The sum in balls of some bits, until what is left is below 2**-60 of it, or the balls have grown too large.
+
+    :math:`\|A^N\|_\infty = q < 1` is proved for a power, and rows beyond sum up to at most
+    :math:`\|CA^L\|_1/(1-q)` times the largest entry of :math:`\sum_{j<N}|A^jB|`. Shares nothing with
+    :mod:`gpbnb.kalman.guarantee.envelope`, and is its oracle.
+    """
+    before, ctx.prec = ctx.prec, bits
+    try:
+        a, b, c = (_balls(each) for each in (A, B, C))
+        power, N = a, 1
+        while not _row_norm(power) < 1:
+            power, N = power * power, 2 * N
+            if N > 2**20:
+                raise ValueError("got a filter of which no power was proved to contract; needed a stable one")
+        left = 1 / (1 - _row_norm(power))
+        within, moving = arb(0), b
+        total_columns = [[arb(0)] * b.ncols() for _ in range(b.nrows())]
+        for _ in range(N):
+            for i in range(b.nrows()):
+                for j in range(b.ncols()):
+                    total_columns[i][j] += abs(moving[i, j])
+            moving = a * moving
+        for row in total_columns:
+            for entry in row:
+                within = entry if entry > within else within
+        p, m = c.nrows(), b.ncols()
+        sums = [[abs(_balls(D)[i, j]) if D is not None else arb(0) for j in range(m)] for i in range(p)]
+        row = c
+        while True:
+            tail = _row_norm(row) * left * within
+            if tail < arb(2) ** -60 or not float(tail.rad()) < 2.0**-30:
+                break
+            for _ in range(64):
+                terms = row * b
+                for i in range(p):
+                    for j in range(m):
+                        sums[i][j] += abs(terms[i, j])
+                row = row * a
+        low = np.array([[float(s.lower()) * (1 - 2.0**-50) for s in line] for line in sums])
+        high = np.array([[float((s + tail).upper()) * (1 + 2.0**-50) for s in line] for line in sums])
+        return Enclosure(low, high)
+    finally:
+        ctx.prec = before
+
+
+def error_coefficients(A: Any, B: Any, C: Any, D: Any, largest_input: float) -> NDArray[np.float64]:
+    r"""FixIF's coefficients: what one unit in the last place of each state and of the output may do to the output.
+
+    .. math:: E_j = \mathrm{WCPG}(\text{error in } x_j \to y)\cdot 2^{\lceil\log_2\max|x_j|\rceil}
+
+    The output error is at most the sum of :math:`E_j 2^{-w_j}` up to factors of the rounding, w_j bits each.
+
+    Returns
+    -------
+    coefficients : (n + 1,), the output last.
+
+    Raises
+    ------
+    ArithmeticError : the enclosure of a largest state holds a power of two.
+
+    References
+    ----------
+    Volkova, Hilaire and Lauter, IEEE Trans. Computers 69 (2020); FixIF's example files.
+    """
+    n = len(exact(A))
+    unit = exact(np.eye(n, dtype=np.int64))
+    to_output = peak_gain(A, unit, C)
+    states, output = peak_gain(A, B, unit), peak_gain(A, B, C, D)
+    low = np.concatenate([states.low[:, 0], output.low[:, 0]]) * largest_input
+    high = np.concatenate([states.high[:, 0], output.high[:, 0]]) * largest_input
+    exponents = np.ceil(np.log2(high))
+    if np.any(exponents != np.ceil(np.log2(low))):
+        raise ArithmeticError("the largest value of a state is too near a power of two; use more bits")
+    return np.concatenate([to_output.high[0], [1.0]]) * 2.0**exponents
+
+
+def _balls(values: Any) -> Any:
+    return arb_mat([[arb(x.numerator) / arb(x.denominator) for x in row] for row in exact(values)])
+
+
+def _row_norm(X: Any) -> Any:
+    largest = arb(0)
+    for i in range(X.nrows()):
+        row = sum((abs(X[i, j]) for j in range(X.ncols())), arb(0))
+        largest = row if row > largest else largest
+    return arb(largest.upper())

@@ -1,0 +1,47 @@
+r"""The probable error beside the worst case: roundings as independent noise.
+
+Each rounding error is taken as uniform within its limit, independent of all others. Their covariance goes on as
+:math:`\Sigma_k = \hat F_k\Sigma_{k-1}\hat F_k^T + \Gamma_k\operatorname{diag}(\sigma^2)\Gamma_k^T`, and settles at the
+solution of a Lyapunov equation. Errors of gain and stored closed loop are no noise, and are left out. This is an
+estimate, not a bound, and of chopped arithmetic, whose errors have a mean, it says too little.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_lyapunov
+
+from gpbnb.kalman.guarantee.bound import Guarantee, disturbances_of
+
+
+def probable_error(found: Guarantee) -> NDArray[np.float64]:
+    """Standard deviation of the error of each state that roundings cause, the largest over a period; (n,).
+
+    Values are taken to be as large as their limits allow; smaller ones have smaller rounding errors.
+
+    Raises
+    ------
+    ValueError : the guarantee does not hold for ever.
+    """
+    given = found.schedule
+    if not found.for_ever:
+        raise ValueError(f"got a filter without a steady state: {found.why}; needed one with a bound for ever")
+    each = disturbances_of(found)
+    groups, first = len(given.program.roots), given.first
+    # The limit of a group is a sum over roundings; independent ones have the sum of squares. All alike: mean square.
+    count = np.maximum(given.program.roundings, 1)
+    variance = each.limits[first:, :groups] ** 2 / 3 / count
+    F, noise = (
+        each.F[first:],
+        np.einsum("kig,kg,kjg->kij", each.G[first:, :, :groups], variance, each.G[first:, :, :groups]),
+    )
+    whole, gathered = np.eye(given.program.n), np.zeros_like(noise[0])
+    for loop, added in zip(F, noise, strict=True):
+        whole, gathered = loop @ whole, loop @ gathered @ loop.T + added
+    covariance = np.asarray(solve_discrete_lyapunov(whole, gathered))
+    largest = np.diagonal(covariance).copy()
+    for loop, added in zip(F, noise, strict=True):
+        covariance = loop @ covariance @ loop.T + added
+        largest = np.maximum(largest, np.diagonal(covariance))
+    return np.sqrt(largest)

@@ -1,0 +1,117 @@
+"""Emulated runs against guarantees: random stable filters in many formats, with random, constant and chosen inputs.
+
+``python -m gpbnb.kalman.guarantee.survey`` computes ``survey.csv`` anew; with ``--sample 20`` it recomputes that many
+of its rows, chosen at random, and compares them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.kalman.guarantee.adversary import responses, run_against
+from gpbnb.kalman.guarantee.bound import closed_loops, from_schedule, limits
+from gpbnb.kalman.guarantee.linear import state_space
+
+FILE = Path(__file__).with_name("survey.csv")
+ROWS = 2_000
+RANDOM, CONSTANT, CHOSEN = 40, 6, 5
+"""Runs of each kind for a filter."""
+STEPS = 300
+_WHOLE = {"seed", "n", "m", "base", "precision", "runs"}
+
+
+class Row(NamedTuple):
+    """A filter in a format, and the largest error over bound of any state, step and run of each kind."""
+
+    seed: int
+    n: int
+    m: int
+    base: int
+    precision: int
+    rounding: str
+    radius: str
+    runs: int
+    random: str
+    constant: str
+    chosen: str
+
+
+def compute(seed: int) -> Row:
+    """One row; everything is drawn from its seed."""
+    rng = np.random.default_rng([19, seed])
+    n, m = int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    A, B = rng.standard_normal((n, n)), rng.standard_normal((n, m))
+    A *= rng.uniform(0.3, 0.97) / np.abs(np.linalg.eigvals(A)).max()
+    base = int(rng.choice([2, 10]))
+    precision = int(rng.integers(6, 31) if base == 2 else rng.integers(3, 9))
+    fmt = FloatFormat(base, precision, list(Rounding)[int(rng.integers(2))])
+    A, B = np.round(A * 2**20) / 2**20, np.round(B * 2**20) / 2**20
+    Z = 10.0 ** rng.uniform(-2, 3, m)
+    found = from_schedule(state_space(A, B).schedule(fmt), limits(n, m, measurement=Z))
+    if not found.for_ever:  # rounded to few digits, the loop may be unstable
+        return Row(seed, n, m, base, precision, fmt.rounding.value, f"{found.radius:.4f}", 0, "0", "0", "0")
+    F, steer, worst = closed_loops(found.schedule), np.zeros((m, n + 1)), [0.0, 0.0, 0.0]
+    every = [responses(found.schedule, F, state, STEPS) for state in range(n)]
+    kinds = [0] * RANDOM + [1] * CONSTANT + [2] * CHOSEN
+    for kind in kinds:
+        rows = every[int(rng.integers(n))]
+        if kind == 0:
+            pool = Z * rng.uniform(-1, 1, (STEPS, 1, m))
+        elif kind == 1:
+            pool = np.broadcast_to(Z * rng.uniform(-1, 1, m), (STEPS, 1, m)).copy()
+        else:
+            pool = Z * rng.uniform(-1, 1, (STEPS, 30, m))
+        _, _, errors = run_against(found, rows, pool * (1 - 2.0**-5), steer, False)
+        worst[kind] = max(worst[kind], float((np.abs(errors).max(axis=0) / found.bound).max()))
+    ratios = [f"{each:.4g}" for each in worst]
+    return Row(seed, n, m, base, precision, fmt.rounding.value, f"{found.radius:.4f}", len(kinds), *ratios)
+
+
+def load(file: Path = FILE) -> tuple[Row, ...]:
+    """The stored rows."""
+    with file.open(encoding="utf-8", newline="") as stream:
+        return tuple(
+            Row(**{f: int(v) if f in _WHOLE else v for f, v in line.items()})  # type: ignore[arg-type]
+            for line in csv.DictReader(stream)
+        )
+
+
+def sample(count: int, seed: int) -> list[tuple[Row, Row]]:
+    """Recompute some stored rows; pairs that differ."""
+    rows = load()
+    chosen = np.random.default_rng(seed).choice(len(rows), min(count, len(rows)), replace=False)
+    pairs = [(rows[i], compute(rows[i].seed)) for i in chosen]
+    return [(stored, again) for stored, again in pairs if stored != again]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute the survey, or recompute a sample of it; non-zero if that differs."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sample", type=int, default=0, help="rows to recompute and compare")
+    parser.add_argument("--seed", type=int, default=0, help="which rows")
+    parser.add_argument("--rows", type=int, default=ROWS)
+    given = parser.parse_args(arguments)
+    if given.sample:
+        different = sample(given.sample, given.seed)
+        for stored, again in different:
+            print(f"stored {stored}, recomputed {again}")
+        return bool(different)
+    with FILE.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(Row._fields)
+        for seed in tqdm(range(given.rows)):
+            writer.writerow(compute(seed))
+            stream.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,123 @@
+"""gpbnb.kalman.report_bounds: the counts of the report and its closing example."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+import sympy as sp
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman import derivation, report_bounds
+
+# -- counts ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("faults", report_bounds.CORRECTIONS.values())
+@pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (4, 3, 5), (17, 10, 2), (3_153_600, 10, 2)])
+def test_coefficients_are_those_derived(faults, k, n, m):
+    c, d = derivation.ONCE if faults.get("once") else derivation.TWICE
+    g = derivation.GROWTH if faults.get("carried") else sp.S.Zero
+    first = derivation.count_start(c, g)
+    second = derivation.second_coefficient(c, d, g, 1 if faults.get("free_signs") else -1)
+    values = {derivation.K: k, derivation.N: n, derivation.M: m}
+    assert report_bounds.coefficients(k, n, m, **faults) == (first.subs(values), second.subs(values))
+
+
+@pytest.mark.parametrize(
+    "faults", [{}, {"once": True}, {"free_signs": True}, {"carried": True}, {"once": True, "carried": True}]
+)
+def test_coefficients_are_sums_over_steps(faults):
+    k, n, m = 7, 3, 2
+    grow = 3 * n + m + 2 if faults.get("carried") else 0
+    extra = 0 if faults.get("once") else 1
+    c = [6 * n + 3 * m + 5 + extra * (n + 1) + grow * j for j in range(k)]
+    d = [4 * n + 3 * m + 4 + extra + grow * j for j in range(k)]
+    a0 = sum(c)
+    a = [sum(c[i + 1 :]) + d[i] for i in range(k)]
+    sign = 1 if faults.get("free_signs") else -1
+    assert report_bounds.coefficients(k, n, m, **faults) == (a0, sum(a0 + sign * each for each in a))
+
+
+def test_the_printed_cases():
+    n, m = 4, 3
+    assert report_bounds.coefficients(3, n, m) == (3 * (7 * n + 3 * m + 6), 30 * n + 9 * m + 21)
+    assert report_bounds.coefficients(4, n, m).second == 4 * (3 * n + 1) + 6 * (7 * n + 3 * m + 6)
+    assert (
+        report_bounds.prediction_count(n),
+        report_bounds.covariance_count(n, m),
+        report_bounds.gain_count(n, m),
+    ) == (9, 17, 25)
+    assert (report_bounds.transition_count(n, m), report_bounds.input_count(n, m)) == (38, 29)
+
+
+@pytest.mark.parametrize("numbers", [(0, 1, 1), (1, 0, 1), (1, 1, 0)])
+def test_coefficients_refuse_nothing(numbers):
+    with pytest.raises(ValueError, match="needed each at least 1"):
+        report_bounds.coefficients(*numbers)
+
+
+def test_printed_bounds_of_covariance_and_gain():
+    beta = Fraction(1, 1000)
+    assert report_bounds.printed_covariance_bound([[2, -1], [-1, 3]], 1, beta).tolist() == [
+        [Fraction(18, 1000), Fraction(9, 1000)],
+        [Fraction(9, 1000), Fraction(27, 1000)],
+    ]
+    assert report_bounds.printed_gain_bound([[2], [-1]], beta).tolist() == [[Fraction(26, 1000)], [Fraction(13, 1000)]]
+
+
+def test_the_least_b():
+    F = [exact([["1/2", 0], ["1/2", 2]]), exact([[0, 0], [0, 1]])]
+    u = [exact([3, -5]), exact([0, 1])]
+    assert report_bounds.printed_input_bound(F, u) == 5 * 2
+    assert report_bounds.printed_input_bound([f / 4 for f in F], u) == 5
+    assert report_bounds.state_bound(
+        Fraction(3), Fraction(2), Fraction(1, 10), report_bounds.Coefficients(5, 7)
+    ) == Fraction(29, 10)
+    with pytest.raises(ValueError, match="got 2 transitions and 1 inputs"):
+        report_bounds.printed_input_bound(F, u[:1])
+    with pytest.raises(ValueError, match="at least one"):
+        report_bounds.printed_input_bound([], [])
+
+
+# -- the closing example --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("base", "rounding"), [(2, Rounding.NEAREST), (10, Rounding.NEAREST), (10, Rounding.CHOP)])
+@pytest.mark.parametrize("coefficient", [1, 82, 999_999, 10**9, Fraction(1, 7)])
+def test_required_precision_is_enough_and_the_least(base, rounding, coefficient):
+    t = report_bounds.precision_for_coefficient(coefficient, Fraction(1, 3), base, rounding)
+    assert coefficient * FloatFormat(base, t, rounding).unit_roundoff <= Fraction(1, 3)
+    assert t == 1 or coefficient * FloatFormat(base, t - 1, rounding).unit_roundoff > Fraction(1, 3)
+
+
+@pytest.mark.parametrize(("coefficient", "tolerance"), [(0, 1), (1, 0), (-1, 1)])
+def test_required_precision_needs_positive_numbers(coefficient, tolerance):
+    with pytest.raises(ValueError, match="needed both positive"):
+        report_bounds.precision_for_coefficient(coefficient, tolerance)
+
+
+def test_the_closing_example():
+    first, second = report_bounds.coefficients(*report_bounds.EXAMPLE)
+    assert (first, second) == (258_595_200, 407_752_879_824_000)
+    assert (report_bounds.precision_for_coefficient(first), report_bounds.precision_for_coefficient(second)) == (10, 16)
+    assert report_bounds.precision_for_coefficient(second, base=2) == 49  # IEEE double has 53
+
+
+def test_which_misprint_leads_to_which_printed_number():
+    k, n, m = report_bounds.EXAMPLE
+    printed = report_bounds.PRINTED
+    assert not prints_as(report_bounds.coefficients(k, n, m).first, printed["first coefficient"])
+    assert report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"]) == [(7, 4, 6), (7, 3, 8)]
+    assert prints_as(report_bounds.read_as_product(k, n, m, 84), printed["second coefficient"])
+    assert not prints_as(report_bounds.read_as_product(k, n, m), printed["second coefficient"])
+    for name in ("first", "second"):
+        assert prints_as(1 / Fraction(printed[f"{name} coefficient"]), printed[f"{name} beta"])
+
+
+def test_the_order_of_the_equations():
+    found = report_bounds.order(second=False)
+    for equation, needs in report_bounds.dependencies(second=False).items():
+        assert all(found.index(need) < found.index(equation) for need in needs)
+    assert report_bounds.order(second=True) is None

@@ -1,0 +1,67 @@
+"""gpbnb.kalman.smallest: filters of one and two states that violate the bounds of the report."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman import smallest
+
+FORMATS = [
+    FloatFormat(b, t, rounding)
+    for b in (2, 3, 10, 16)
+    for t in (2, 4, 9, 17)
+    for rounding in Rounding.documented()
+    if b**t > 40
+]
+
+
+@pytest.mark.parametrize("fmt", FORMATS, ids=str)
+def test_the_smallest_filter_breaks_the_bounds_by_the_derived_factors_in_every_format(fmt):
+    case, beta = smallest.scalar(fmt), fmt.unit_roundoff
+    x, K, P = smallest.rounded_step(fmt, case)
+    assert (x[0], K[0, 0], P[0, 0]) == (0, 1, 0)
+    x, K, P = smallest.rounded_step(fmt, case, second=True)
+    assert (x[0], K[0, 0], P[0, 0]) == (1, 0, 0)
+    first, second = smallest.ratios(fmt, case), smallest.ratios(fmt, case, second=True)
+    assert first.covariance == second.covariance == float(1 / (6 * beta))
+    assert second.gain == float(1 / (9 * beta))
+    assert first.state == float(1 / (16 * beta))
+    assert second.state == float(1 / (16 * beta * case.R[0, 0]))
+    assert first.gain < 1
+
+
+def test_more_steps_and_more_states():
+    four = FloatFormat(10, 4)
+    later = smallest.ratios(four, smallest.scalar(four), steps=2)
+    assert later.gain == float(1 / (9 * four.unit_roundoff))
+    assert smallest.ratios(four, smallest.scalar(four), steps=3).state == float(1 / (48 * four.unit_roundoff))
+    # (4n + 2m + 3) β = 13 β, and the first entry of the gain is lost.
+    assert smallest.ratios(four, smallest.correlated()).gain == float(1 / (13 * four.unit_roundoff))
+
+
+def test_nothing_is_broken_where_nothing_cancels():
+    four = FloatFormat(10, 4)
+    for second in (False, True):
+        assert max(smallest.ratios(four, smallest.scalar(four, r=9), second)) < 1
+
+
+@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("fmt", [FloatFormat(10, 2), FloatFormat(2, 6)], ids=str)
+def test_the_largest_violating_noise_is_the_largest(fmt, second):
+    found = smallest.largest_violating_noise(fmt, second)
+    numbers = {Fraction(d, fmt.base ** (fmt.precision - 1 + e)) for e in range(3) for d in range(1, 100)}
+    for name, largest in found.items():
+        assert getattr(smallest.ratios(fmt, smallest.scalar(fmt, largest), second), name) > 1
+        for r in numbers:
+            if largest < r <= 1 and fmt.round(r) == r:
+                assert getattr(smallest.ratios(fmt, smallest.scalar(fmt, r), second), name) <= 1
+
+
+def test_a_step_of_more_measurements_is_refused():
+    case = smallest.scalar(FloatFormat(10, 4))._replace(H=exact([[1], [1]]))
+    with pytest.raises(ValueError, match="got 2 measurements; needed one"):
+        smallest.rounded_step(FloatFormat(10, 4), case)
