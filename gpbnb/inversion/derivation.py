@@ -264,16 +264,6 @@ def perturbed_system() -> Derivation:
     )
 
 
-def line_before_68(brackets: bool = True) -> sp.Expr:
-    r"""Left less right side of :math:`(\hat A-\Delta A)(\hat x-\Delta x) = \hat b-\Delta b`; zero if it holds.
-
-    Without `brackets` around the second factor, as printed in 1984.
-    """
-    hat, solved = A + DELTA, X + D_X
-    left = (hat - DELTA) * (solved - D_X) if brackets else (hat - DELTA) * solved - D_X
-    return sp.expand(left - A * X)
-
-
 def two_systems() -> Derivation:
     r"""What (91) and (92) add up: Ã and b̃ change the given system, ΔA and Δb the triangular one.
 

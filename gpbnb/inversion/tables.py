@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gpbnb.display.tables import Table, digits, scientific
-from gpbnb.inversion.example import PLACES, PRINTED, Claim, Column, Possible, Search
+from gpbnb.inversion.example import PLACES, PRINTED, Claim, Column, Search
+from gpbnb.inversion.existence import Possible
 from gpbnb.inversion.experiment import Frozen, Trial
 
 

@@ -47,6 +47,9 @@ REPEATS = 34
 
 _HERE = Path(__file__).parent
 
+#: The stored sweep.
+FILE = _HERE / "ensembles.csv"
+
 
 class Task(NamedTuple):
     """One trial: a random model of a kind, and a filter."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
+from matplotlib.lines import Line2D
 
-from gpbnb.arithmetic.formats import Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.style import (
     BOUND,
     COLOURS,
@@ -28,6 +30,7 @@ from gpbnb.kalman.answers import Answers, decimal_digits, largest
 from gpbnb.kalman.bounded_run import BoundedHistory
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.probability import Share
 from gpbnb.kalman.year import Year
 
 _QUANTITIES = {
@@ -98,7 +101,7 @@ def year_end(
     runs: Sequence[Year],
     ax: Axes,
     tolerance: float,
-    counts: Sequence[tuple[str, report_bounds.Coefficients]],
+    faults: Mapping[str, Mapping[str, bool]],
     answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
     """Largest error of drift or rate in a year against the digits, beside (125) and the answers to how many.
@@ -106,9 +109,10 @@ def year_end(
     Parameters
     ----------
     tolerance : in mas and mas/yr.
-    counts : name and coefficients of bounds like (125), which are drawn for a norm of the state and a B of 1, as in the
-        report's example.
-    answers : name and numbers of digits, open markers on the tolerance; the last is drawn upright, through it.
+    faults : name, and the faults of (125) that are corrected, as for
+        :func:`gpbnb.kalman.report_bounds.gravity_probe_b_bound`.
+    answers : name and numbers of digits. Those of the report are open markers where the error is as large as the drift
+        of a year, which is what they grant; the last is drawn upright, through the tolerance.
     """
     artists: list[Artist] = []
     for form, rounding in [(form, rounding) for rounding in Rounding.documented() for form in Form]:
@@ -117,12 +121,13 @@ def year_end(
             colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
             name = f"{form}, {rounding.value}"
             artists += ax.plot(*zip(*sorted(points), strict=True), _MARKERS[form], color=colour, label=name, alpha=0.7)
-    for (name, each), style in zip(counts, ("-", "--", "-."), strict=False):
-        artists += ax.plot(_DIGITS, _allowed(each), color=BOUND, ls=style, label=name)
+    for (name, corrected), style in zip(faults.items(), ("-", "--", "-."), strict=False):
+        artists += bound_by_digits(ax, corrected, ls=style, label=name)
     artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
     for (name, places), marker in zip(answers[:-1], "os^", strict=False):
         colour = BOUND if marker == "o" else STRICT
-        artists += ax.plot(list(places), [tolerance] * len(places), marker, mfc="none", mec=colour, ms=9, label=name)
+        height = [float(report_bounds.YEAR_SIZE)] * len(places)
+        artists += ax.plot(list(places), height, marker, mfc="none", mec=colour, ms=9, label=name)
     for name, places in answers[-1:]:
         artists += ax.plot(
             list(places), [tolerance] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name
@@ -135,13 +140,10 @@ def year_end(
 
 def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
     """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
-    lines = [
-        ("(125), printed formula", report_bounds.coefficients(*report_bounds.EXAMPLE)),
-        (
-            "(125), all faults corrected",
-            report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.CORRECTIONS["and errors carried on"]),
-        ),
-    ]
+    lines: dict[str, Mapping[str, bool]] = {
+        "(125), printed formula": {},
+        "(125), all faults corrected": report_bounds.CORRECTIONS["and errors carried on"],
+    }
     marked: list[tuple[str, Sequence[float]]] = [
         ("printed answers", found.printed),
         ("formula", found.formula),
@@ -164,18 +166,18 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         ("(125) as printed", {}, "-"),
         ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"], "--"),
     ):
-        height = _allowed(report_bounds.coefficients(*report_bounds.EXAMPLE, **faults))
-        artists += ax.plot(_DIGITS, height, color=BOUND, ls=style)
-        artists.append(_beside(ax, word, (_DIGITS[12], height[12]), (6, 6), BOUND))
+        (line,) = bound_by_digits(ax, faults, ls=style)
+        x, y = np.asarray(line.get_xdata())[12], np.asarray(line.get_ydata())[12]
+        artists += [line, _beside(ax, word, (x, y), (6, 6), BOUND)]
     artists.append(ax.axhline(found.tolerance, color=REFERENCE, ls=":"))
     artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
-    artists += ax.plot(found.printed, [found.tolerance] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
-    artists += [_beside(ax, f"{place} printed", (place, found.tolerance), (6, 13), BOUND) for place in found.printed]
-    needed = found.observed[Rounding.NEAREST]
-    artists.append(ax.vlines(needed, 1e-11, found.tolerance, color=OBSERVED))
-    artists.append(_beside(ax, f"{needed:g} digits were enough", (needed, 1e-5), (-6, 0), OBSERVED, ha="right"))
+    size = float(report_bounds.YEAR_SIZE)
+    artists.append(ax.axhline(size, color=REFERENCE, ls=":"))
+    artists.append(_beside(ax, "as large as the drift of a year", (3.5, size), (0, 4), REFERENCE))
+    artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
+    artists += [_beside(ax, f"{place} printed", (place, size), (6, 13), BOUND) for place in found.printed]
     ax.set_yscale("log")
-    ax.set_ylim(1e-11, 1e20)
+    ax.set_ylim(1e-11, 1e23)
     ax.set_yticks(10.0 ** np.arange(-8, 20, 4))
     ax.set_xticks(range(4, 24, 2))
     legend(ax, loc="lower left")
@@ -188,9 +190,21 @@ def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
     return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
 
 
-def _allowed(each: report_bounds.Coefficients) -> NDArray[np.float64]:
-    """What (125) allows with :data:`_DIGITS` decimal digits, for a norm of the state and a B of 1."""
-    return 0.5 * 10.0 ** (1 - _DIGITS) * (each.first + each.second)
+def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[Line2D]:
+    """Bound (125) at the end of a year against the decimal digits, in mas."""
+    betas = [Fraction(0.5 * 10.0 ** (1 - digits)) for digits in _DIGITS.tolist()]
+    heights = [
+        report_bounds.gravity_probe_b_bound(beta, report_bounds.EXAMPLE[0], report_bounds.YEAR_SIZE, **faults)
+        for beta in betas
+    ]
+    return ax.plot(_DIGITS, heights, color=BOUND, **style)
+
+
+def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
+    """Bound (125) in one format after some steps, in mas, for :func:`lines`."""
+    return [
+        report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), report_bounds.YEAR_SIZE, **faults) for k in steps
+    ]
 
 
 def _beside(
@@ -226,4 +240,23 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
     ax.set_ylim(0, 118)
     legend(ax, ncols=3, loc="upper right")
     label(ax, "form of the filter", "filters that violate it (%)")
+    return artists
+
+
+def shares(found: Sequence[Share], ax: Axes, tolerance: float = 1.0) -> list[Artist]:
+    """Largest error of each record (points) against the bits or digits, a column for each format, and their medians."""
+    artists: list[Artist] = []
+    for states, colour in zip(dict.fromkeys(each.states for each in found), (OBSERVED, *OBSERVED_OTHERS), strict=False):
+        group = [each for each in found if each.states == states]
+        for each in group:
+            # Spread by rank, so that every record is seen.
+            places = each.fmt.precision + 0.6 * (np.arange(each.records) + 0.5) / each.records - 0.3
+            artists += ax.plot(places, np.sort(each.errors), ".", color=colour, ms=3)
+        points = [(each.fmt.precision, each.quantile(0.5)) for each in group]
+        artists += ax.plot(*zip(*points, strict=True), "_", color=colour, ms=18, mew=2, label=f"{states}, median")
+    artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
+    ax.set_yscale("log")
+    ax.set_xticks(sorted({each.fmt.precision for each in found}))
+    legend(ax)
+    label(ax, "bits" if found[0].fmt.base == 2 else "decimal digits", "largest error in a year (mas, mas/yr)")
     return artists

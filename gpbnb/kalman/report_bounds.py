@@ -220,3 +220,19 @@ def order(second: bool) -> tuple[str, ...] | None:
         return tuple(TopologicalSorter(dependencies(second)).static_order())
     except CycleError:
         return None
+
+
+#: The drift of a year that relativity predicts, in mas, Everitt et al. 2011; the norm of the state and B in figures.
+YEAR_SIZE = Fraction(6606)
+
+
+def gravity_probe_b_bound(beta: Fraction, k: int, size: Fraction, **faults: bool) -> float:
+    r"""Bound (125) for Gravity Probe B, n = 10 and m = 2, in mas: every figure of (125) draws this.
+
+    Parameters
+    ----------
+    beta : unit roundoff. k : steps.
+    size : :math:`\|x_k\|` and B, in mas.
+    faults : to correct, as for :func:`coefficients`.
+    """
+    return float(state_bound(size, size, beta, coefficients(k, *EXAMPLE[1:], **faults)))

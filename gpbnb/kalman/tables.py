@@ -13,9 +13,11 @@ from gpbnb.display.tables import Table, arithmetic, scientific, short
 from gpbnb.kalman import contraction, report_bounds, smallest, year
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.gravity_probe_b import STATES
+from gpbnb.kalman.mission import PARAMETERS
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
+from gpbnb.kalman.probability import Share
 
 DOUBLE = FloatFormat(2, 53)
 
@@ -245,3 +247,27 @@ def _typeset(printed: str) -> str:
 
 def _yes(holds: bool, what: str) -> str:
     return what if holds else f"not {what}"
+
+
+def shares(found: Sequence[Share]) -> Table:
+    """Share of the records that stay within the tolerance for a year, with its 95 % limits, and quantiles."""
+    rows = [
+        (
+            each.states,
+            str(each.form),
+            arithmetic(each.fmt),
+            f"{each.within} of {each.records}",
+            f"{each.low:.3f} to {each.high:.3f}",
+            *(f"{each.quantile(p):.2g}" for p in (0.5, 0.9, 1.0)),
+            f"{each.quantile_limit:.2g}",
+        )
+        for each in found
+    ]
+    head = ("state", "form", "arithmetic", "within", "probability", "median", "90 %", "largest", "99 %, upper limit")
+    return Table("records that stay within a milliarcsecond for a year", head, tuple(rows))
+
+
+def parameters() -> Table:
+    """The numbers of the mission model, with their sources."""
+    rows = tuple((each.name, f"{each.value:g}", each.unit, each.source) for each in PARAMETERS)
+    return Table("parameters of the mission model", ("parameter", "value", "unit", "source"), rows)

@@ -80,11 +80,6 @@ def test_l_carries_the_back_substitution_of_rows_above_into_rows_below():
     assert sp.expand(missing[2, 2] - 3 * a13 * lower[2, 0] - 3 * a23 * lower[2, 1]) == 0
 
 
-def test_the_line_before_68_needs_its_brackets():
-    assert derivation.line_before_68() == 0
-    assert derivation.line_before_68(brackets=False) != 0
-
-
 @pytest.mark.parametrize("terms", range(5))
 def test_a_row_of_back_substitution_has_the_weights_of_theory(terms):
     right, products = derivation.back_row_weights(terms)

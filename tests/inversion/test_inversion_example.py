@@ -12,7 +12,7 @@ import pytest
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import inverse_of
-from gpbnb.inversion import example, procedure
+from gpbnb.inversion import example, existence, procedure
 from gpbnb.inversion.example import PLACES, PRINTED, Wordlength
 from gpbnb.inversion.procedure import Reading
 
@@ -214,21 +214,21 @@ def norm_of(error, norm):
 
 
 class TestPossible:
-    @pytest.mark.parametrize("norm", example.SEARCHED)
+    @pytest.mark.parametrize("norm", existence.SEARCHED)
     @pytest.mark.parametrize("kind", example.KINDS)
     def test_the_error_of_an_inverse_is_found_possible(self, norm, kind):
         wordlength = Wordlength(kind, NEAREST)
         for places in PLACES:
             x = example.gauss_jordan(example.matrix(), wordlength.rounder(places))
             printed = f"{float(norm_of(x - exact_inverse(), norm)):.3e}"
-            found = example.possible(wordlength, places, norm, printed=printed)
+            found = existence.possible(wordlength, places, norm, printed=printed)
             assert found.witness is not None
             for index in np.ndindex(3, 3):  # numbers of the wordlength
                 assert wordlength.rounder(places)(found.witness[index]) == found.witness[index]
             assert example.agree(norm_of(found.witness - exact_inverse(), norm), printed)
 
     def test_every_witness_has_the_printed_error(self):
-        found = [one for one in example.all_possible() if one.witness is not None]
+        found = [one for one in existence.all_possible() if one.witness is not None]
         assert found
         for one in found:
             assert one.reference == "given"
@@ -255,7 +255,7 @@ class TestPossible:
             last = np.sort(np.array(last, dtype=object))
             for p, q in itertools.product(*two):
                 hits += np.searchsorted(last, high - p - q) - np.searchsorted(last, low - p - q)
-        found = example.possible(MORE, 3, "row sum" if transposed else "column sum")
+        found = existence.possible(MORE, 3, "row sum" if transposed else "column sum")
         assert (found.witness is not None) == (hits > 0)
 
     def test_the_smallest_error_there_is_can_exclude_the_print(self):
@@ -263,26 +263,26 @@ class TestPossible:
         best = example.round_once(example.matrix(), MORE.rounder(5)) - exact_inverse()
         for norm in ("column sum", "row sum", "Frobenius"):
             assert norm_of(best, norm) > Fraction(PRINTED["error"][1]) * Fraction("1.001")
-            assert example.possible(MORE, 5, norm).witness is None
+            assert existence.possible(MORE, 5, norm).witness is None
 
     @pytest.mark.parametrize("rounding", [NEAREST, CHOP])
     def test_against_the_matrix_as_stored(self, rounding):
         # Three digits: the error of the best inverse of the stored matrix is found possible.
         wordlength = Wordlength("t = places", rounding)
         fl = wordlength.rounder(3)
-        stored = example._each(example.matrix(), fl)
+        stored = example.each_rounded(example.matrix(), fl)
         true = inverse_of(stored)
         assert (true @ stored == np.eye(3, dtype=int)).all()
-        for norm in example.SEARCHED:
+        for norm in existence.SEARCHED:
             error = norm_of(example.round_once(stored, fl) - true, norm)
-            found = example.possible(wordlength, 3, norm, printed=f"{float(error):.3e}", reference="stored")
+            found = existence.possible(wordlength, 3, norm, printed=f"{float(error):.3e}", reference="stored")
             assert example.agree(norm_of(found.witness - true, norm), found.printed)
             assert found.reference == "stored"
-        for norm in example.SEARCHED:  # and the largest error of the best inverse is above the print
+        for norm in existence.SEARCHED:  # and the largest error of the best inverse is above the print
             assert norm_of(example.round_once(stored, fl) - true, norm) > Fraction(PRINTED["error"][0])
 
     def test_all_of_them(self):
-        found = example.all_possible()
+        found = existence.all_possible()
         assert len(found) == 6 * 4 * 2 * 3
         assert sum(one.reference == "stored" for one in found) == 2 * 4 * 2 * 3
         for one in found:
@@ -291,12 +291,12 @@ class TestPossible:
 
     def test_other_words_are_refused(self):
         with pytest.raises(ValueError, match="norm: got 'spectral'; needed one of column sum, row sum"):
-            example.possible(MORE, 3, "spectral")
+            existence.possible(MORE, 3, "spectral")
         with pytest.raises(ValueError, match="reference: got 'rounded'; needed 'given' or 'stored'"):
-            example.possible(MORE, 3, "row sum", reference="rounded")
+            existence.possible(MORE, 3, "row sum", reference="rounded")
 
     @pytest.mark.parametrize(("y", "up", "down"), [("0.1000", "0.1001", "0.09999"), ("-0.1000", "-0.09999", "-0.1001"),
                                                    ("0.9999", "1", "0.9998"), ("2", "2.001", "1.999")])  # fmt: skip
     def test_neighbours(self, y, up, down):
-        assert example._next(Fraction(y), MORE, 3, 1) == Fraction(up)
-        assert example._next(Fraction(y), MORE, 3, -1) == Fraction(down)
+        assert existence._next(Fraction(y), MORE, 3, 1) == Fraction(up)
+        assert existence._next(Fraction(y), MORE, 3, -1) == Fraction(down)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.inversion import example, experiment, tables
+from gpbnb.inversion import example, existence, experiment, tables
 from gpbnb.inversion.experiment import Frozen
 
 
@@ -55,7 +55,7 @@ def test_claims():
 
 
 def test_possibilities():
-    found = example.all_possible()
+    found = existence.all_possible()
     table = tables.possibilities(found)
     assert len(table.body) == 6 * 4 * 2
     assert table.body[-1][0] == "t = places, chop, matrix stored so"

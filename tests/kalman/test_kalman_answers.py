@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
 from gpbnb.kalman import answers, figures, report_bounds, year, year_cases
+from gpbnb.wordlength import study
 
 
 def test_the_answers_are_those_of_the_example_and_of_the_years():
@@ -90,7 +92,8 @@ def test_the_picture_shows_each_answer_on_the_tolerance():
     marked = {"printed answers": found.printed, "formula": found.formula, "all faults corrected": found.corrected}
     for name, places in marked.items():
         assert list(shown[name].get_xdata()) == list(places)
-        assert set(shown[name].get_ydata()) == {found.tolerance}
+        # The report grants an error as large as the estimate.
+        assert set(shown[name].get_ydata()) == {6606}
     assert list(shown["observed"].get_xdata()) == [found.observed[Rounding.NEAREST]]
     axes[0].figure.canvas.draw()
 
@@ -101,8 +104,7 @@ def test_the_headline_says_beside_each_mark_what_it_is():
     figures.headline(found, ax)
     words = {text.get_text(): text.xy for text in ax.texts}
     for place in found.printed:
-        assert words[f"{place} printed"] == (place, found.tolerance)
-    assert words[f"{found.observed[Rounding.NEAREST]:g} digits were enough"][0] == found.observed[Rounding.NEAREST]
+        assert words[f"{place} printed"] == (place, 6606)
     drawn = {line.get_label(): line for line in ax.lines}
     shown = sum(len(drawn[f"emulated, {word}"].get_xdata()) for word in ("chopped", "rounded"))
     assert shown == sum(run.case.fmt is not None for run in found.runs)
@@ -112,5 +114,39 @@ def test_the_headline_says_beside_each_mark_what_it_is():
     ):
         each = report_bounds.coefficients(*report_bounds.EXAMPLE, **faults)
         t, height = words[name]
-        assert height == pytest.approx(0.5 * 10 ** (1 - t) * (each.first + each.second), rel=1e-12)
+        assert height == pytest.approx(6606 * 0.5 * 10 ** (1 - t) * (each.first + each.second), rel=1e-12)
     ax.figure.canvas.draw()
+
+
+def test_every_figure_draws_the_same_bound(monkeypatch):
+    """Front page, chapter on the filter, its year by steps, and the chapter on wordlength."""
+    drawn = []
+    exact = report_bounds.gravity_probe_b_bound
+
+    def spy(beta, *arguments, **faults):
+        drawn.append(exact(beta, *arguments, **faults))
+        return drawn[-1]
+
+    monkeypatch.setattr(report_bounds, "gravity_probe_b_bound", spy)
+    found = answers.find_answers()
+    counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
+    lines = []
+    for draw in (figures.headline, figures.digits_needed):
+        _, axes = style.figure()
+        drawn.clear()
+        draw(found, axes[0])
+        assert len(drawn) == 100  # two lines of fifty points
+        lines.append(
+            [list(line.get_ydata()) for line in axes[0].lines if list(line.get_ydata()) in (drawn[:50], drawn[50:])]
+        )
+    assert lines[0] == lines[1]
+    assert len(lines[0]) == 2
+    fmt = FloatFormat(2, 24)
+    drawn.clear()
+    (year_end,) = figures.bound_by_steps([report_bounds.EXAMPLE[0]], fmt, {})
+    assert drawn == [year_end] == [pytest.approx(6606 * 2.0**-24 * (counts.first + counts.second), rel=1e-15)]
+    # The chapter on wordlength draws the bits at which the same bound meets the tolerance.
+    bits = study.printed_precision(*report_bounds.EXAMPLE, Fraction(1), report_bounds.YEAR_SIZE)
+    of_year = report_bounds.EXAMPLE[0], report_bounds.YEAR_SIZE
+    assert exact(FloatFormat(2, bits).unit_roundoff, *of_year) <= 1
+    assert exact(FloatFormat(2, bits - 1).unit_roundoff, *of_year) > 1

@@ -75,9 +75,9 @@ def test_lines_and_levels(ax):
 
 def test_year_end(ax, runs):
     cases = [TWENTY_FOUR, TWENTY_FOUR._replace(precision=32), TWENTY_FOUR._replace(rounding=Rounding.CHOP)]
-    counts = [("printed", report_bounds.coefficients(*report_bounds.EXAMPLE))]
+    faults = {"printed": {}}
     answers = [("print", [9, 17]), ("formula", [10, 16]), ("seen", [10.3])]
-    artists = figures.year_end([runs[case] for case in cases], ax, 1.0, counts, answers)
+    artists = figures.year_end([runs[case] for case in cases], ax, 1.0, faults, answers)
     rounded, chopped, line, tolerance, *checkpoint_steps = artists
     ends = [max(np.abs(runs[case].drift[-1]).max(), np.abs(runs[case].rate[-1]).max()) for case in cases]
     assert np.allclose(rounded.get_xdata(), [decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)
@@ -85,11 +85,14 @@ def test_year_end(ax, runs):
     assert list(chopped.get_ydata()) == ends[2:]
     assert colour(rounded) == style.OBSERVED != colour(chopped)
     assert colour(line) == style.BOUND
-    crossing = float(np.interp(0, -np.log10(line.get_ydata()), line.get_xdata()))
-    assert int(np.ceil(crossing)) == report_bounds.precision_for_coefficient(sum(counts[0][1]))
+    size = report_bounds.YEAR_SIZE
+    crossing = float(np.interp(-np.log10(float(size)), -np.log10(line.get_ydata()), line.get_xdata()))
+    counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
+    # Where the bound is as large as the drift, the digits are those of the report's example.
+    assert int(np.ceil(crossing)) == report_bounds.precision_for_coefficient(sum(counts))
     assert list(tolerance.get_ydata()) == [1, 1]
     assert [list(mark.get_xdata()) for mark in checkpoint_steps] == [places for _, places in answers]
-    assert all(set(mark.get_ydata()) == {1} for mark in checkpoint_steps)
+    assert [set(mark.get_ydata()) for mark in checkpoint_steps] == [{size}, {size}, {1}]
     assert checkpoint_steps[0].get_markerfacecolor() == checkpoint_steps[1].get_markerfacecolor() == "none"
     assert checkpoint_steps[2].get_marker() == "|"
     assert legend_of(ax)[:3] == ["Hung (1984), nearest", "Hung (1984), chop", "printed"]

@@ -40,7 +40,7 @@ class ExactKernel:
         self.nearest = nearest
         self._bits = log2(base)
         self._smallest = base ** (precision - 1)
-        self._limit = base**precision
+        self.limit = base**precision
         self._largest_exponent = int(LARGEST_BITS / self._bits)
         # What the operations need; of very long significands the powers are made when needed.
         self._powers = [base**k for k in range(min(2 * precision + 8, 512))]
@@ -96,7 +96,7 @@ class ExactKernel:
             # The smaller operand is below base**-2 units of the last digit, the next number or midpoint at least
             # 1 / (2 * base) units away, also just below a power of the base: only its sign matters.
             m2, e2 = (1 if m2 > 0 else -1), e1 - 3
-        n = m1 * self._power(e1 - e2) + m2
+        n = m1 * self.power(e1 - e2) + m2
         return self._round_integer(n, e2) if n else ZERO
 
     def subtract(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
@@ -122,7 +122,7 @@ class ExactKernel:
         (m, e), (n, f) = ((m, e), (m3, e3)) if e >= e3 else ((m3, e3), (m, e))
         if e - f > 3 * self.precision + 2:
             n, f = (1 if n > 0 else -1), e - self.precision - 3  # far below: only its sign matters
-        n += m * self._power(e - f)
+        n += m * self.power(e - f)
         return self._round_integer(n, f) if n else ZERO
 
     def sqrt(self, m: int, e: int) -> Pair:
@@ -131,7 +131,7 @@ class ExactKernel:
             return ZERO
         # With 2t - 1 or 2t digits and an even exponent, the root has exactly t digits.
         shift = self.precision if (e - self.precision) % 2 == 0 else self.precision - 1
-        n = m * self._power(shift)
+        n = m * self.power(shift)
         root = isqrt(n)
         # n >= (root + 1/2)**2 in integers: n - root**2 > root. An exact tie cannot occur, nor a carry:
         # n <= (b**t - 1) * b**t, whose root is below b**t - 1/2.
@@ -164,7 +164,7 @@ class ExactKernel:
         """
         if abs(e) > self._largest_exponent:
             raise OverflowError(
-                f"got a number of about {self._about(e)}; needed an exponent of at most "
+                f"got a number of about {self.about(e)}; needed an exponent of at most "
                 f"{self._largest_exponent} in size to write it as a Fraction; scale the numbers"
             )
         return Fraction(m * self.base**e) if e >= 0 else Fraction(m, self.base**-e)
@@ -187,40 +187,42 @@ class ExactKernel:
             if value != 0.0:
                 return value
         raise OverflowError(
-            f"got a number of about {self._about(e)}; needed one within the range of float64, "
+            f"got a number of about {self.about(e)}; needed one within the range of float64, "
             "2**-1074 to 2**1024; scale it, or use to_fractions()"
         )
 
-    def _about(self, e: int) -> str:
+    def about(self, e: int) -> str:
+        """The size of a number with the exponent e, for messages."""
         return f"{integer_text(self.base)}**{integer_text(e + self.precision - 1)}"
 
     # -- rounding ------------------------------------------------------------------------------
 
-    def _power(self, k: int) -> int:
+    def power(self, k: int) -> int:
+        """The base to the power k, at least 0."""
         return self._powers[k] if k < len(self._powers) else self.base**k
 
-    def _digits(self, n: int) -> int:
+    def digits(self, n: int) -> int:
         """Number of base-b digits of ``n > 0``."""
         if self.base == 2:
             return n.bit_length()
         count = int((n.bit_length() - 1) / self._bits) + 1  # within one or two; then exactly:
-        while self._power(count) <= n:
+        while self.power(count) <= n:
             count += 1
-        while self._power(count - 1) > n:
+        while self.power(count - 1) > n:
             count -= 1
         return count
 
     def _carry(self, m: int, e: int) -> Pair:
         """Normalize a positive significand that rounding may have carried to t + 1 digits."""
-        return (self._smallest, e + 1) if m == self._limit else (m, e)
+        return (self._smallest, e + 1) if m == self.limit else (m, e)
 
     def _round_integer(self, n: int, e: int) -> Pair:
         """Round ``n * base**e``, ``n`` not zero."""
         a = abs(n)
-        drop = self._digits(a) - self.precision
+        drop = self.digits(a) - self.precision
         if drop <= 0:
-            return n * self._power(-drop), e + drop
-        unit = self._power(drop)
+            return n * self.power(-drop), e + drop
+        unit = self.power(drop)
         m, rest = divmod(a, unit)
         if self.nearest and 2 * rest >= unit:
             m += 1
@@ -230,9 +232,9 @@ class ExactKernel:
     def _round_quotient(self, p: int, q: int, e: int) -> Pair:
         """Round ``p / q * base**e``, ``p`` not zero, ``q`` positive."""
         a = abs(p)
-        shift = self.precision - self._digits(a) + self._digits(q)
-        numerator, denominator = (a * self._power(shift), q) if shift >= 0 else (a, q * self._power(-shift))
-        if numerator >= denominator * self._limit:  # t + 1 digits, not t
+        shift = self.precision - self.digits(a) + self.digits(q)
+        numerator, denominator = (a * self.power(shift), q) if shift >= 0 else (a, q * self.power(-shift))
+        if numerator >= denominator * self.limit:  # t + 1 digits, not t
             denominator *= self.base
             shift -= 1
         m, rest = divmod(numerator, denominator)

@@ -108,32 +108,32 @@ class LimitedKernel(ExactKernel):
         if e1 - e2 > gap and self.limits is None:
             # Only the sign of the smaller number matters: it is far below what any mode looks at.
             m2, e2 = (1 if m2 > 0 else -1), e1 - 2 * DRAW_BITS - 3
-        n = m1 * self._power(e1 - e2) + m2
+        n = m1 * self.power(e1 - e2) + m2
         return self._round_integer(n, e2) if n else ZERO
 
     # -- rounding ------------------------------------------------------------------------------
 
     def _round_integer(self, n: int, e: int) -> Pair:
         a = abs(n)
-        drop = self._dropped(self._digits(a) - self.precision, e)
+        drop = self._dropped(self.digits(a) - self.precision, e)
         if drop <= 0:
             return self._within(n, a, e)
-        if drop > self._digits(a) + DRAW_BITS + 2:  # far below half of the last digit
+        if drop > self.digits(a) + DRAW_BITS + 2:  # far below half of the last digit
             a, e, drop = 1, e + drop - DRAW_BITS - 2, DRAW_BITS + 2
-        unit = self._power(drop)
+        unit = self.power(drop)
         m, rest = divmod(a, unit)
         return self._within(n, m + self._up(m, rest, unit, n < 0), e + drop)
 
     def _round_quotient(self, p: int, q: int, e: int) -> Pair:
         a = abs(p)
-        shift = self.precision - self._digits(a) + self._digits(q)
+        shift = self.precision - self.digits(a) + self.digits(q)
         # The quotient has t digits or one more at this shift; then it is rounded at the right one.
-        numerator, denominator = (a * self._power(shift), q) if shift >= 0 else (a, q * self._power(-shift))
-        drop = self._dropped(int(numerator >= denominator * self._limit), e - shift)
+        numerator, denominator = (a * self.power(shift), q) if shift >= 0 else (a, q * self.power(-shift))
+        drop = self._dropped(int(numerator >= denominator * self.limit), e - shift)
         if drop < 0:
-            numerator *= self._power(-drop)
+            numerator *= self.power(-drop)
         else:
-            denominator *= self._power(drop)
+            denominator *= self.power(drop)
         m, rest = divmod(numerator, denominator)
         return self._within(p, m + self._up(m, rest, denominator, p < 0), e - shift + drop)
 
@@ -176,7 +176,7 @@ class LimitedKernel(ExactKernel):
                 return ZERO
             if (e, m) > self.top:
                 raise OverflowError(
-                    f"got a result of about {self._about(e)}; needed at most {float(self.limits.largest):.7g} in size; "
+                    f"got a result of about {self.about(e)}; needed at most {float(self.limits.largest):.7g} in size; "
                     "scale the numbers, or use a format with a larger range"
                 )
         return (m if sign > 0 else -m), e
@@ -184,7 +184,7 @@ class LimitedKernel(ExactKernel):
     def _wrapped(self, m: int, e: int) -> int:
         """A fixed-point number as a count of its last digit."""
         limits = cast(Limits, self.limits)
-        count = m * self._power(e - self.quantum)
+        count = m * self.power(e - self.quantum)
         unit = Fraction(self.base) ** self.quantum
         lowest, largest = int(limits.lowest / unit), int(limits.largest / unit)
         if lowest <= count <= largest:
@@ -200,8 +200,8 @@ class LimitedKernel(ExactKernel):
 
     def _normalized(self, m: int, e: int) -> Pair:
         """Add zeros up to t digits, or take them away where rounding has carried to more."""
-        shift = self.precision - self._digits(abs(m))
-        return (m * self._power(shift) if shift >= 0 else m // self._power(-shift)), e - shift
+        shift = self.precision - self.digits(abs(m))
+        return (m * self.power(shift) if shift >= 0 else m // self.power(-shift)), e - shift
 
 
 @lru_cache(maxsize=256)

@@ -7,7 +7,7 @@ from functools import cache
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact
-from gpbnb.inversion import example
+from gpbnb.inversion import example, existence
 from gpbnb.ledger.checks.inversion.registry import CHECKS
 from gpbnb.ledger.checks.inversion.samples import Sample
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
@@ -91,7 +91,7 @@ def _closest(column: str) -> example.Search:
 @cache
 def _possible(places: tuple[int, ...]) -> tuple[int, int]:
     """How many searches through all matrices of so many places find an error of the printed norm, and of how many."""
-    here = [p for p in example.all_possible() if p.places in places and p.wordlength.kind != "t = places + 2"]
+    here = [p for p in existence.all_possible() if p.places in places and p.wordlength.kind != "t = places + 2"]
     return sum(p.witness is not None for p in here), len(here)
 
 

@@ -20,7 +20,7 @@ from gpbnb.ledger.statements import Statement
 PRODUCT, EXACT_GAIN, SIGNS, TWICE = (
     "product-error-relative-to-product",
     "gain-taken-as-exact",
-    "negative-terms-dropped",
+    "one-signed-epsilon",
     "roundings-counted-twice",
 )
 _CANCELS = "as in (30): the error of a product is no multiple of the product, which may cancel while the error stays"

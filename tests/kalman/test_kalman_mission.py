@@ -1,0 +1,116 @@
+"""gpbnb.kalman.mission: the known signal against the sky, and a filter that finds out what the signal shows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman import mission_runs
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.lockstep import Lockstep
+from gpbnb.kalman.mission import PARAMETERS, STATES, Mission
+from gpbnb.kalman.records import Records
+from gpbnb.kalman.simulation import BLOCK
+
+YEAR = np.linspace(0, 3_153_600, 2001).astype(np.int64)
+
+
+def test_every_number_has_its_source():
+    assert len({each.name for each in PARAMETERS}) == len(PARAMETERS)
+    assert all(each.source for each in PARAMETERS)
+    assert sum(each.source.startswith("ours") for each in PARAMETERS) < len(PARAMETERS) * 2 / 3
+
+
+def test_annual_aberration_is_the_ellipse_of_the_star_s_latitude():
+    both, orbit = (Mission(annual=annual).known_signal(YEAR) for annual in (True, False))
+    ellipse = (both - orbit) / 20.5
+    axes = np.sqrt(np.linalg.eigvalsh(np.cov(ellipse.T)) * 2)
+    ra, dec, tilt = (math.radians(each) for each in (343.259, 16.841, 23.44))
+    latitude = math.asin(math.sin(dec) * math.cos(tilt) - math.cos(dec) * math.sin(tilt) * math.sin(ra))
+    # Two thousand samples of a year.
+    assert axes == pytest.approx([math.sin(latitude), 1], rel=2e-3)
+
+
+def test_the_orbit_moves_the_star_north_and_south_only():
+    steps = np.arange(1, 2000)
+    signal = Mission(annual=False).known_signal(steps)
+    drift = np.outer(steps * 10 / (365 * 86400), [6.6061, 0.0392])
+    assert np.abs(signal[:, 0] - drift[:, 0]).max() == pytest.approx(5.2, rel=1e-4)
+    assert signal[:, 1] == pytest.approx(drift[:, 1], abs=1e-15)
+
+
+def test_the_earth_hides_the_star_for_a_third_of_each_orbit():
+    mission = Mission()
+    _, orbit = mission.phases(np.arange(1, 5860))  # ten orbits
+    hidden = 1 - mission.visible(orbit).mean()
+    assert hidden == pytest.approx(2 * math.asin(6378 / 7020) / (2 * math.pi), abs=2e-3)
+    H = mission.matrices(0, 2)
+    assert (H[:, 0].any(axis=1) == mission.visible(mission.phases(np.arange(1, BLOCK + 1))[1])).all()
+    assert Mission(occultation=False).matrices(0, 2).any(axis=(1, 2)).all()
+
+
+@pytest.mark.parametrize("base", [2, 10])
+def test_matrices_are_held_exactly_by_every_format_of_the_sweep(base):
+    H = Mission().matrices(300, base)
+    fmt = FloatFormat(2, 20) if base == 2 else FloatFormat(10, 7)
+    given = [Fraction(round(h * 10**4), 10**4) if base == 10 else Fraction(h) for h in H[::400].ravel()]
+    assert [fmt.round(each) for each in given] == given
+    model = Mission().model(base)
+    for entry in (*model.Phi.ravel(), *model.Q.ravel(), *model.R.ravel(), *model.P0.ravel()):
+        assert fmt.round(entry) == entry
+
+
+def test_decimals_are_the_same_on_the_fast_way():
+    mission, fmt = Mission(), FloatFormat(10, 8)
+    fast, slow = (Records(mission.model(10), fmt, Form.INNOVATION, 1) for _ in range(2))
+    H = mission.matrices(0, 10)[:50]
+    fast.use_measurement_matrices(H, 4)
+    slow.use_measurement_matrices(np.rint(H * 1e4) / 1e4)
+    assert (fast.matrices[2] == slow.matrices[2]).all()
+    assert (fast.matrices[3] == slow.matrices[3]).all()
+
+
+def test_while_the_star_is_hidden_no_estimate_learns():
+    mission = replace(Mission(), flicker=False)
+    run = Records(mission.model(2), FloatFormat(2, 30), Form.INNOVATION, 1)
+    H = mission.matrices(0, 2)
+    hidden = H[~H.any(axis=(1, 2))][:20]
+    run.use_measurement_matrices(hidden)
+    assert (run.carry(np.zeros((20, 2, 1)), 4) == 0).all()
+
+
+def test_the_filter_finds_scale_and_roll_phase_by_the_aberration():
+    mission = Mission(deviations=True, quiet=10.0)
+    lockstep = Lockstep("a trial", mission, [FloatFormat(2, 40)], Form.HUNG, range(4), 2 * BLOCK)
+    while not lockstep.finished:
+        lockstep.advance()
+    reference = lockstep.reference
+    deviation = np.sqrt(np.diagonal(reference.P))
+    start = np.sqrt(mission.model(2).P0.diagonal().astype(float))
+    for name in ("scale factor k", "roll-phase offset δ"):
+        at = [state for state, _ in STATES].index(name)
+        assert (
+            deviation[at] < start[at] / 5
+        )  # within a day, beside 1/f noise that is eight times the white one at 600 s
+        # Four records: a difference of five standard deviations is a fault.
+        assert np.abs(reference.x[at] - lockstep.truth[:, at]).max() < 5 * deviation[at]
+    assert lockstep.largest.max() < 0.1
+
+
+def test_the_sweep_changes_one_choice_at_a_time():
+    usual = mission_runs.SETTINGS["mission"]
+    fields = list(vars(usual))
+    for name, setting in mission_runs.SETTINGS.items():
+        changed = [field for field in fields if getattr(setting, field) != getattr(usual, field)]
+        assert len(changed) == (name != "mission")
+    assert mission_runs.SETTINGS["steps and roll as flown"].steps == 15_768_000
+    cell = mission_runs.CELLS[0]
+    assert cell.mission.deviations
+    found = mission_runs.rows(cell, mission_runs.compute(replace(cell, count=2), steps=500))
+    assert next(row[:7] for row in found) == cell.key
+    assert len(found) == 2 * len(cell.precisions)
