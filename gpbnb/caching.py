@@ -114,42 +114,42 @@ def lock(path: Path, longest_wait: float) -> IO[bytes] | None:
 
     Returns
     -------
-    held : None where there are no locks, or where the wait was too long.
+    handle : None where there are no locks, or where the wait was too long.
     """
     if fcntl is None:
         return None
     try:
-        held = _beside(path).open("wb")
+        handle = _beside(path).open("wb")
     except OSError:
         return None
     began = time.monotonic()
     while True:
         try:
-            fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             if time.monotonic() - began > longest_wait:
-                held.close()
+                handle.close()
                 return None
             time.sleep(0.05)
         else:
-            return held
+            return handle
 
 
-def unlock(path: Path, held: IO[bytes] | None) -> None:
+def unlock(path: Path, handle: IO[bytes] | None) -> None:
     """Give back a lock of a file."""
-    if held is not None:
+    if handle is not None:
         _beside(path).unlink(missing_ok=True)
-        held.close()
+        handle.close()
 
 
 @contextlib.contextmanager
 def locked(path: Path, longest_wait: float) -> Iterator[None]:
     """Hold the lock of a file, as by :func:`lock`."""
-    held = lock(path, longest_wait)
+    handle = lock(path, longest_wait)
     try:
         yield
     finally:
-        unlock(path, held)
+        unlock(path, handle)
 
 
 def _beside(path: Path) -> Path:
@@ -204,7 +204,7 @@ def _following(first: Iterable[Path]) -> frozenset[Path]:
 
 
 def with_data(sources: Iterable[Path]) -> frozenset[Path]:
-    """Add to source files the data files that stand beside them."""
+    """Add to source files the data files next to them."""
     found = set(sources)
     for folder in {path.parent for path in found}:
         found |= {path for path in folder.iterdir() if path.is_file() and path.suffix not in _NO_DATA}

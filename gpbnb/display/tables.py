@@ -31,7 +31,7 @@ class Table:
     body: tuple[tuple[str, ...], ...]
 
     def markdown(self) -> str:
-        """Return the table as lines of equally many cells between unescaped pipes."""
+        """Return the table as lines with the same number of cells between unescaped pipes."""
         lines = [map(_cell, self.header), ("---",) * len(self.header), *(map(_cell, row) for row in self.body)]
         return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
 

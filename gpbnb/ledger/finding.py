@@ -66,7 +66,7 @@ class Finding:
     ----------
     recomputed : what the project gets; prose with math between single dollar signs.
     agrees : whether print and recomputation agree; None where there is nothing to compare.
-    verdict : what became of the statement; not free, it must fit `agrees`.
+    verdict : the judgement of the statement; it must fit `agrees`.
     note : why, or where; same markup. Needed for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
     root : id of the root error in ``roots.csv`` that makes the statement disagree; empty where it agrees.
 

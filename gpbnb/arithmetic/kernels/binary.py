@@ -1,6 +1,6 @@
 """Base 2 with 1 to 53 digits, and base 16 with 1 to 13, on float64.
 
-Conditions are joined by & and |, which do not branch: no branch on a rounding can be foretold.
+Conditions are joined by & and |, which do not branch: no branch depends on a rounding, which is unpredictable.
 
 The float64 result p of an operation and the sign of what it lacks of the exact one say where the exact result lies
 between two neighbouring float64. Seen as integers, float64 of one sign are evenly spaced, over powers of two too:
@@ -61,8 +61,8 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
     def fit(fmt: Any, p: Any, shift: Any, exact_zero: Any) -> Any:
         u = bits(p)
         v = clear(fmt, (u & _MAGNITUDE) + shift)
-        held = ((v >= _LEAST) & (v < _LIMIT)) | (exact_zero & (v == 0))
-        return from_bits(v | (u & _SIGN)) if held else np.nan
+        in_range = ((v >= _LEAST) & (v < _LIMIT)) | (exact_zero & (v == 0))
+        return from_bits(v | (u & _SIGN)) if in_range else np.nan
 
     @njit(forceinline=True)
     def direction(fmt: Any, p: Any, r: Any) -> Any:

@@ -138,13 +138,13 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
     }[fmt.types[0].instance_class]
 
 
-def _held(fmt: Any, m: Any, e: Any) -> Any:
+def _within_range(fmt: Any, m: Any, e: Any) -> Any:
     """The pair, if its exponent is one that the backend and the format hold."""
-    raise TypeError("got a call of _held from Python; needed one from a function compiled by numba")
+    raise TypeError("got a call of _within_range from Python; needed one from a function compiled by numba")
 
 
-@overload(_held, strict=False, jit_options={"forceinline": True})
-def _overloaded_held(fmt: Any, m: Any, e: Any) -> Any:
+@overload(_within_range, strict=False, jit_options={"forceinline": True})
+def _overloaded_within_range(fmt: Any, m: Any, e: Any) -> Any:
     def anywhere(fmt: Any, m: Any, e: Any) -> Any:
         check(e)
         return m, e
@@ -162,7 +162,7 @@ def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
     """The pair of a magnitude of t digits, or one that rounding carried to t + 1."""
     carried = m == _power(fmt.precision)
     m = _power(fmt.precision - 1) if carried else m
-    return _held(fmt, (-np.int64(m) if negative else np.int64(m)), e + np.int64(carried))
+    return _within_range(fmt, (-np.int64(m) if negative else np.int64(m)), e + np.int64(carried))
 
 
 @njit(forceinline=True)

@@ -34,7 +34,7 @@ def _fast_two_sum(a: Any, b: Any) -> Any:
 
 
 @njit(forceinline=True)
-def _held(high: Any, low: Any, exact_zero: Any) -> Any:
+def _within_range(high: Any, low: Any, exact_zero: Any) -> Any:
     size = abs(high)
     if ((size >= LEAST) & (size < LIMIT)) | (exact_zero & (size == 0.0)):
         return high + 0.0, low + 0.0
@@ -47,7 +47,7 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     t, f = _two_sum(a[1], b[1])
     s, e = _fast_two_sum(s, e + t)
     s, e = _fast_two_sum(s, e + f)
-    return _held(s, e, True)
+    return _within_range(s, e, True)
 
 
 @njit(forceinline=True)
@@ -61,7 +61,7 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
     e = fma(a[0], b[0], -p)
     e += fma(a[0], b[1], fma(a[1], b[0], a[1] * b[1]))
     p, e = _fast_two_sum(p, e)
-    return _held(p, e, (a[0] == 0.0) | (b[0] == 0.0))
+    return _within_range(p, e, (a[0] == 0.0) | (b[0] == 0.0))
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -73,7 +73,7 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
     e = fma(b[0], q, -p)
     p, e = _fast_two_sum(p, fma(b[1], q, e))
     q, low = _fast_two_sum(q, ((a[0] - p) + (a[1] - e)) / b[0])
-    return _held(q, low, a[0] == 0.0)
+    return _within_range(q, low, a[0] == 0.0)
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -84,13 +84,13 @@ def sqrt(fmt: Any, a: Any) -> Any:
         return 0.0, 0.0
     s = math.sqrt(a[0])
     s, low = _fast_two_sum(s, (fma(-s, s, a[0]) + a[1]) / (2.0 * s))
-    return _held(s, low, False)
+    return _within_range(s, low, False)
 
 
 @njit(forceinline=True)
 def round_(fmt: Any, x: Any) -> Any:
     high, low = _two_sum(x[0], x[1])
-    return _held(high, low, x[0] == 0.0 and x[1] == 0.0)
+    return _within_range(high, low, x[0] == 0.0 and x[1] == 0.0)
 
 
 @njit(forceinline=True)

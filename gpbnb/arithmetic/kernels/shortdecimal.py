@@ -1,6 +1,6 @@
 """Base 10 with 1 to 8 digits: as :mod:`gpbnb.arithmetic.kernels.decimal`, in 64 bits and almost without branches.
 
-A processor cannot foretell how many digits a sum or a product has, nor which operand is the larger, and each wrong
+A processor cannot predict how many digits a sum or a product has, nor which operand is the larger, and each wrong
 guess costs as much as the operation. So nothing branches on them: a result is shifted until it has a known number of
 digits or one less, and a table and selections do the rest.
 """
