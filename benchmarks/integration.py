@@ -12,15 +12,15 @@ from benchmarks.timing import Row, medians, rows
 from gpbnb.integration import experiment, theory
 
 COUNT = 10_000_000
-PIECE = 1 << 19  # cycles at a time, as in experiment.pieces
+CHUNK = 1 << 19  # cycles at a time, as in experiment.chunks
 PROCESS = theory.first_order(1.0, 0.1)
 
 
 def drawn() -> Iterator[Any]:
-    """Normal numbers, a piece at a time."""
+    """Normal numbers, a chunk at a time."""
     rng = np.random.default_rng(1)
-    for first in range(0, COUNT, PIECE):
-        yield rng.standard_normal((min(PIECE, COUNT - first), 1, 2))
+    for first in range(0, COUNT, CHUNK):
+        yield rng.standard_normal((min(CHUNK, COUNT - first), 1, 2))
 
 
 def with_gpbnb(parts: Iterable[Any]) -> float:

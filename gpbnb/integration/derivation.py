@@ -359,7 +359,7 @@ def small_mu() -> Derivation:
 # -- what the slips would have led to -------------------------------------------------------------
 
 
-def slips() -> dict[str, sp.Expr]:
+def misprints() -> dict[str, sp.Expr]:
     """The steady-state rate, over P T, in μ, had the print been used: 0 where the document uses it and is right.
 
     "(12)": without P22, of which the print takes the square of a mean. "(18)": with the full last term of P32. "(25)":

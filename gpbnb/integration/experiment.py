@@ -136,7 +136,7 @@ def advance(step: Step, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
     return x, d
 
 
-class Piece(NamedTuple):
+class Chunk(NamedTuple):
     """Some cycles of a simulation: `first` is the number of the first one, x and d are (cycles, paths).
 
     x begins `memory` samples before those of d, so that ``x[memory + k]`` is the sample at the end of cycle
@@ -148,23 +148,23 @@ class Piece(NamedTuple):
     d: NDArray[np.float64]
 
 
-def pieces(
+def chunks(
     process: Process, f_c: float, cycles: int, rng: np.random.Generator, paths: int = 1, memory: int = 1
-) -> Iterator[Piece]:
+) -> Iterator[Chunk]:
     """Simulate a process and the error of the trapezoidal rule, exact in distribution at the sampling times.
 
     No step is subdivided: the sample and the integral over a cycle are drawn from their joint distribution, given what
     was before. It begins in the steady state. Memory is bounded, whatever the number of cycles, and the numbers do
-    not depend on how they are cut into pieces.
+    not depend on how they are cut into chunks.
 
     Parameters
     ----------
     f_c : iteration rate, Hz.
-    memory : samples before the first of a piece that come with it.
+    memory : samples before the first of a chunk that come with it.
 
     Yields
     ------
-    piece : the cycles 1, 2, … in order.
+    chunk : the cycles 1, 2, … in order.
 
     Raises
     ------
@@ -185,22 +185,22 @@ def pieces(
         x, d = advance(step, state, rng.standard_normal((min(length, cycles + 1 - first), paths, m + 1)))
         x = np.concatenate([past, x])
         past = x[-memory:]
-        yield Piece(first, x, d)
+        yield Chunk(first, x, d)
 
 
-def rule_errors(rule: Rule, f_c: float, piece: Piece) -> Floats:
-    """Error that each cycle of a piece adds when integrated by a rule; (cycles, paths)."""
-    memory, cycles = len(piece.x) - len(piece.d), len(piece.d)
+def rule_errors(rule: Rule, f_c: float, chunk: Chunk) -> Floats:
+    """Error that each cycle of a chunk adds when integrated by a rule; (cycles, paths)."""
+    memory, cycles = len(chunk.x) - len(chunk.d), len(chunk.d)
     if memory < rule.memory:
         raise ValueError(f"got a memory of {memory} samples; needed {rule.memory} for the rule {rule.name!r}")
-    added = piece.d.copy()
+    added = chunk.d.copy()
     period = 1 / f_c
     for r, weights in enumerate(rule.weights):
-        rows = np.arange((r + 1 - piece.first) % rule.period, cycles, rule.period)
+        rows = np.arange((r + 1 - chunk.first) % rule.period, cycles, rule.period)
         for j in range(max(2, len(weights))):
             w = (float(weights[j]) if j < len(weights) else 0.0) - (0.5 if j < 2 else 0.0)
             if w:
-                added[rows] += period * w * piece.x[memory + rows - j]
+                added[rows] += period * w * chunk.x[memory + rows - j]
     return added
 
 
@@ -249,14 +249,14 @@ def simulate(
         raise ValueError(f"got n = {tuple(n)}; needed rising numbers of cycles, at least 1")
     total, kept = np.zeros(paths), []
     bar = tqdm(total=wanted[-1], desc="cycles", unit_scale=True, **BAR)
-    for piece in pieces(process, f_c, wanted[-1], rng, paths, rule.memory):
-        bar.update(len(piece.d))
-        added = piece.d if rule.name == "trapezoidal" else rule_errors(rule, f_c, piece)
-        last = piece.first + len(added) - 1
-        cuts = [k for k in wanted if piece.first <= k <= last]
+    for chunk in chunks(process, f_c, wanted[-1], rng, paths, rule.memory):
+        bar.update(len(chunk.d))
+        added = chunk.d if rule.name == "trapezoidal" else rule_errors(rule, f_c, chunk)
+        last = chunk.first + len(added) - 1
+        cuts = [k for k in wanted if chunk.first <= k <= last]
         begin = 0
         for k in cuts:
-            end = k - piece.first + 1
+            end = k - chunk.first + 1
             total = total + added[begin:end].sum(axis=0)
             kept.append(total)
             begin = end
@@ -338,7 +338,7 @@ def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
 
 
 class Accumulator:
-    """The trapezoidal rule (2) in a format, fed piece by piece.
+    """The trapezoidal rule (2) in a format, fed chunk by chunk.
 
     Parameters
     ----------
@@ -360,7 +360,7 @@ class Accumulator:
         self._total = backend.pack(fmt.array(np.zeros(paths)).components)
 
     def feed(self, x: Floats) -> None:
-        """Go on with the samples x, (samples, paths); the first row is the last one of the piece before."""
+        """Go on with the samples x, (samples, paths); the first row is the last one of the chunk before."""
         if self.fmt.base == 10:
             packed = self.backend.pack(self.fmt.array(x).components)
             _integrate(self.backend.tag, self._half, packed, self._total)
@@ -420,11 +420,11 @@ def emulate(
     cycles = round(positive_number("duration", duration) * positive_number("f_c", f_c))
     running = [Accumulator(fmt, 1 / f_c, paths) for fmt in formats]
     error, reference, half = np.zeros(paths), np.zeros(paths), np.array([0.5 / f_c])
-    for piece in pieces(process, f_c, cycles, rng, paths):
-        error = error + piece.d.sum(axis=0)
-        _integrate_rounding(Double(), half, piece.x, reference)
+    for chunk in chunks(process, f_c, cycles, rng, paths):
+        error = error + chunk.d.sum(axis=0)
+        _integrate_rounding(Double(), half, chunk.x, reference)
         for one in running:
-            one.feed(piece.x)
+            one.feed(chunk.x)
     return tuple(
         Emulation(one.fmt, omega_bw, f_c, duration, error, np.asarray(one.value - reference)) for one in running
     )

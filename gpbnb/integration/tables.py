@@ -61,11 +61,11 @@ def rules(processes: Sequence[tuple[Process, float]]) -> Table:
     return Table(f"{len(body)} rules", ("rule", "cycles a period", "weights of the samples", *names), tuple(body))
 
 
-def slips(mu: float = 0.1, period: float = 0.01) -> Table:
+def misprints(mu: float = 0.1, period: float = 0.01) -> Table:
     """What each slip of the print would have made of the rate, at one μ and a cycle time in s."""
     right = float(derivation.walk().subs(derivation.MU, mu))
     body: list[tuple[str, ...]] = []
-    for place, rate in derivation.slips().items():
+    for place, rate in derivation.misprints().items():
         value = float(rate.subs({derivation.MU: mu, derivation.T: period}))
         spoiled = "no" if math.isclose(value, right, rel_tol=1e-9) else "yes"
         body.append((place, f"{value:.5g}", f"{right:.5g}", spoiled))

@@ -49,7 +49,7 @@ from gpbnb.integration.walk import (
     required_rate,
     savage_recursion,
     series,
-    takeover,
+    settling_cycles,
     validity,
     walk_factor,
 )
@@ -88,8 +88,8 @@ __all__ = [
     "rule_variance",
     "savage_recursion",
     "series",
+    "settling_cycles",
     "stall_rate",
-    "takeover",
     "two_errors",
     "validity",
     "walk_factor",

@@ -266,7 +266,7 @@ def rectangle_error_variance(n: ArrayLike, mu: float) -> Floats:
     return np.asarray(cycles * rate - (1 - rate**2) / 2 * np.expm1(-cycles * mu))
 
 
-def takeover(mu: float, share: float, rectangle: bool = False) -> float:
+def settling_cycles(mu: float, share: float, rectangle: bool = False) -> float:
     r"""Cycles after which the random walk is the error variance to within the relative `share`.
 
     For the trapezoidal rule :math:`L(1-\varphi^n)/2n \le` share, for the rectangular ones

@@ -196,7 +196,7 @@ def roll_rate() -> Derivation:
     """
     u, q, k, p = sp.symbols("u q k P", positive=True)
     c = 12 * (TIME - sp.Rational(1, 2))
-    free, held_back = sp.Integral(c * TIME * (TIME - u), (TIME, u, 1)), sp.Integral(c * TIME, (TIME, u, 1))
+    free, after_reset = sp.Integral(c * TIME * (TIME - u), (TIME, u, 1)), sp.Integral(c * TIME, (TIME, u, 1))
     a, w, b = sp.symbols("a Omega beta", positive=True)
     return Derivation(
         (
@@ -206,10 +206,10 @@ def roll_rate() -> Derivation:
                 k**2 * q * sp.Integral(sp.expand(free.doit() ** 2), (u, 0, 1)),
                 sp.Rational(383, 1260) * k**2 * q,
             ),
-            Step("the same with resets, but for $P/2$", held_back, 1 + 3 * u**2 - 4 * u**3),
+            Step("the same with resets, but for $P/2$", after_reset, 1 + 3 * u**2 - 4 * u**3),
             Step(
                 "with resets",
-                k**2 * q * p**2 / 4 * sp.Integral(sp.expand(held_back.doit() ** 2), (u, 0, 1)),
+                k**2 * q * p**2 / 4 * sp.Integral(sp.expand(after_reset.doit() ** 2), (u, 0, 1)),
                 sp.Rational(38, 35) * k**2 * q * p**2 / 4,
             ),
             Step(

@@ -93,7 +93,7 @@ def test_the_expansion_is_the_series():
 
 
 def test_slips():
-    slips = derivation.slips()
+    slips = derivation.misprints()
     mu, period = sp.Rational(3, 10), sp.Rational(1, 50)
     found = {place: float(rate.subs({MU: mu, T: period})) for place, rate in slips.items()}
     right = float(theory.walk_factor(0.3))

@@ -83,31 +83,31 @@ def test_numbers_do_not_depend_on_the_pieces(process, monkeypatch):
     whole = experiment.simulate(process, 2.0, [10, 100], rng(3), 5, rule)
     monkeypatch.setattr(experiment, "CHUNK", 70)
     cut = experiment.simulate(process, 2.0, [10, 100], rng(3), 5, rule)
-    assert len(list(experiment.pieces(process, 2.0, 100, rng(3), 5))) > 10
+    assert len(list(experiment.chunks(process, 2.0, 100, rng(3), 5))) > 10
     assert cut.errors == pytest.approx(whole.errors, rel=1e-12, abs=1e-14)
 
 
 def test_pieces_carry_the_samples_before():
-    pieces = list(experiment.pieces(FIRST, 2.0, 20, rng(4), 2, memory=3))
-    assert [piece.first for piece in pieces] == [1]
-    assert pieces[0].x.shape == (23, 2)
-    assert pieces[0].d.shape == (20, 2)
+    chunks = list(experiment.chunks(FIRST, 2.0, 20, rng(4), 2, memory=3))
+    assert [chunk.first for chunk in chunks] == [1]
+    assert chunks[0].x.shape == (23, 2)
+    assert chunks[0].d.shape == (20, 2)
 
 
 def test_pieces_follow_each_other(monkeypatch):
     monkeypatch.setattr(experiment, "CHUNK", 24)
-    pieces = list(experiment.pieces(FIRST, 2.0, 20, rng(4), 2, memory=3))
-    assert len(pieces) > 2
-    for before, after in pairwise(pieces):
+    chunks = list(experiment.chunks(FIRST, 2.0, 20, rng(4), 2, memory=3))
+    assert len(chunks) > 2
+    for before, after in pairwise(chunks):
         assert after.first == before.first + len(before.d)
         assert np.array_equal(after.x[:3], before.x[-3:])
 
 
 @pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
 def test_samples_have_the_autocovariance(process):
-    piece = next(experiment.pieces(process, 2.0, 4, rng(5), 20_000))
+    chunk = next(experiment.chunks(process, 2.0, 4, rng(5), 20_000))
     for lag in range(4):
-        observed = float(np.mean(piece.x[0] * piece.x[lag]))
+        observed = float(np.mean(chunk.x[0] * chunk.x[lag]))
         error = process.sigma**2 * math.sqrt(2 / 20_000)  # at most, of a product of two normal numbers
         assert abs(observed - float(process.autocovariance(lag / 2.0))) < 4 * error
 
@@ -118,16 +118,16 @@ def test_the_error_of_a_trapezoid_is_that_beside_a_fine_integral():
     A coarse cycle of k fine ones: its trapezoid less the sum of the fine trapezoids less the fine errors.
     """
     k, fine = 8, 16.0
-    piece = next(experiment.pieces(FIRST, fine, k, rng(6), 20_000))
-    integral = (piece.x[:-1] / 2 + piece.x[1:] / 2).sum(axis=0) / fine - piece.d.sum(axis=0)
-    coarse = (piece.x[0] + piece.x[-1]) / 2 * k / fine - integral
-    one = next(experiment.pieces(FIRST, fine / k, 1, rng(7), 20_000))
+    chunk = next(experiment.chunks(FIRST, fine, k, rng(6), 20_000))
+    integral = (chunk.x[:-1] / 2 + chunk.x[1:] / 2).sum(axis=0) / fine - chunk.d.sum(axis=0)
+    coarse = (chunk.x[0] + chunk.x[-1]) / 2 * k / fine - integral
+    one = next(experiment.chunks(FIRST, fine / k, 1, rng(7), 20_000))
     spread = math.sqrt(2 / 20_000)
     assert np.mean(coarse**2) == pytest.approx(np.mean(one.d**2), rel=4 * math.sqrt(2) * spread)
-    assert np.mean(coarse * piece.x[0]) == pytest.approx(
+    assert np.mean(coarse * chunk.x[0]) == pytest.approx(
         np.mean(one.d[0] * one.x[0]), abs=8 * spread * np.std(coarse) * 1.7
     )
-    assert np.mean(coarse * piece.x[-1]) == pytest.approx(
+    assert np.mean(coarse * chunk.x[-1]) == pytest.approx(
         np.mean(one.d[0] * one.x[1]), abs=8 * spread * np.std(coarse) * 1.7
     )
 
@@ -144,15 +144,15 @@ def test_simulated_errors_have_the_exact_variance(process, rule):
 
 @each_rule
 def test_rules_are_applied_as_they_are_written(rule):
-    """Against a loop over cycles, over pieces that do not fit the period."""
-    pieces = [experiment.Piece(1, rng(9).standard_normal((11, 2)), rng(10).standard_normal((7, 2)))]
-    pieces.append(experiment.Piece(8, rng(11).standard_normal((9, 2)), rng(12).standard_normal((5, 2))))
-    for piece in pieces:
-        found, memory = experiment.rule_errors(rule, 2.0, piece), 4
-        for k in range(len(piece.d)):
-            weights = rule.weights[(piece.first + k - 1) % rule.period]
-            added = sum(float(w) * piece.x[memory + k - j] for j, w in enumerate(weights)) / 2.0
-            integral = (piece.x[memory + k] + piece.x[memory + k - 1]) / 4.0 - piece.d[k]
+    """Against a loop over cycles, over chunks that do not fit the period."""
+    chunks = [experiment.Chunk(1, rng(9).standard_normal((11, 2)), rng(10).standard_normal((7, 2)))]
+    chunks.append(experiment.Chunk(8, rng(11).standard_normal((9, 2)), rng(12).standard_normal((5, 2))))
+    for chunk in chunks:
+        found, memory = experiment.rule_errors(rule, 2.0, chunk), 4
+        for k in range(len(chunk.d)):
+            weights = rule.weights[(chunk.first + k - 1) % rule.period]
+            added = sum(float(w) * chunk.x[memory + k - j] for j, w in enumerate(weights)) / 2.0
+            integral = (chunk.x[memory + k] + chunk.x[memory + k - 1]) / 4.0 - chunk.d[k]
             assert found[k] == pytest.approx(added - integral, rel=1e-12, abs=1e-13)
 
 
@@ -183,10 +183,10 @@ def test_ten_million_samples_in_bounded_memory():
         (lambda: experiment.simulate(FIRST, 2.0, [], rng(0)), r"got n = \(\); needed rising numbers of cycles"),
         (lambda: experiment.simulate(FIRST, 2.0, [2, 2], rng(0)), "needed rising numbers"),
         (lambda: experiment.simulate(FIRST, 2.0, [0], rng(0)), "at least 1"),
-        (lambda: next(experiment.pieces(FIRST, 2.0, 0, rng(0))), "got 0 cycles, 1 paths, a memory of 1"),
+        (lambda: next(experiment.chunks(FIRST, 2.0, 0, rng(0))), "got 0 cycles, 1 paths, a memory of 1"),
         (
             lambda: experiment.rule_errors(
-                theory.RULES["Boole"], 1.0, next(experiment.pieces(FIRST, 1.0, 4, rng(0), memory=2))
+                theory.RULES["Boole"], 1.0, next(experiment.chunks(FIRST, 1.0, 4, rng(0), memory=2))
             ),
             "got a memory of 2 samples; needed 4",
         ),
@@ -300,11 +300,11 @@ def test_a_meeting_collects_its_emulations():
 def test_both_errors_are_what_came_minus_what_should_come():
     fmt = FloatFormat(2, 11)
     (run,) = experiment.emulate(64.0, 32.0, 4.0, [fmt], rng(22), 3)
-    (piece,) = experiment.pieces(theory.first_order(1.0, 64.0), 32.0, 128, rng(22), 3)
+    (chunk,) = experiment.chunks(theory.first_order(1.0, 64.0), 32.0, 128, rng(22), 3)
     running = experiment.Accumulator(fmt, 1 / 32, 3)
-    running.feed(piece.x)
-    trapezoids = (piece.x[:-1] + piece.x[1:]).sum(axis=0) / 64
-    assert np.array_equal(run.discretization, piece.d.sum(axis=0))
+    running.feed(chunk.x)
+    trapezoids = (chunk.x[:-1] + chunk.x[1:]).sum(axis=0) / 64
+    assert np.array_equal(run.discretization, chunk.d.sum(axis=0))
     assert run.rounding == pytest.approx(running.value - trapezoids, abs=1e-12)
     assert np.abs(run.rounding).min() > 1e-6
     assert run.rms.rounding == math.sqrt(np.mean(run.rounding**2))

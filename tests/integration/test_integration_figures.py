@@ -212,7 +212,7 @@ def test_rules_table():
 
 
 def test_slips_table():
-    rows = {row[0]: row for row in tables.slips(0.3, 0.02).body}
+    rows = {row[0]: row for row in tables.misprints(0.3, 0.02).body}
     assert rows["(25)"][-1] == "no"
     assert [place for place, row in rows.items() if row[-1] == "yes"] == ["(12)", "(18)", "(34)", "(37)"]
     assert float(rows["(12)"][1]) == pytest.approx(float(theory.walk_factor(0.3)) - 2 / 0.3, rel=1e-3)

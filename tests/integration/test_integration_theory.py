@@ -274,7 +274,7 @@ def test_the_documents_recursion_mended_and_as_printed(mu):
 def test_the_random_walk_takes_over_where_it_says(mu, rectangle):
     variance = theory.rectangle_error_variance if rectangle else theory.error_variance
     for share in (0.001, 0.05):
-        n = theory.takeover(mu, share, rectangle)
+        n = theory.settling_cycles(mu, share, rectangle)
         away = abs(float(variance(n, mu)) / (n * float(theory.walk_factor(mu))) - 1)
         assert away <= share * (1 + 1e-9)
         if n > 1:
@@ -504,7 +504,7 @@ BAD = [
     (lambda: theory.series(0), "got terms = 0; needed at least 1"),
     (lambda: theory.error_variance(-1, 1.0), "needed cycles, at least 0"),
     (lambda: theory.error_variance(1, 1.0, start=-0.1), "got start = -0.1"),
-    (lambda: theory.takeover(1.0, 0.0), "got share = 0.0"),
+    (lambda: theory.settling_cycles(1.0, 0.0), "got share = 0.0"),
     (lambda: theory.resonant(1.0, 1.0, 1.0), "got zeta = 1.0; needed 0 < zeta < 1; use first_order"),
     (lambda: theory.first_order(1.0, NAN), "got omega_bw = nan"),
     (lambda: theory.Rule("none", ()), "got a rule without steps"),

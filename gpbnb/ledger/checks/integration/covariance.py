@@ -33,7 +33,7 @@ CLOSE = 1e-10
 
 @cache
 def _misprints() -> dict[str, sp.Expr]:
-    return derivation.slips()
+    return derivation.misprints()
 
 
 def if_used(place: str) -> str:

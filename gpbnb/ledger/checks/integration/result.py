@@ -123,7 +123,7 @@ def large_n(printed: Statement) -> Finding:
     away = max(
         abs(float(theory.error_variance(n, mu)) / (n * float(theory.walk_factor(mu))) - 1) for mu in (0.01, 1.0, 100.0)
     )
-    begins = {mu: theory.takeover(mu, 0.01) for mu in (0.1, 1.0, 100.0)}
+    begins = {mu: theory.settling_cycles(mu, 0.01) for mu in (0.1, 1.0, 100.0)}
     return compare(
         away < 1e-3,
         "the variance is that of the random walk to 1 % from cycle "
@@ -173,7 +173,7 @@ def series(printed: Statement) -> Finding:
         Verdict.MISPRINT if others else Verdict.WRONG,
         otherwise_note="the quadratic term is halved with the 2 in front, the cubic one is not, by the author or the "
         "scan; the next line drops it, so nothing depends on it. If kept, it would add a term "
-        f"${sp.latex(derivation.slips()['(37)'] - MU / 6)}$ to an odd function of $\\mu$",
+        f"${sp.latex(derivation.misprints()['(37)'] - MU / 6)}$ to an odd function of $\\mu$",
     )
 
 
