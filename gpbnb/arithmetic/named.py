@@ -32,7 +32,7 @@ BFLOAT16 = _ieee(2, 8, 127)
 #: The 19 bits that tensor cores take of a binary32 operand.
 TF32 = _ieee(2, 11, 127)
 FP8_E5M2 = _ieee(2, 3, 15)
-#: Its largest number is 1.75 * 2**8: the significand of all ones means NaN there.
+#: Its largest number is 1.75 * 2**8, since the significand of all ones means NaN there.
 FP8_E4M3 = FloatFormat(2, 4, Rounding.EVEN, emin=-6, emax=8, largest=Fraction(448))
 
 DECIMAL32 = _ieee(10, 7, 96)
@@ -43,7 +43,7 @@ DECIMAL128 = _ieee(10, 34, 6144)
 IBM_HEX32 = FloatFormat(16, 6, Rounding.CHOP, emin=-65, emax=62, subnormal=False)
 IBM_HEX64 = FloatFormat(16, 14, Rounding.CHOP, emin=-65, emax=62, subnormal=False)
 
-#: The 36-bit word of the IBM 704: sign, characteristic of 8 bits, fraction of 27, from 2**-129 to 2**127.
+#: The 36-bit word of the IBM 704 with a sign, a characteristic of 8 bits and a fraction of 27, from 2**-129 to 2**127.
 IBM_704 = FloatFormat(2, 27, Rounding.CHOP, emin=-129, emax=126, subnormal=False)
 
 NAMED = {

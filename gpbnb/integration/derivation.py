@@ -356,7 +356,7 @@ def small_mu() -> Derivation:
     )
 
 
-# -- what the slips would have led to -------------------------------------------------------------
+# -- what the misprints would have led to -------------------------------------------------------------
 
 
 def misprints() -> dict[str, sp.Expr]:

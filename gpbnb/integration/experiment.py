@@ -58,7 +58,7 @@ def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
 
     Parameters
     ----------
-    name : "walk" for (35), or a field of :class:`gpbnb.integration.theory.Discretization`.
+    name : "walk" for (35), or a field of ``Discretization``.
     mu : (k,), positive.
     printed : the form that cancels instead of the stable one; for "walk" and "q22".
     """
@@ -123,7 +123,7 @@ def advance(step: Step, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    step : from :func:`gpbnb.integration.theory.exact_step`.
+    step : from ``exact_step``.
     state : (paths, m), at the start; at the end afterwards.
     normal : (cycles, paths, m + 1).
 
@@ -431,7 +431,7 @@ def emulate(
 
 
 @dataclass(frozen=True)
-class Meeting:
+class RateSweep:
     """Both errors over the iteration rate, in several formats: what was observed, (formats, rates)."""
 
     omega_bw: float
@@ -464,19 +464,19 @@ class Meeting:
         return np.asarray(self.rounding / expected)
 
 
-def meet(
+def sweep_rates(
     omega_bw: float,
     duration: float,
     formats: Sequence[FloatFormat],
     rates: Sequence[float],
     rng: np.random.Generator,
     paths: int = 64,
-) -> Meeting:
+) -> RateSweep:
     """Emulate an integrator over iteration rates and formats; rates are powers of two, so that T/2 is exact."""
     bar = tqdm(rates, desc="rates", **BAR)
     runs = [emulate(omega_bw, f_c, duration, formats, rng, paths) for f_c in bar]
     table = np.array([[(*run.rms, run.rms_total) for run in at_rate] for at_rate in runs]).transpose(2, 1, 0)
-    return Meeting(omega_bw, duration, paths, tuple(formats), np.array(rates, dtype=np.float64), *table)
+    return RateSweep(omega_bw, duration, paths, tuple(formats), np.array(rates, dtype=np.float64), *table)
 
 
 #: The formats of the chapter's figure.

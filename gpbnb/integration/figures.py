@@ -15,7 +15,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.style import BOUND, COLOURS, OBSERVED, REFERENCE, STRICT, colours, label, legend, line_styles, loglog
 from gpbnb.display.tables import arithmetic
 from gpbnb.integration import theory
-from gpbnb.integration.experiment import Accuracy, Meeting, Simulation, Sweep
+from gpbnb.integration.experiment import Accuracy, RateSweep, Simulation, Sweep
 
 
 def block_diagram(ax: Axes) -> list[Artist]:
@@ -210,7 +210,7 @@ def rules_resonant(rules: Sequence[str], zeta: float, ax: Axes) -> list[Artist]:
     return artists
 
 
-def meeting(result: Meeting, ax: Axes) -> list[Artist]:
+def errors_over_rate(result: RateSweep, ax: Axes) -> list[Artist]:
     """Discretization and rounding errors over the iteration rate, observed (points) beside theory (lines)."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     artists: list[Artist] = []
@@ -228,7 +228,7 @@ def meeting(result: Meeting, ax: Axes) -> list[Artist]:
     return artists
 
 
-def totals(result: Meeting, ax: Axes) -> list[Artist]:
+def totals(result: RateSweep, ax: Axes) -> list[Artist]:
     """Both errors together, and the best rate (star) of each format."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     artists: list[Artist] = []

@@ -91,7 +91,7 @@ def exact_step(process: Process, f_c: float) -> Step:
     r"""Discretize a process together with the error of the trapezoidal rule, exact at the sampling times.
 
     For the first order in closed form. With h the part of :math:`L\tanh(\mu/2)`,
-    :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b`, where b has the variance ``bridge`` of :func:`discretize`. For others
+    :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b`, where b has the variance ``bridge`` of ``discretize``. For others
     from the matrix exponential, with as many digits as the cancellation takes.
     """
     period = 1 / positive_number("f_c", f_c)

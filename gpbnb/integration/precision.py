@@ -71,7 +71,7 @@ def correlation_factor(change: ArrayLike) -> Floats:
 def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt: FloatFormat) -> Errors:
     r"""Errors of the trapezoidal rule run in a format, at the end of a `duration` t of many correlation times.
 
-    Discretization: :func:`error_variance`. Rounding to nearest: the sum of
+    Discretization: ``error_variance``. Rounding to nearest: the sum of
 
     - the errors of the additions to the accumulator, whose variance grows as (23); their mean square is that of a
       spacing u of the accumulator, :math:`u^2F/12`;

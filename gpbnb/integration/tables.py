@@ -70,7 +70,7 @@ def misprints(mu: float = 0.1, period: float = 0.01) -> Table:
         spoiled = "no" if math.isclose(value, right, rel_tol=1e-9) else "yes"
         body.append((place, f"{value:.5g}", f"{right:.5g}", spoiled))
     header = ("slip in", f"rate over $\\sigma_x^2T$ if used, $\\mu = {mu:g}$", "right", "spoils (35)")
-    return Table(f"{len(body)} slips", header, tuple(body))
+    return Table(f"{len(body)} misprints", header, tuple(body))
 
 
 def design(omega_bw: float, duration: float, precisions: Sequence[int], base: int = 2) -> Table:

@@ -1,8 +1,7 @@
-"""The algebra of hung1984, ch. II, sections 10-11, derived again: for 3 × 3 as printed, and for every n.
+"""The algebra of hung1984, ch. II, sections 10-11, derived again for 3 × 3 as printed and for every n.
 
-Matrices are symbols that do not commute, so that a step holds for every n; where entries matter, a step is about the
-entry (i, j) of any matrix, and sums over the stages of elimination go by induction.
-"""
+Matrices are symbols that do not commute, so a step holds for every n. Where entries matter, a step concerns the entry
+(i, j) of any matrix, and sums over the stages of elimination follow by induction."""
 
 from __future__ import annotations
 
@@ -281,11 +280,7 @@ def two_systems() -> Derivation:
                 A + A_TILDE + L * DELTA_A,
             ),
             Step("(92) as it must be: its right side", L * unevaluated(right + DELTA_B), B + B_TILDE + L * DELTA_B),
-            Step(
-                "what (91) leaves out",
-                together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)),
-                (L - 1) * DELTA_A,
-            ),
+            Step("what (91) leaves out", together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)), (L - 1) * DELTA_A),
             Step(
                 "or all of it as a change of the triangular matrix $L^{-1}A$",
                 together(upper, DELTA_A, minus(L**-1 * A)),
@@ -312,12 +307,7 @@ def transfer_cost() -> Derivation:
                 2 * unevaluated(new + old - w),
                 new + 2 * w,
             ),
-            Step(
-                "the largest weight of (87), where $j = 2 + m$",
-                N + 1,
-                (N - J + 3).subs(J, 2 + m),
-                m,
-            ),
+            Step("the largest weight of (87), where $j = 2 + m$", N + 1, (N - J + 3).subs(J, 2 + m), m),
             Step(
                 "so $|\\tilde A|$ is taken at most so many times",
                 together(1, over(N + 1, sp.Integer(2))),

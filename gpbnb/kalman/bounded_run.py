@@ -47,7 +47,7 @@ class BoundedHistory:
 
 
 class BoundedRun(Run):
-    """A run together with its contraction bound, :mod:`gpbnb.kalman.contraction`; see :class:`Run`.
+    """A run together with its contraction bound, :mod:`gpbnb.kalman.contraction`; see ``Run``.
 
     Of the reference itself, in double-double, the bound says how far it may be from what is exact.
     """
@@ -96,7 +96,7 @@ class BoundedRun(Run):
 def emulate_with_bound(
     model: LinearModel, z: Any, fmt: FloatFormat, form: Form = Form.HUNG, checkpoint_steps: Sequence[int] | None = None
 ) -> BoundedHistory:
-    """Run the filter rounded, in double-double, and with its contraction bound; arguments as of :func:`emulate`."""
+    """Run the filter rounded, in double-double, and with its contraction bound; arguments as of ``emulate``."""
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     run = BoundedRun(model, fmt, form, chosen)

@@ -17,11 +17,11 @@ for the errors :math:`e_k = \hat x_k - x_k` and :math:`E_k = \hat P_k - P_k` obe
 
 where :math:`K^\circ, S^\circ` are the gain and the innovation covariance of (99) for :math:`\hat P_{k-1}`, and
 :math:`\hat\nu_k = z_k - H\Phi\hat x_{k-1}`; :math:`F_k` is (109), the closed loop of the exact filter. Proof:
-:func:`gpbnb.kalman.derivation.contraction`. In the norm :math:`\|v\|_k = \|L_k^{-1}v\|_2`, with :math:`L_kL_k^T`
+``contraction``. In the norm :math:`\|v\|_k = \|L_k^{-1}v\|_2`, with :math:`L_kL_k^T`
 about the filter's own covariance, the closed loop does not expand: errors are added up, not multiplied up. The norm has
 no units; an entry of the error is at most :math:`\|v\|_k` of these standard deviations.
 
-The functions are compiled (:mod:`gpbnb.kalman.kernels.contraction`), take and return float64, and include their own
+The functions are compiled (``contraction``), take and return float64, and include their own
 roundings in the bound.
 """
 

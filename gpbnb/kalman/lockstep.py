@@ -19,14 +19,14 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.records import Records
 from gpbnb.kalman.simulation import BLOCK
 
-#: The reference: the innovation form in float64.
+#: The reference, the innovation form in float64.
 REFERENCE = FloatFormat(2, 53)
 
 DECIMALS = 4
 """Measurement matrices of base 10 have entries of so many decimals."""
 
 ANGLES = 4
-"""How many of the first states are compared: two drift angles, two rates."""
+"""How many of the first states are compared, two drift angles, two rates."""
 
 
 class Source(Protocol):

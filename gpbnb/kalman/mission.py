@@ -246,7 +246,7 @@ class Mission:
 
     @property
     def start(self) -> tuple[float, ...]:
-        """The truth at the start: what the filter finds out."""
+        """True initial state, which the filter is to find."""
         rates = [_VALUE[f"{name}, true less predicted"] for name in ("geodetic drift", "frame dragging")]
         if not self.deviations:
             rates[0] += _VALUE["geodetic drift, predicted"]

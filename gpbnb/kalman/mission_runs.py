@@ -21,7 +21,7 @@ from gpbnb.kalman.threshold import COLUMNS as ERROR_COLUMNS
 from gpbnb.kalman.threshold import FORMS, STATES
 from gpbnb.sweeps import Column, Sweep
 
-#: The settings of the sweep: the model with the report's timing, and with one choice changed.
+#: The settings of the sweep, the model with the report's timing, and with one choice changed.
 SETTINGS = {
     "mission": Mission(),
     "no occultation": Mission(occultation=False),

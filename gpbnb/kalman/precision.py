@@ -88,7 +88,7 @@ def required_precision(
         the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
         contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
         asks for more digits. "guarantee" bounds the error for every measurement sequence within limits, and for ever
-        (:mod:`gpbnb.kalman.guarantee`); "probable" takes three standard deviations of the error that independent
+        (``guarantee``); "probable" takes three standard deviations of the error that independent
         roundings would cause. Neither depends on `z` or `steps`.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.

@@ -53,6 +53,8 @@ def interval(within: int, records: int, confidence: float = CONFIDENCE) -> tuple
     ------
     ValueError : counts or confidence out of range.
 
+    Examples
+    --------
     >>> [round(each, 4) for each in interval(100, 100)]
     [0.9705, 1.0]
     """
@@ -69,6 +71,8 @@ def interval(within: int, records: int, confidence: float = CONFIDENCE) -> tuple
 def records_needed(probability: float, confidence: float = CONFIDENCE) -> int:
     r"""How many records must all succeed before `probability` is shown: :math:`\ln(1-c)/\ln p`, rounded up.
 
+    Examples
+    --------
     >>> records_needed(0.99)
     299
     """
@@ -101,7 +105,7 @@ def shares(table: Table, tolerance: float = 1.0) -> tuple[Share, ...]:
 
     Parameters
     ----------
-    table : with the columns of :data:`gpbnb.kalman.threshold.COLUMNS`, and perhaps one named `setting` before them.
+    table : with the columns of ``COLUMNS``, and perhaps one named `setting` before them.
     tolerance : of the drift angles in mas and of their rates in mas/yr, at every step.
     """
     groups: dict[tuple[str, ...], list[float]] = {}

@@ -21,7 +21,7 @@ from gpbnb.sweeps import Sweep
 
 HERE = Path(__file__).parent
 
-#: Steps of a year that a sample computes again: about eleven days.
+#: Steps of a year that a sample computes again, about eleven days.
 SAMPLE_STEPS = 100_000
 
 

@@ -34,7 +34,7 @@ STATES = ("absolute", "deviation")
 #: The forms of the sweep, by the name under which they are stored.
 FORMS = {"hung": Form.HUNG, "innovation": Form.INNOVATION}
 
-#: True drift rates less the predicted ones, mas/yr: 6606.1 - 6601.8 and 39.2 - 37.2, the measured differences.
+#: True drift rates less the predicted ones, mas/yr, 6606.1 - 6601.8 and 39.2 - 37.2, the measured differences.
 DEVIATION = (4.3, 2.0)
 
 SEED = 1984
@@ -44,7 +44,7 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Cell:
-    """Some formats of one base, for the same records: they share measurements and reference."""
+    """Some formats of one base, for the same records, they share measurements and reference."""
 
     states: str
     base: int

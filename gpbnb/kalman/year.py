@@ -190,7 +190,7 @@ def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
 
 @cache
 def load(directory: Path = _HERE) -> tuple[Year, ...]:
-    """The years that the package brings, in the order of :data:`CASES`."""
+    """The years that the package brings, in the order of ``CASES``."""
     about = provenance(directory)["cases"]
     result = []
     for case, numbers in _read(directory / "year.csv", COLUMNS).items():
@@ -214,7 +214,7 @@ def load(directory: Path = _HERE) -> tuple[Year, ...]:
 
 @cache
 def bounds(directory: Path = _HERE) -> dict[Case, Bounds]:
-    """The contraction bounds of :data:`BOUNDED_CASES` that the package brings."""
+    """The contraction bounds of ``BOUNDED_CASES`` that the package brings."""
     return {
         case: Bounds(
             case, numbers[:, 0].astype(np.int64), numbers[:, 1:3], numbers[:, 3:5], *(numbers[:, i] for i in (5, 6, 7))

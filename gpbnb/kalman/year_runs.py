@@ -27,7 +27,7 @@ _FINGERPRINT_STEPS = 200  # steps that show whether the code computes the same
 
 
 class ResumableRun:
-    """A run of a case, saved in a file; with its contraction bound if it is among :data:`BOUNDED_CASES`."""
+    """A run of a case, saved in a file; with its contraction bound if it is among ``BOUNDED_CASES``."""
 
     def __init__(self, case: Case, directory: Path, steps: int) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0

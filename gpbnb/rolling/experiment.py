@@ -191,7 +191,7 @@ def survey_rng() -> np.random.Generator:
     return np.random.default_rng(1984)
 
 
-#: Columns of the stored survey: errors of the drift rates of x and y, mas/yr, for each roll period.
+#: Columns of the stored survey, errors of the drift rates of x and y, mas/yr, for each roll period.
 SURVEY_COLUMNS = (
     Column("gyro", "integer", 0, SURVEY_GYROS - 1),
     *(

@@ -23,7 +23,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.sweeps.table import Column, Row, Table, read, write
+from gpbnb.sweeps.table import Column, Record, Table, read, write
 
 C = TypeVar("C")
 
@@ -35,8 +35,8 @@ class Difference(NamedTuple):
     """A row that was computed again and does not stand in the stored table: the stored row with its key, if any."""
 
     cell: str
-    stored: Row | None
-    computed: Row
+    stored: Record | None
+    computed: Record
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ class Sweep(Generic[C]):
     key: int
     cells: Callable[[], Sequence[C]]
     compute: Callable[[C, Path | None], Any]
-    rows: Callable[[C, Any], list[Row]]
+    rows: Callable[[C, Any], list[Record]]
     command: str
     seed: int
     version: str = "1"
-    summary: Callable[[Sequence[tuple[C, Any]]], list[Row]] | None = None
-    sample: Callable[[C, np.random.Generator], list[Row]] | None = None
-    same: Callable[[Row, Row], bool] = operator.eq
+    summary: Callable[[Sequence[tuple[C, Any]]], list[Record]] | None = None
+    sample: Callable[[C, np.random.Generator], list[Record]] | None = None
+    same: Callable[[Record, Record], bool] = operator.eq
     packages: tuple[str, ...] = ("numpy", "numba", "llvmlite")
 
     # -- computing --------------------------------------------------------------------------------------
@@ -179,7 +179,7 @@ class Sweep(Generic[C]):
                     differences.append(Difference(str(cell), found, row))
         return differences
 
-    def _is_stored(self, cell: C, stored: Mapping[Row, Row]) -> bool:
+    def _is_stored(self, cell: C, stored: Mapping[Record, Record]) -> bool:
         """Whether rows of a cell are stored; a sweep may be stored before all its cells are computed."""
         names = cell_key(cell)
         return any(key[: len(names)] == names for key in stored)
@@ -237,7 +237,7 @@ class Sweep(Generic[C]):
                     yield chunks[number], results
 
 
-def cell_key(cell: Any) -> Row:
+def cell_key(cell: Any) -> Record:
     """The first columns of a cell's rows: its `key`, or nothing."""
     return tuple(getattr(cell, "key", ()))
 

@@ -20,7 +20,7 @@ from typing import Literal
 CHECK = "crc32"
 """Name of the last column."""
 
-Row = tuple[str, ...]
+Record = tuple[str, ...]
 
 
 class DamagedFileError(ValueError):
@@ -65,7 +65,7 @@ class Table:
     """Rows of text with their columns and their provenance."""
 
     columns: tuple[Column, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[Record, ...]
     provenance: Mapping[str, str]
 
     def records(self, **where: str) -> list[dict[str, str]]:
@@ -75,7 +75,7 @@ class Table:
         return [each for each in found if all(each[name] == value for name, value in where.items())]
 
 
-def write(file: Path, columns: Sequence[Column], rows: Iterable[Row], provenance: Mapping[str, str]) -> None:
+def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provenance: Mapping[str, str]) -> None:
     """Write a table; all of it, or nothing.
 
     Raises

@@ -233,7 +233,7 @@ def test_emulated_errors_are_those_of_the_theory(f_c):
     formats = (FloatFormat(2, 11), FloatFormat(2, 16), FloatFormat(2, 16, CHOP), FloatFormat(16, 5), FloatFormat(2, 24))
     paths = 400
     runs = experiment.emulate(64.0, f_c, 16.0, formats, rng(17), paths)
-    error = math.sqrt(6 / paths) / 2  # of an rms, derived at Meeting.standard_error
+    error = math.sqrt(6 / paths) / 2  # of an rms, derived at RateSweep.standard_error
     for run in runs:
         assert f_c <= theory.stall_rate(64.0, 16.0, run.fmt) / 2
         expected = theory.two_errors(1.0, 64.0, f_c, 16.0, run.fmt)
@@ -285,7 +285,7 @@ def test_decimal_digits():
 
 def test_a_meeting_collects_its_emulations():
     formats, rates = (FloatFormat(2, 11), FloatFormat(2, 16)), [64.0, 256.0]
-    met = experiment.meet(64.0, 4.0, formats, rates, rng(20), 40)
+    met = experiment.sweep_rates(64.0, 4.0, formats, rates, rng(20), 40)
     again, draw = {}, rng(20)
     for f in rates:
         again[f] = experiment.emulate(64.0, f, 4.0, formats, draw, 40)
@@ -319,7 +319,7 @@ def test_the_standard_error_of_a_meeting_is_that_of_a_walk():
     least = np.minimum.outer(i, i)
     ratio = np.sum(np.multiply.outer(i, i) + 2 * least**2) / np.sum(i) ** 2
     assert ratio == pytest.approx(7 / 3, rel=1e-3)
-    met = experiment.meet(64.0, 1.0, [FloatFormat(2, 11)], [64.0], rng(25), 6)
+    met = experiment.sweep_rates(64.0, 1.0, [FloatFormat(2, 11)], [64.0], rng(25), 6)
     assert met.standard_error == pytest.approx(math.sqrt((3 * ratio - 1) / 6) / 2, rel=1e-3)
 
 

@@ -145,11 +145,11 @@ def test_rules_resonant(ax):
 @pytest.fixture(scope="module")
 def met():
     formats = (FloatFormat(2, 8), FloatFormat(2, 12, Rounding.CHOP))
-    return experiment.meet(64.0, 2.0, formats, [32.0, 128.0], np.random.default_rng(3), 20)
+    return experiment.sweep_rates(64.0, 2.0, formats, [32.0, 128.0], np.random.default_rng(3), 20)
 
 
 def test_meeting(ax, met):
-    figures.meeting(met, ax)
+    figures.errors_over_rate(met, ax)
     assert line(ax, "discretization").get_ydata().tolist() == met.discretization[0].tolist()
     assert line(ax, "rounding, 12 bits, chopped").get_ydata().tolist() == met.rounding[1].tolist()
     theories = [each for each in ax.lines if len(each.get_xdata()) == 40]

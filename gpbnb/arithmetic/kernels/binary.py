@@ -104,7 +104,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         r = fma(-q, b, a)
         if b < 0.0:
             r = 0.0 - r
-        # A quotient of 53-bit numbers is never halfway between two: no tie to mend.
+        # A quotient of 53-bit numbers is never halfway between two: no tie to correct.
         down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, q, r)
         return fit(fmt, q, down, a == 0.0)
 

@@ -42,7 +42,7 @@ from gpbnb.kalman.guarantee.program import functionals
 from gpbnb.kalman.model import LinearModel
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
-"""Names of the parts of a bound, in the order of :attr:`Guarantee.parts`."""
+"""Names of the parts of a bound, in the order in which a guarantee lists them."""
 
 
 @dataclass(frozen=True, eq=False)

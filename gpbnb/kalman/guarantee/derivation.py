@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, held, over, together
+from gpbnb.display.derivation import Derivation, Step, over, together, unevaluated
 
 
 def recursion() -> Derivation:
@@ -16,7 +16,7 @@ def recursion() -> Derivation:
     phi, h, k, known, loop = sp.symbols(r"\Phi H K \hat{K} \hat{F}", commutative=False)
     e, p, z, w = sp.symbols("e p z w", commutative=False)
     one = sp.S.One
-    exact_loop, stored = held(one - k * h) * phi, loop - held(one - known * h) * phi
+    exact_loop, stored = unevaluated(one - k * h) * phi, loop - unevaluated(one - known * h) * phi
     innovation = z - h * phi * p
     computed = loop * (p + e) + known * z + w
     return Derivation(
@@ -24,12 +24,12 @@ def recursion() -> Derivation:
             Step(
                 "computed minus exact estimate after a step",
                 sp.expand(computed) - (exact_loop * p + k * z),
-                together(loop * e, stored * p, held(known - k) * held(innovation), w),
+                together(loop * e, stored * p, unevaluated(known - k) * unevaluated(innovation), w),
             ),
             Step(
                 "the exact estimate, by the computed loop: $\\hat F p + \\hat K z$ less what separates them",
                 exact_loop * p + k * z,
-                together(loop * p, known * z, -(stored * p), -(held(known - k) * held(innovation))),
+                together(loop * p, known * z, -(stored * p), -(unevaluated(known - k) * unevaluated(innovation))),
             ),
         )
     )
@@ -46,14 +46,14 @@ def telescope() -> Derivation:
             Step(
                 "$c_0$ times the error after two steps",
                 sp.expand(c0 * (f * before + w)),
-                together(c0 * w, c1 * v, held(c0 * f - c1) * before, held(c1 * g - c2) * e, c2 * e),
+                together(c0 * w, c1 * v, unevaluated(c0 * f - c1) * before, unevaluated(c1 * g - c2) * e, c2 * e),
             ),
         )
     )
 
 
 def induction() -> Derivation:
-    r"""One state: a bound that bounds itself, from sums cut after L steps with what is left over, ρ = |F|^L."""
+    r"""One state: a bound that bounds itself, from sums cut after L steps with the remainder ρ, the L-th power of the size of F."""
     f, w = sp.symbols("F w", positive=True)
     lags = sp.Symbol("L", integer=True, positive=True)
     cut = w * over(1 - f**lags, 1 - f)

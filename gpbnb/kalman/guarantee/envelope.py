@@ -38,13 +38,13 @@ _UP = 1 + 2.0**-40
 """Enlarges a sum of up to 2**12 terms of one sign by more than its roundings."""
 
 ROUNDING, LOOP, GAIN, START = range(4)
-"""Parts of a bound: roundings of the step, of the stored closed loop, error of the gain, and what is carried on."""
+"""Parts of a bound (roundings of the step, of the stored closed loop, error of the gain, and what is carried on)."""
 
 
 class Units(NamedTuple):
     r"""The largest rounding error of a result of at most a given size, :math:`\tfrac12 b^{e-t}` or :math:`b^{e-t}`.
 
-    The size is below :math:`b^e`. Exponents are without limit in a :class:`FloatFormat`; the table spans 2**±900.
+    The size is below :math:`b^e`. Exponents are without limit in a ``FloatFormat``; the table spans 2**±900.
     """
 
     #: powers of the base, rounded down.
@@ -97,11 +97,11 @@ class Limits(NamedTuple):
     The state and the innovation, or the measurement, must be finite.
     """
 
-    #: (n,), |x|.
+    #: (n,), largest size of each state.
     state: NDArray[np.float64]
-    #: (m,), |z - HΦx|.
+    #: (m,), largest size of each innovation.
     innovation: NDArray[np.float64]
-    #: (m,), |z|.
+    #: (m,), largest size of each measurement.
     measurement: NDArray[np.float64]
 
 
@@ -110,7 +110,7 @@ class Disturbances(NamedTuple):
 
     #: (steps, n, n), closed loop of the program.
     F: NDArray[np.float64]
-    #: (steps, n, n), row vector c: the product c F in float64 differs by at most |c| spread.
+    #: (steps, n, n), the product of a row vector c and F in float64 differs by at most ``abs(c) @ spread``.
     spread: NDArray[np.float64]
     #: (steps, n, g), columns.
     G: NDArray[np.float64]
@@ -326,7 +326,7 @@ def certify(
     starts : (t, n), the functions.
     k : the step; with `steady`, counted from `first`, and the past is without end.
     most : how many steps to go back.
-    scale, small : (n,), stop when every |c| scale is below small.
+    scale, small : (n,), stop when every ``abs(c) @ scale`` is below small.
     """
     n, t, g_count = F.shape[1], starts.shape[0], G.shape[2]
     rows = F.shape[0]
