@@ -567,7 +567,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("precision 2.5", lambda: FloatFormat(10, 2.5), TypeError, "precision: got 2.5 of type float; needed an int of at"),
     ("precision vast", lambda: FloatFormat(2, 10**12), ValueError, "precision: got 1000000000000 digits; needed at mo"),
     ("rounding str", lambda: FloatFormat(10, 4, "nearest"), TypeError,
-     "rounding: got 'nearest' of type str; needed Rounding.NEAREST or Rounding.CHOP"),
+     "rounding: got 'nearest' of type str; needed one of Rounding.NEAREST, Rounding.CHOP"),
     # operands
     ("mixed +", lambda: V + W, ValueError, f"got operands in {D4} and {B8}; needed one format; convert one of them"),
     ("mixed @", lambda: V @ W, ValueError, f"got operands in {D4} and {B8}; needed one format"),

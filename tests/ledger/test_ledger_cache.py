@@ -66,7 +66,7 @@ def test_exactly_the_checks_that_depend_on_a_change_are_run_again(copy):
     assert copy(*SAMPLE) == {"ran": [], "outcomes": first["outcomes"]}
     append(copy.package / "arithmetic" / "kernels" / "binary.py", "# changed\n")
     assert sorted(copy(*SAMPLE)["ran"]) == sorted([INTEGRATION, ROUNDING])
-    append(copy.package / "geometry" / "theory.py", "# changed\n")
+    append(copy.package / "geometry" / "derivation.py", "# changed\n")
     assert copy(*SAMPLE)["ran"] == [GEOMETRY]
     (copy.package / "rounding" / "stored.csv").write_text("1\n")  # data beside the sources
     assert copy(*SAMPLE)["ran"] == [ROUNDING]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
@@ -71,7 +72,7 @@ def _scaled(x: float) -> Any:
     return np.int64(x), np.int64(e)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def greedy(
     fmt: Any,
     operations: Any,

@@ -53,7 +53,7 @@ def telescope() -> Derivation:
 
 
 def induction() -> Derivation:
-    r"""One state: a bound that bounds itself, from sums cut after L steps with the remainder ρ, the L-th power of the size of F."""
+    r"""One state: a bound that bounds itself, from sums cut after L steps and a remainder ρ."""
     f, w = sp.symbols("F w", positive=True)
     lags = sp.Symbol("L", integer=True, positive=True)
     cut = w * over(1 - f**lags, 1 - f)

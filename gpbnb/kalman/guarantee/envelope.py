@@ -27,10 +27,10 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.kalman.guarantee.program import MULTIPLY, effects, functionals
 
 _U = 2.0**-53
@@ -72,7 +72,7 @@ def units(fmt: FloatFormat) -> Units:
     return Units(np.array(powers), np.array(errors), np.array(exact))
 
 
-@njit(cache=True)
+@compiled
 def _largest_error(units: Any, size: float) -> float:
     if size == 0.0:
         return 0.0
@@ -80,7 +80,7 @@ def _largest_error(units: Any, size: float) -> float:
     return np.inf if at >= len(units.powers) else units.errors[at]
 
 
-@njit(cache=True)
+@compiled
 def _is_power(units: Any, high: float, low: float) -> bool:
     if high == 0.0:
         return True
@@ -124,7 +124,7 @@ class Disturbances(NamedTuple):
     gain: NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def disturbances(
     operations: Any,
     outputs: Any,
@@ -249,7 +249,7 @@ def disturbances(
     return Disturbances(F, spread, G, lim, slack, K, loop, gain)
 
 
-@njit(cache=True)
+@compiled
 def _minus(a: Any, b: Any) -> Any:
     s, e = _two_sum(a[0], -b[0])
     e += a[1] - b[1]
@@ -257,7 +257,7 @@ def _minus(a: Any, b: Any) -> Any:
     return high, e - (high - s)
 
 
-@njit(cache=True)
+@compiled
 def _plus_product(s: Any, a: Any, b: Any) -> Any:
     p = a[0] * b[0]
     high, low = _two_product(a[0], b[0], p)
@@ -268,14 +268,14 @@ def _plus_product(s: Any, a: Any, b: Any) -> Any:
     return total, e - (total - t)
 
 
-@njit(cache=True)
+@compiled
 def _two_sum(a: float, b: float) -> Any:
     s = a + b
     c = s - a
     return s, (a - (s - c)) + (b - c)
 
 
-@njit(cache=True)
+@compiled
 def _two_product(a: float, b: float, p: float) -> Any:
     c = 134217729.0 * a
     a1 = c - (c - a)
@@ -301,7 +301,7 @@ class Certificate(NamedTuple):
     lags: int
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def certify(
     F: Any,
     spread: Any,
@@ -379,7 +379,7 @@ def certify(
     return Certificate(sums, residual, tail, begun, lags)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def transient(
     F: Any,
     spread: Any,
@@ -421,7 +421,7 @@ def transient(
     return bounds, parts, lags
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def peaks(
     F: Any,
     spread: Any,

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from flint import arb, arb_mat
-from numba import njit
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.kalman.bounded_run import BoundedRun
@@ -68,7 +68,7 @@ class Schedule:
         return len(self.coefficients)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _stored_loops(fmt: Any, K: Any, H: Any, Phi: Any, identity: Any, F: Any) -> None:
     """Closed loops (I - KH)Φ of some steps, with every operation rounded, in the order of the filter."""
     T, W = np.empty_like(identity), np.empty_like(identity)
@@ -78,7 +78,7 @@ def _stored_loops(fmt: Any, K: Any, H: Any, Phi: Any, identity: Any, F: Any) -> 
         product_by_sparse(fmt, W, Phi[k % Phi.shape[0]], F[k])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
     """D = the inverse of the unit upper triangle U times H, by back substitution, for each step."""
     for k in range(D.shape[0]):

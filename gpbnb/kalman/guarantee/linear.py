@@ -114,8 +114,8 @@ class Enclosure(NamedTuple):
 def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
     r"""Worst-case peak gain :math:`|D| + \sum_{l\ge0}|CA^lB|`, in ball arithmetic; (p, m).
 
-    Balls grow at each product, by the norm of the sizes of A rather than by that of A: the bits are doubled until both ends agree to
-    2**-40. See ``_peak_gain``.
+    Balls grow at each product, by the norm of the sizes of A rather than by that of A. The bits are therefore doubled
+    until both ends agree to 2**-40.
 
     Raises
     ------

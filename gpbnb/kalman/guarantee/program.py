@@ -23,6 +23,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, put, store, subtract
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
@@ -234,7 +235,7 @@ def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, 
         store(fmt, x, i, load(fmt, values, outputs[i]))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: Any, z: Any, x: Any, X: Any) -> None:
     """Take a step with each of the measurements z and keep every state in X.
 
@@ -265,7 +266,7 @@ def steps_in_python(
 # -- linear functions -------------------------------------------------------------------------------------------------
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes: Any) -> None:
     """Linear function of (x, z) that each value approximates.
 
@@ -299,7 +300,7 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
             sizes[first + o, j] = size
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def effects(operations: Any, outputs: Any, coefficients: Any, first: int, G: Any, sizes: Any) -> None:
     """What an error in each value does to the states after the step.
 
