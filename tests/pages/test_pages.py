@@ -200,12 +200,13 @@ def test_the_keyboard_gets_through_a_page(open_page):
         assert page.evaluate("document.activeElement === document.body")
 
 
-def test_chapters_show_the_ledger_as_the_complete_one_does(open_page):
-    with open_page("book/rounding.html") as page:
+def test_chapters_show_their_errors_with_badges(open_page):
+    with open_page("book/kalman.html") as page:
         tables = page.locator(".ledger > div > table, .ledger > table")
-        assert tables.count() >= 2
+        assert tables.count() == 1
         for table in tables.all():
-            assert table.locator("thead th").all_inner_texts() == ["Item", "Verdict", "Printed, recomputed, and note"]
+            assert table.locator("thead th").all_inner_texts() == ["Statement", "Verdict", "What is wrong"]
+            assert table.locator(".verdict").count() == table.locator("tbody tr").count()
             assert table.locator("tbody tr th").count() == table.locator("tbody tr").count()
 
 
