@@ -28,7 +28,7 @@ from gpbnb.kalman.simulation import Simulation
 from gpbnb.kalman.year_cases import MODELS, model
 from gpbnb.sweeps import Column, Sweep
 
-#: What the filter estimates: drift angles and rates themselves, or their deviations from the predicted drift.
+#: States of the filter, either drift angles and rates or their deviations from the predicted drift.
 STATES = ("absolute", "deviation")
 
 #: The forms of the sweep, by the name under which they are stored.

@@ -75,7 +75,7 @@ def _cases() -> tuple[Case, ...]:
 #: All runs, the most informative first.
 CASES = _cases()
 
-#: Runs with their own contraction bound: the references of the first model, on which the bounds of the others rest.
+#: Runs with their own contraction bound, the references of the first model, on which the bounds of the others rest.
 BOUNDED_CASES = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.INNOVATION) for base in STORED)
 
 

@@ -14,7 +14,7 @@ class Rounding(Enum):
     NEAREST = "nearest"
     #: Toward zero, the further digits dropped; hung1984, ch. II, (9). IEEE 754 calls it roundTowardZero.
     CHOP = "chop"
-    #: To nearest, half to the neighbour with an even last digit: the default of IEEE 754.
+    #: To nearest, half to the neighbour with an even last digit, the default of IEEE 754.
     EVEN = "even"
     #: Toward plus infinity.
     UP = "up"
