@@ -58,7 +58,7 @@ CLAIMS = {
     "hung1984.II.eq26": "Rounding error of an inner product",
     "hung1984.II.eq31": "Rounding error of a product of matrices",
     "hung1984.II.s10.practicality-of-44": "The residual bound of an inverse is impractical",
-    "hung1984.II.eq96": "Error bound of an inverse by elimination",
+    "hung1984.II.eq91": "Errors of elimination and back substitution add up",
     "hung1984.II.s11-4.table-1-proposed-3-places": "Table 1: bounds of an inverse",
     "hung1984.II.eq105": "Rounding error of one covariance update",
     "hung1984.II.eq125": "Rounding error of the Kalman filter after k steps",
