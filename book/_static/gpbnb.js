@@ -4,6 +4,8 @@ document.addEventListener("DOMContentLoaded", () => {
   const sidebar = document.getElementById("pst-primary-sidebar");
   sidebar?.setAttribute("role", "navigation");
   sidebar?.setAttribute("aria-label", "Book");
+  // The arrow beside an entry of the sidebar has a picture alone.
+  for (const arrow of document.querySelectorAll("nav summary")) arrow.setAttribute("aria-label", "Show the pages below");
   // docutils gives the entries of the bibliography a role that ARIA has withdrawn.
   for (const entry of document.querySelectorAll('[role="doc-biblioentry"]')) entry.setAttribute("role", "listitem");
 });

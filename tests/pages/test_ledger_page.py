@@ -150,7 +150,7 @@ def test_paper_has_the_tables_and_no_form(page):
     page.emulate_media(media="print")
     assert not page.locator(".ledger-form").is_visible()
     row = page.locator('[id="hung1984.II.eq125"]')
-    assert row.is_visible()
+    row.wait_for(state="visible")
     assert row.evaluate("e => getComputedStyle(e).display") == "table-row"
 
 
