@@ -77,6 +77,21 @@ def test_axes_are_named():
     assert ax.get_title(loc="left") == "a title"
 
 
+def test_names_at_the_right_edge_do_not_collide():
+    fig, (ax,) = style.figure()
+    style.loglog(ax)
+    ax.plot([1, 10], [1, 1000])
+    style.label(ax, "x (no unit)", "y (no unit)")
+    ends = {"low": (1.0, style.VALID), "same": (30.0, style.REFUTED), "also\nsame": (30.0, style.OBSERVED)}
+    names = style.name_ends(ax, ends)
+    fig.canvas.draw()
+    boxes = [each.get_window_extent() for each in names]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert all(box.x0 > ax.get_window_extent().x1 and box.x1 <= fig.bbox.x1 for box in boxes)
+    assert {each.get_text(): each.get_color() for each in names} == {k: colour for k, (_, colour) in ends.items()}
+    assert names[0].get_position() == (6, 0)
+
+
 def test_the_legend_has_no_frame():
     _, (ax,) = style.figure()
     ax.plot([1, 2], label="a line")
