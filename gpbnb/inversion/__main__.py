@@ -1,4 +1,4 @@
-"""``python -m gpbnb.inversion``: compute the long sweeps of the chapter anew and keep their results in the package."""
+"""``python -m gpbnb.inversion``: recompute the long sweeps of the chapter and store their results."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 
 from gpbnb.display.tables import Table, arithmetic, scientific, short
@@ -147,7 +148,7 @@ def _reading(one: Column) -> str:
 
 def in_math(text: str) -> str:
     """Spell out the name of a reading or bound, with mathematics."""
-    return ", ".join(_WORDS.get(word, word) for word in text.split(", "))
+    return "".join(_WORDS.get(word, word) for word in re.split("(, |: )", text))
 
 
 _WORDS = {
