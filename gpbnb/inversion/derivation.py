@@ -73,7 +73,7 @@ def first_approach_norms() -> Derivation:
     posterior = x * rho / (1 - rho)
     return Derivation(
         (
-            Step("(44): (43) over $a$", over(printed, a), rho + a * d),
+            Step("(44): (43) divided by $a$", over(printed, a), rho + a * d),
             Step(
                 "(43) to every order: $e = a\\rho + a d\\,(a + e)$ has this solution",
                 together(a * rho, a * d * (a + strict)),
@@ -275,14 +275,16 @@ def two_systems() -> Derivation:
     return Derivation(
         (
             Step(
-                "(91) as it must be: the matrix whose solution was found",
+                "(91) corrected: the matrix whose exact solution was computed",
                 L * unevaluated(upper + DELTA_A),
                 A + A_TILDE + L * DELTA_A,
             ),
-            Step("(92) as it must be: its right side", L * unevaluated(right + DELTA_B), B + B_TILDE + L * DELTA_B),
-            Step("what (91) leaves out", together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)), (L - 1) * DELTA_A),
+            Step("(92) corrected: its right-hand side", L * unevaluated(right + DELTA_B), B + B_TILDE + L * DELTA_B),
             Step(
-                "or all of it as a change of the triangular matrix $L^{-1}A$",
+                "term missing from (91)", together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)), (L - 1) * DELTA_A
+            ),
+            Step(
+                "the same as a change of the triangular matrix $L^{-1}A$",
                 together(upper, DELTA_A, minus(L**-1 * A)),
                 L**-1 * A_TILDE + DELTA_A,
             ),
@@ -302,7 +304,7 @@ def transfer_cost() -> Derivation:
     return Derivation(
         (
             Step(
-                "a term of the size of (59) has room for two products, $u = |\\hat a(k-1)|$, $v = |\\hat a(k)|$",
+                "each absolute value in (59) bounds two products, $u = |\\hat a(k-1)|$, $v = |\\hat a(k)|$",
                 3 * new + 2 * old,
                 2 * unevaluated(new + old - w),
                 new + 2 * w,
@@ -323,13 +325,13 @@ def inverse_norms() -> Derivation:
     strict = x * c / (1 - c)
     return Derivation(
         (
-            Step("(97): (96) over $x$", over(x * c, x), c),
+            Step("(97): (96) divided by $x$", over(x * c, x), c),
             Step(
                 "(96) to every order: $e = (x + e)\\,c$, since $\\|A^{-1}\\| \\le x + e$, has this solution",
                 unevaluated(x + strict) * c,
                 strict,
             ),
-            Step("what (96) leaves out, relative to it", over(strict - x * c, x * c), c / (1 - c)),
+            Step("term missing from (96), relative to (96)", over(strict - x * c, x * c), c / (1 - c)),
         )
     )
 
@@ -378,7 +380,7 @@ def back_substitution_weights() -> Derivation:
         (
             Step("(86): $n-k$ subtractions and the division", together(N - K, 1), N - K + 1),
             Step(
-                "(85): $a_{kj}$ is multiplied, subtracted, and passes the $n-j$ subtractions after it and the division",
+                "(85): $a_{kj}$ is multiplied and subtracted, then passes $n-j$ subtractions and the division",
                 together(1, 1, N - J, 1),
                 N - J + 3,
             ),

@@ -33,7 +33,7 @@ def one_rounding() -> Derivation:
     half = b ** (e - t) / 2
     return Derivation(
         (
-            Step("(8): the bound (5) over the least $|x|$ of (6)", over(half, smallest), unit),
+            Step("(8): bound (5) divided by the smallest $|x|$ of (6)", over(half, smallest), unit),
             Step("(13): the same for chopping", over(b ** (e - t), smallest), b ** (1 - t)),
             Step("(14): chopping doubles the unit roundoff, in any base", over(b ** (1 - t), unit), sp.Integer(2)),
             Step(
@@ -92,7 +92,7 @@ def sums() -> Derivation:
                 sp.Integer(1),
             ),
             Step(
-                "(18), first inequality: what $x_j$ lacks of weight $n-1$",
+                "(18), first inequality: the difference between the weight of $x_j$ and $n-1$",
                 first,
                 together(later, J - 2),
             ),
@@ -201,7 +201,7 @@ def matrix_sums() -> Derivation:
     return Derivation(
         (
             Step(
-                "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, without anything left out",
+                "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, with no term left out",
                 BETA * c,
                 unevaluated(c) * unevaluated(BETA - w),
                 c * w,
@@ -246,7 +246,7 @@ def dots() -> Derivation:
     return Derivation(
         (
             Step("three products, as printed before (26)", error, printed),
-            Step("(26), weight of $a_1 b_1$: a sum's, and one", N, together(N - 1, 1)),
+            Step("(26), weight of $a_1 b_1$: the weight in a sum, plus one", N, together(N - 1, 1)),
             Step("(26), weight of $a_j b_j$, $j \\ge 2$: the same", N + 2 - J, together(N + 1 - J, 1)),
             Step(
                 "no weight is above $n$, written with $j = k + 1$",
