@@ -47,7 +47,7 @@ from tqdm import tqdm
 
 from gpbnb.arithmetic import named
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels import bits, elementwise, limited_backends, processor, rules, tags
+from gpbnb.arithmetic.kernels import bits, elementwise, processor, rules
 
 RESULTS = Path(__file__).parent / "results"
 SMALL: dict[str, tuple[FloatFormat, Any]] = {
@@ -97,7 +97,7 @@ class Journal:
 
 def code_digest() -> str:
     """Eight characters that change with the code that rounds."""
-    files = [module.__file__ for module in (bits, limited_backends, named, processor, rules, tags)]
+    files = [module.__file__ for module in (bits, named, processor, rules)]
     return hashlib.sha256(b"".join(Path(str(file)).read_bytes() for file in files)).hexdigest()[:8]
 
 
