@@ -98,17 +98,21 @@ class BoundedRun(Run):
         x[0], P[0] = self.x, self.P
         every, notes = np.arange(first + 1, first + len(z) + 1), self.notes.copy()
         notes[NEXT_CHECKPOINT] = 0
+        failure: ArithmeticError | None = None
         try:
             advance(
                 self.tag, int(self.form), self.matrices, z, first, self.x, self.P, every, x[1:], K[1:], P[1:], notes
             )
-        except (OverflowError, ZeroDivisionError):
-            notes[STOPPED] = notes[DONE] + 1
+        except (OverflowError, ZeroDivisionError) as error:
+            notes[STOPPED], failure = notes[DONE] + 1, error
         done = int(notes[DONE]) - first
         notes[NEXT_CHECKPOINT] = np.searchsorted(self.checkpoint_steps, notes[DONE], side="right")
         saved = slice(at, notes[NEXT_CHECKPOINT])
         rows = self.checkpoint_steps[saved] - first
         self.X[saved], self.G[saved], self.C[saved], self.notes[:] = x[rows], K[rows], P[rows], notes
+        if self.stopped:
+            pivot = f"a zero pivot in the innovation covariance at step {self.stopped}"
+            self.reason = self.stopped_by(failure) if failure else pivot
         if not done:
             return
         computed = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
