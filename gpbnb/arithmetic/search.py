@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -76,6 +77,8 @@ class Search:
     error : gives the error over the tolerance in a format, and why it is infinite.
     checks : precisions that are tried if they lie above the answer.
     tick : called after each run.
+    bounds : whether the errors are bounds, which need not exist: precisions above the answer that have none are then
+        listed as undecided, and do not count against it.
     """
 
     def __init__(
@@ -84,9 +87,12 @@ class Search:
         base: int,
         rounding: Rounding,
         checks: Sequence[int],
-        tick: Callable[[], object],
+        tick: Callable[[], object] = lambda: None,
+        bounds: bool = False,
     ) -> None:
         self._ratios, self._why = dict[int, float](), dict[int, str]()
+        #: Precisions above the answer for which there is no bound.
+        self.undecided: tuple[int, ...] = ()
         #: Precisions that met the tolerance although a higher one missed it; empty if all is regular.
         self.irregular: tuple[int, ...] = ()
         largest = LARGEST_PRECISION[base]
@@ -102,7 +108,11 @@ class Search:
         if self.fmt is None or not checks:
             return
         above = {digits for digits in (self.fmt.precision + 2, *checks) if self.fmt.precision < digits <= largest}
-        if all(meets(FloatFormat(base, digits, rounding)) for digits in sorted(above)):
+        missed = [digits for digits in sorted(above) if not meets(FloatFormat(base, digits, rounding))]
+        if not missed:
+            return
+        if bounds and all(math.isinf(self._ratios[digits]) for digits in missed):
+            self.undecided = tuple(missed)
             return
         every = [FloatFormat(base, digits, rounding) for digits in range(self.fmt.precision, largest + 1)]
         most = max(fmt.precision for fmt in every if not meets(fmt))
@@ -117,6 +127,9 @@ class Search:
 
     @property
     def why(self) -> str:
-        """Why the largest precision without a number for its error has none."""
-        reasons = [f"in {digits} digits {reason}" for digits, reason in sorted(self._why.items()) if reason]
+        """Why the largest precision below the answer without a number for its error has none."""
+        below = math.inf if self.fmt is None else self.fmt.precision
+        reasons = [
+            f"in {digits} digits {reason}" for digits, reason in sorted(self._why.items()) if reason and digits < below
+        ]
         return reasons[-1] if reasons else ""

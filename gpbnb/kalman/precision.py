@@ -39,11 +39,11 @@ class Requirement:
     steps : of the filter.
     tried : precision, and largest error over tolerance of all states and checkpoints; infinite where the run stopped, a
         variance was lost, or no bound exists.
-    why : of the largest precision tried that has no number for an error, why not; empty if all have one. Shown where it
-        kept the answer from being a smaller one.
+    why : of the largest precision below the answer that has no number for an error, why not; empty if all have one.
+        Shown where it kept the answer from being a smaller one.
     form : of the filter.
     irregular : precisions that meet the tolerance although a higher one was run and misses it; empty if all is regular.
-    advice : if more digits fail where fewer do not, another form that meets the tolerance.
+    advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
     repairs : changes of the model's covariances, each as text.
     """
 
@@ -159,10 +159,10 @@ def required_precision(
 
     checks = () if for_ever else CHECKED[base]
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(errors_of(form), base, rounding, checks, bar.update)
-        advice = ""
+        found = Search(errors_of(form), base, rounding, checks, bar.update, bounds=basis == "bound")
+        advice = f"no bound exists in {_listed(found.undecided)} digits" if found.undecided else ""
         if not for_ever and (found.irregular or found.fmt is None):
-            advice = _better_form(errors_of, form, base, rounding, checks, bar.update)
+            advice = _better_form(errors_of, form, base, rounding, checks, bar.update, basis == "bound")
     repairs = tuple(str(each) for each in model.repairs)
     return Requirement(found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs)
 
@@ -174,10 +174,11 @@ def _better_form(
     rounding: Rounding,
     checks: Sequence[int],
     tick: Callable[[], Any],
+    bounds: bool,
 ) -> str:
     """Advice: the form that meets the tolerance with the fewest digits; empty if none does."""
     others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not form]
-    answers = [(other, Search(errors_of(other), base, rounding, checks, tick).fmt) for other in others]
+    answers = [(other, Search(errors_of(other), base, rounding, checks, tick, bounds).fmt) for other in others]
     met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
     return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import pytest
 
@@ -39,7 +40,7 @@ def test_a_record_without_a_checksum_is_refused(tmp_path):
         read_record(tmp_path / "a.json", "cure")
 
 
-@pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "nan", "1e999", "0x1", "1e", ".", "--1", "infinity"])
+@pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "1e999", "0x1", "1e", ".", "--1", "infinity"])
 def test_what_is_no_plain_number(text):
     with pytest.raises(ValueError, match="needed"):
         plain_number(text)
@@ -47,11 +48,10 @@ def test_what_is_no_plain_number(text):
     assert Column("a", "integer").fault(text)
 
 
-@pytest.mark.parametrize(
-    ("text", "value"), [("1", 1.0), ("-1.5e-3", -0.0015), ("+.5", 0.5), ("2.", 2.0), ("-inf", float("-inf"))]
-)
+@pytest.mark.parametrize(("text", "value"), [("1", 1.0), ("-1.5e-3", -0.0015), ("+.5", 0.5), ("-inf", -math.inf)])
 def test_plain_numbers(text, value):
     assert plain_number(text) == value
+    assert Column("a", low=0, high=1).fault("nan") == "needed 0 to 1"
 
 
 @pytest.mark.parametrize("text", ["1.0", "1_0", "٣", "1e3"])
