@@ -379,11 +379,7 @@ def back_substitution_weights() -> Derivation:
     return Derivation(
         (
             Step("(86): $n-k$ subtractions and the division", together(N - K, 1), N - K + 1),
-            Step(
-                "(85): $a_{kj}$ is multiplied and subtracted, then passes $n-j$ subtractions and the division",
-                together(1, 1, N - J, 1),
-                N - J + 3,
-            ),
+            Step("(85): product, subtraction, $n-j$ more, and the division", together(1, 1, N - J, 1), N - J + 3),
             Step(
                 "one more row and column, the last: each weight grows by one",
                 together(N - J + 3, 1),
