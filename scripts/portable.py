@@ -112,7 +112,7 @@ def run(name: str, environment: dict[str, str], jobs: int, only: Sequence[str], 
         groups = ["-n", str(jobs), "--dist", "loadgroup", "--no-loadscope-reorder"]
         commands = {
             "notebooks": ["scripts/execute_notebooks.py", "--check", "--jobs", str(jobs), *notebooks],
-            "tests": ["-m", "pytest", "-q", *groups, "-p", "no:cacheprovider", *chosen],
+            "tests": ["-m", "pytest", "-q", *groups, "-o", f"cache_dir={scratch}/pytest", *chosen],
         }
         began = time.monotonic()
         failed = []
