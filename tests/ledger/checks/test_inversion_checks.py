@@ -27,11 +27,6 @@ ENTRIES = (
 PRINTED = {entry.id: entry for entry in ENTRIES}
 
 
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
-
-
 # -- the present state ----------------------------------------------------------------------------
 
 

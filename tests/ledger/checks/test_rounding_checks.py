@@ -36,12 +36,7 @@ ENTRIES = (
     *ledger.select(INVENTORY, "hung1982", "III", (1, 2, 3, 4, 6, 7, 8, 9)),
 )
 PRINTED = {entry.id: entry.printed for entry in ENTRIES}
-REMEMBERING = (instances, introduction, representation, one_rounding, sums, matrices, products, experiment)
-
-
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
+CACHING = (instances, introduction, representation, one_rounding, sums, matrices, products, experiment)
 
 
 # -- the present state ----------------------------------------------------------------------------
@@ -123,7 +118,7 @@ def test_each_wrong_statement_names_its_root_error(rows):
 
 
 def test_findings_are_the_same_again(rows):
-    faults.forget(*REMEMBERING)
+    faults.forget(*CACHING)
     for key in ("hung1984.II.eq18", "hung1982.III.eq27", "hung1984.II.s3.example-8-x"):
         assert checks.CHECKS.run(statement(key)) == finding(rows, key)
 
@@ -198,13 +193,12 @@ def test_the_scatter_of_a_standard_deviation(n):
 
 
 @pytest.fixture
-def patch(monkeypatch):
-    """Change the code, with small surveys and nothing remembered; undone, and forgotten, afterwards."""
-    with faults.forgetting(monkeypatch, *REMEMBERING):
-        survey = experiment.survey.__wrapped__
-        monkeypatch.setattr(experiment, "SURVEYED", experiment.SURVEYED[:2] + experiment.SURVEYED[8:12])
-        monkeypatch.setattr(experiment, "survey", cache(lambda trial: survey(trial, repeats=3)))
-        yield monkeypatch
+def patch(patch):
+    """Change the code, with small surveys."""
+    survey = experiment.survey.__wrapped__
+    patch.setattr(experiment, "SURVEYED", experiment.SURVEYED[:2] + experiment.SURVEYED[8:12])
+    patch.setattr(experiment, "survey", cache(lambda trial: survey(trial, repeats=3)))
+    return patch
 
 
 SPLIT, ROUND = FloatFormat.split, FloatFormat.round
@@ -334,7 +328,7 @@ def matrices_of_one():
 @pytest.mark.parametrize(("key", "change"), AGREE)
 def test_a_statement_is_verified_if_the_code_says_the_same(patch, key, change):
     assert checks.CHECKS.run(statement(key)).agrees is False
-    faults.forget(*REMEMBERING)
+    faults.forget(*CACHING)
     change(patch)
     assert checks.CHECKS.run(statement(key)).verdict is Verdict.VERIFIED
 

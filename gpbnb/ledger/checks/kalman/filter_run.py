@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from gpbnb.ledger.formula import Undefined
 from gpbnb.ledger.statements import Statement
 
 STATES, MEASUREMENTS, STEPS = 3, 2, 4
@@ -64,6 +65,6 @@ def holds_exactly(printed: Statement) -> bool:
     """Whether all printed equations hold in two steps of the run."""
     try:
         links = [link for k in (2, 3) for link in printed.links(names(k))]
-    except ValueError:  # a product or sum of matrices that does not exist
+    except Undefined:  # a product or sum of matrices that does not exist
         return False
     return bool(links) and all(link.symbol == "==" and link.left == link.right for link in links)
