@@ -117,7 +117,7 @@ def period_1984(printed: Statement) -> Finding:
     found = period(printed)
     months, days = found or (0, 0)
     return compare(
-        found == (printed.number("duration").value, 0),
+        found is not None and months == printed.number("duration").value and days == 0,
         f"{months} months and {days} days, the last day included",
     )
 
