@@ -286,7 +286,10 @@ class _Evaluation:
                 function = self.names.get(name) or _FUNCTIONS.get(name) or sp.Function(name)
                 return _apply(node, function, *map(self, arguments))
             case ast.Call(func=ast.Subscript(value=ast.Name(id=name), slice=index), args=arguments):
-                return _apply(node, self.names[name], *self._indices(index), *map(self, arguments))
+                indices = self._indices(index)
+                if name not in self.names:
+                    return sp.Function(f"{name}[{','.join(map(str, indices))}]")(*map(self, arguments))
+                return _apply(node, self.names[name], *indices, *map(self, arguments))
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
                 found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
                 return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
