@@ -14,7 +14,7 @@ INTERRUPTED = 130
 
 
 def run_command(sweep: Sweep[Any], description: str, directory: Path, arguments: Sequence[str] | None = None) -> int:
-    """Compute the cells of a sweep, or store the finished ones; return the exit status.
+    """Compute the cells of a sweep and write its table, or write the finished cells alone; return the exit status.
 
     Parameters
     ----------
@@ -27,7 +27,8 @@ def run_command(sweep: Sweep[Any], description: str, directory: Path, arguments:
     parser = argparse.ArgumentParser(prog=sweep.command, description=description)
     parser.add_argument("--directory", type=Path, default=directory, help="where progress is saved")
     parser.add_argument("--cells", type=int, default=len(cells), help="only so many of the cells")
-    parser.add_argument("--store", action="store_true", help="store the finished cells, and compute nothing")
+    parser.add_argument("--store", action="store_true", help="write the finished cells, and compute nothing")
+    parser.add_argument("--output", type=Path, help="folder for the table; by default where progress is saved")
     given = parser.parse_args(arguments)
     if not given.store:
         try:
@@ -35,5 +36,7 @@ def run_command(sweep: Sweep[Any], description: str, directory: Path, arguments:
         except KeyboardInterrupt:
             print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
             return INTERRUPTED
-    sweep.store(sweep.finished(given.directory), sweep.seconds(given.directory))
+    folder = given.output or given.directory
+    folder.mkdir(parents=True, exist_ok=True)
+    sweep.store(sweep.finished(given.directory), sweep.seconds(given.directory), folder / sweep.file.name)
     return 0

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from alterations import altered
 
+from gpbnb.ledger.checking import owners
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.finding import Verdict
 from gpbnb.ledger.formula import Undefined, Words
@@ -16,6 +17,7 @@ from gpbnb.ledger.statements import Statement, load_statements
 
 STATEMENTS = load_statements()
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
+TOPIC = owners(STATEMENTS)
 MOST = 5
 """Alterations judged of one statement; which ones depends on its id alone."""
 MUST_HAVE_FORM = ("equation", "number", "example", "table")
@@ -87,12 +89,18 @@ def needed(statement):
     return 1 if in_words and statement.kind not in MUST_HAVE_FORM else 3
 
 
-WITH_FORM = [
-    statement for statement in STATEMENTS if statement.form and takes_statement(CHECKED[statement.id][statement.id])
-]
+TAKEN = [each for each in STATEMENTS if each.form and takes_statement(CHECKED[each.id][each.id])]
+"""Statements with a form that their checks judge."""
 
 
-@pytest.mark.parametrize("statement", WITH_FORM, ids=lambda statement: statement.id)
+def each_of(statements):
+    """Run a test for each of some statements. The checks of a topic share what they compute: one process runs them."""
+    group = pytest.mark.xdist_group
+    cases = [pytest.param(each, id=each.id, marks=group(f"alterations of {TOPIC[each.id]}")) for each in statements]
+    return pytest.mark.parametrize("statement", cases)
+
+
+@each_of(TAKEN)
 def test_no_altered_statement_is_judged_right(statement):
     if judged(statement).verdict is Verdict.GIVEN:
         return  # a definition: there is nothing to judge
@@ -112,10 +120,7 @@ def negations(statement):
             yield part.label, [replace(statement, form="; ".join([*forms[:i], t, *forms[i + 1 :]])) for t in texts]
 
 
-IN_WORDS = [statement for statement in WITH_FORM if any(isinstance(part, Words) for part in statement.parts)]
-
-
-@pytest.mark.parametrize("statement", IN_WORDS, ids=lambda statement: statement.id)
+@each_of(each for each in TAKEN if any(isinstance(part, Words) for part in each.parts))
 def test_a_claim_in_words_has_a_negation_that_is_rejected(statement):
     if judged(statement).verdict is Verdict.VERIFIED:
         for label, others in negations(statement):
@@ -136,7 +141,7 @@ def test_each_equation_number_example_and_table_has_a_form():
 
 
 def test_each_statement_with_a_form_is_given_to_its_check():
-    taken = {statement.id for statement in WITH_FORM}
+    taken = {statement.id for statement in TAKEN}
     others = [statement for statement in STATEMENTS if statement.form and statement.id not in taken]
     assert {judged(statement).verdict for statement in others} <= {Verdict.GIVEN}
 

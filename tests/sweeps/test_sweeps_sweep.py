@@ -101,13 +101,17 @@ def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(s
     def interrupted(cell, directory):
         raise KeyboardInterrupt
 
+    def stored(folder):
+        return sweep.load(tmp_path / folder / sweep.file.name).rows
+
     assert command(sweep, "--cells", "3") == 0
-    assert len(sweep.load().rows) == 3 * 3
+    assert len(stored("saved")) == 3 * 3
     assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED
     assert "goes on from what is saved" in capsys.readouterr().err
-    assert command(dataclasses.replace(sweep, compute=interrupted), "--store") == 0
+    assert command(dataclasses.replace(sweep, compute=interrupted), "--store", "--output", str(tmp_path / "new")) == 0
+    assert stored("new") == stored("saved")
     assert command(sweep) == 0
-    assert len(sweep.load().rows) == 3 * len(CELLS)
+    assert len(stored("saved")) == 3 * len(CELLS)
 
 
 def test_chunks_of_dead_workers_are_sent_again(sweep, tmp_path):
