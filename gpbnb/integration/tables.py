@@ -47,7 +47,7 @@ def sensor(sigma_x: float, bandwidth_hz: float, unit: str, rates: Sequence[float
 
 
 def rules(processes: Sequence[tuple[Process, float]]) -> Table:
-    """Tabulate the random walk of every rule relative to the trapezoidal one, for pairs of an input and a rate in Hz."""
+    """Tabulate the random walk of rules relative to the trapezoidal one, for pairs of an input and a rate in Hz."""
     body: list[tuple[str, ...]] = []
     for rule in theory.RULES.values():
         weights = rule.sample_weights()
