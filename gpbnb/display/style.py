@@ -18,11 +18,14 @@ from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
 OBSERVED = "#0072B2"
+"""Colour of errors that were measured or simulated."""
 OBSERVED_OTHERS = ("#56B4E9", "#7B3FA0", "#CC79A7", "#1F2F6B")
 COLOURS = (OBSERVED, *OBSERVED_OTHERS)
 """Blues and purples for several observed series in one figure."""
 VALID = "#007D5F"
+"""Colour of bounds and formulas that hold."""
 REFUTED = "#C44E00"
+"""Colour of printed formulas that fail."""
 BOUND = VALID
 """Another name of :data:`VALID`; draw a bound that fails in :data:`REFUTED`."""
 STRICT = "#000000"
@@ -32,7 +35,7 @@ MARKERS = "osD^v"
 WIDTH = 6.4
 """Width of a figure in inches."""
 TEXT = 10.5
-"""Size of the text in points: 16 pixels on a desktop, more than 8 on a phone 390 pixels wide."""
+"""Size of the text in points. It gives 16 pixels on a desktop and more than 8 on a phone 390 pixels wide."""
 
 _STYLE: dict[Any, Any] = {
     "figure.dpi": 110,

@@ -218,7 +218,7 @@ def _error_over_tolerance(
         return math.inf, str(error)
     run.take(measured)
     if run.stopped is not None:
-        return math.inf, f"the run stopped at step {run.stopped}, by a division by zero or a number out of range"
+        return math.inf, f"the run is refused: {run.reason}"
     if isinstance(run, BoundedRun):
         errors = run.bounds[0]
     elif true is not None:
