@@ -110,7 +110,7 @@ def chain(ax: Axes) -> list[Artist]:
     for start, end, name, shift, style in links:
         (x0, y0), (x1, y1) = places[start], places[end]
         upright = x0 == x1
-        arrow = {"arrowstyle": "->", "ls": style, "color": REFERENCE}
+        arrow: dict[str, Any] = {"arrowstyle": "->", "ls": style, "color": REFERENCE}
         arrow |= {"shrinkA": 22 if upright else half[start], "shrinkB": 22 if upright else half[end]}
         if style == "--":
             arrow |= {"connectionstyle": "arc3,rad=-0.22", "shrinkB": 24}
