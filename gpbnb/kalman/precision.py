@@ -20,6 +20,7 @@ from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
@@ -63,8 +64,8 @@ def required_precision(
         roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
-    z : (steps, m), measurements; by default simulated by the model, from its first estimate, and rounded to
-        :func:`gpbnb.kalman.simulation.fine_resolution`.
+    z : (steps, m), measurements, NaN or masked where one is missing; by default simulated by the model, from its first
+        estimate, and rounded to :func:`gpbnb.kalman.simulation.fine_resolution`.
     seed : of the simulation.
     progress : show a bar, a tick a precision.
 
@@ -85,6 +86,8 @@ def required_precision(
         z = Simulation(
             model, tuple(model.x0.astype(np.float64)), whole_number("seed", seed, 0), fine_resolution(model)
         ).measurements(steps)
+    repairs = tuple(str(each) for each in model.repairs)
+    model, z = without_missing(model, z)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
 
@@ -99,7 +102,6 @@ def required_precision(
         advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
         if not for_ever and (found.irregular or found.fmt is None):
             advice = _better_form(errors_of, form, base, rounding, checks, bar.update, basis == "bound")
-    repairs = tuple(str(each) for each in model.repairs)
     return Requirement(found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs)
 
 
@@ -140,7 +142,9 @@ def survey(
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
     form, rounding = form_named(form), rounding_named(rounding)
-    tolerances, measured = _checked(model, tolerance, base, basis), _measured(model, z)
+    tolerances = _checked(model, tolerance, base, basis)
+    model, z = without_missing(model, z)
+    measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
@@ -172,8 +176,8 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
         raise ValueError(
-            f"got {measured[k, i]} for measurement {i} of step {k + 1}; needed finite numbers; where a sensor is "
-            "silent, give H a cycle with a row of zeros there, and any number as its measurement"
+            f"got {measured[k, i]} for measurement {i} of step {k + 1}; needed finite numbers, or NaN where "
+            "one is missing"
         )
     return measured
 
