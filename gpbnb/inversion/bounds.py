@@ -28,7 +28,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import column_sum, gamma, gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -280,8 +280,8 @@ def smallest_precision(
 ) -> Guarantee:
     r"""Find the fewest digits in which the computed inverse of a matrix is proved to be within a tolerance.
 
-    For each precision, from one digit on, the matrix is rounded and inverted in the format, and :func:`a_posteriori`
-    compares the result X with the matrix as given. The function proves
+    In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
+    and :func:`a_posteriori` compares the result X with the matrix as given. The function proves
     :math:`\|X - A^{-1}\| \le \text{tolerance}\,\|A^{-1}\|`, including the rounding of the entries.
 
     Parameters
@@ -294,8 +294,8 @@ def smallest_precision(
 
     Returns
     -------
-    guarantee : the format, the inverse and its bound. The proof applies to this inverse only: with one digit more, the
-        error can be larger.
+    guarantee : the format, the inverse and its bound. The next higher precision meets the tolerance as well, unless it
+        is above `largest`.
 
     Raises
     ------
@@ -310,17 +310,20 @@ def smallest_precision(
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
         raise ValueError(f"a must be a square matrix (n, n) with n at least 1; got shape {given.shape}")
     true_inverse(given)
-    best = math.inf
-    for precision in range(1, largest + 1):
-        fmt = FloatFormat(base, precision, rounding)
+    tried: dict[FloatFormat, Guarantee] = {}
+
+    def meets(fmt: FloatFormat) -> bool:
         try:
             x = linalg.inv(fmt.array(given), pivot)
-            bound = _relative(a_posteriori(given, x), x)
+            tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
         except (np.linalg.LinAlgError, ValueError):  # singular in so few digits, or nothing proved
-            continue
-        if bound <= tolerance:
-            return Guarantee(fmt, x, bound)
-        best = min(best, bound)
+            return False
+        return tried[fmt].bound <= tolerance
+
+    found = search.smallest_precision(meets, base, rounding, largest=largest)
+    if found is not None:
+        return tried[found]
+    best = min((each.bound for each in tried.values()), default=math.inf)
     reached = f"the best proved bound is {best:.3g}" if best < math.inf else "no precision gives a bound at all"
     raise ValueError(
         f"no inverse in at most {largest} base-{base} digits is proved to have a relative error of "

@@ -142,14 +142,14 @@ def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: st
         having = [one for one in trials if bound in one.bounds and one.error]
         if against == "condition":
             having.sort(key=lambda one: one.condition)
-            x, y = [one.condition for one in having], [one.ratio(bound) for one in having]
+            x, y = [one.condition for one in having], [one.overestimation(bound) for one in having]
             artists += ax.plot(x, y, marker, ms=4, color=VALID, label=bound)
             # The loosest bound is named at its last point, the sharpest above its first, any other below its first.
             place, shift = (-1, (6, 0)) if bound == bounds[0] else (0, (1, 4 if bound == bounds[-1] else -8))
             name(ax, bound, (x[place], y[place]), VALID, shift)
             continue
         sizes = sorted({one.n for one in having})
-        medians = [float(np.median([one.ratio(bound) for one in having if one.n == n])) for n in sizes]
+        medians = [float(np.median([one.overestimation(bound) for one in having if one.n == n])) for n in sizes]
         artists += ax.plot(sizes, medians, marker=marker, color=VALID, lw=1, label=bound)
         ends[bound] = medians[-1], VALID
     artists.append(ax.axhline(1, color=OBSERVED, lw=1.2))

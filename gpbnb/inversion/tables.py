@@ -118,7 +118,7 @@ def worst(trials: Mapping[str, Trial]) -> Table:
             f"{one.family}, {one.n} rows, {'with' if one.pivot else 'without'} pivoting",
             arithmetic(one.matrix.format),
             f"{one.condition:.0f}",
-            f"{1 / one.ratio(name):.3g}",
+            f"{one.ratio(name):.3g}",
         )
         for name, one in trials.items()
     ]

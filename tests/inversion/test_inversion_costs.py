@@ -102,7 +102,7 @@ def test_ratios_are_medians_over_single_trials():
     found = {one.bound: one for one in costs.prices((3,), 5, np.random.default_rng(8), fmt)}
     rng = np.random.default_rng(8)
     ones = [experiment.trial(fmt.array(experiment.FAMILIES["random"](3, rng)), True, ("Higham",)) for _ in range(5)]
-    assert found["Higham"].ratios[0] == pytest.approx(np.median([one.ratio("Higham") for one in ones]))
+    assert found["Higham"].ratios[0] == pytest.approx(np.median([one.overestimation("Higham") for one in ones]))
 
 
 def test_a_chopping_format_has_no_probabilistic_bound():

@@ -83,7 +83,7 @@ class TestRatios:
         *lines, error = figures.ratios(trials, self.NAMES, ax)
         for line, name in zip(lines, self.NAMES, strict=True):
             assert list(line.get_xdata()) == [2, 4]
-            expected = [np.median([one.ratio(name) for one in trials if one.n == n]) for n in (2, 4)]
+            expected = [np.median([one.overestimation(name) for one in trials if one.n == n]) for n in (2, 4)]
             assert list(line.get_ydata()) == expected
             assert colour(line) == style.VALID
         assert list(error.get_ydata()) == [1, 1]
@@ -98,7 +98,7 @@ class TestRatios:
         for artist, name in zip(points, self.NAMES, strict=True):
             having = sorted((one for one in trials if name in one.bounds), key=lambda one: one.condition)
             assert list(artist.get_xdata()) == [one.condition for one in having]
-            assert list(artist.get_ydata()) == [one.ratio(name) for one in having]
+            assert list(artist.get_ydata()) == [one.overestimation(name) for one in having]
         assert list(limit.get_xdata()) == [2**24, 2**24]
         assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
         assert "condition number" in ax.get_xlabel()
