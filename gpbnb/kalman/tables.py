@@ -15,9 +15,9 @@ from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.gravity_probe_b import STATES
 from gpbnb.kalman.mission import PARAMETERS
 from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
 from gpbnb.kalman.probability import Share
+from gpbnb.kalman.requirement import Requirement
 
 DOUBLE = FloatFormat(2, 53)
 

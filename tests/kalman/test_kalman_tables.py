@@ -11,7 +11,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles, printed, report_bounds, smallest, tables, year, year_cases
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import gravity_probe_b
-from gpbnb.kalman.precision import Requirement
+from gpbnb.kalman.requirement import Requirement
 
 
 def cells(table):
