@@ -267,9 +267,7 @@ def errors_over_rate(result: RateSweep, ax: Axes) -> list[Artist]:
     ends = np.log10([float(result.discretization[0][-1]), *(line[-1] for line in result.rounding)])
     heights = [10**height for height in _apart(ends.tolist(), 0.6)]
     artists.append(write(ax, "discretization", (last, heights[0]), STRICT, (8, 0)))
-    for i, (fmt, (marker, colour)) in enumerate(
-        zip(result.formats, zip("sD^v", SERIES, strict=True), strict=True)
-    ):
+    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
         artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {arithmetic(fmt)}")
         artists += ax.plot(rates, result.theory(fmt, rates)[1], color=VALID, lw=1)
         artists.append(write(ax, arithmetic(fmt), (last, heights[1 + i]), colour, (8, 0)))
@@ -291,9 +289,7 @@ def totals(result: RateSweep, ax: Axes) -> list[Artist]:
     last = float(result.rates[-1])
     heights = [10**height for height in _apart([float(np.log10(line[-1])) for line in result.total], 0.3)]
     artists: list[Artist] = []
-    for i, (fmt, (marker, colour)) in enumerate(
-        zip(result.formats, zip("sD^v", SERIES, strict=True), strict=True)
-    ):
+    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
         artists += ax.plot(result.rates, result.total[i], marker, color=colour, label=arithmetic(fmt))
         artists += ax.plot(rates, result.theory(fmt, rates)[2], color=VALID, lw=1)
         artists.append(write(ax, arithmetic(fmt), (last, heights[i]), colour, (8, 0)))
