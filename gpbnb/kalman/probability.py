@@ -131,7 +131,8 @@ class Needed(NamedTuple):
     """The smallest precisions of one base that meet a tolerance with a probability; None if no format does.
 
     `observed`: the share of the records is as large. `lognormal`: the upper limit of the quantile is in the tolerance.
-    `shown`: the lower limit of the probability, without an assumption on the distribution, is as large.
+    `shown`: the lower limit of the probability, without an assumption on the distribution, is as large; no higher
+    precision that was run refutes it, and those may have fewer records.
     """
 
     observed: int | None
@@ -162,8 +163,81 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
             enough = share.fmt.precision
         return enough
 
+    by_precision = sorted(found, key=lambda each: each.fmt.precision)
+    refuted = [each.fmt.precision for each in by_precision if each.within < probability * each.records]
+    shown = (each.fmt.precision for each in by_precision if each.low >= probability)
     return Needed(
         first([each.within >= probability * each.records for each in found]),
         first([each.quantile_limit <= tolerance for each in found]),
-        first([each.low >= probability for each in found]),
+        next((each for each in shown if each > max(refuted, default=0)), None),
     )
+
+
+def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
+    """Precision at which the median error would equal the tolerance, for one kind of formats.
+
+    The nearest format on a logarithmic scale is taken, and each further digit divides its error by the base.
+
+    Raises
+    ------
+    ValueError : no formats.
+    """
+    if not found:
+        raise ValueError("got no formats; needed at least one")
+
+    def away(each: Share) -> float:
+        return math.log(each.quantile(0.5) / tolerance, each.fmt.base)
+
+    nearest = min(found, key=lambda each: abs(away(each)))
+    return nearest.fmt.precision + away(nearest)
+
+
+class Moved(NamedTuple):
+    """One choice of the study, changed: what it was and became, and by how many bits the median precision moves."""
+
+    choice: str
+    before: str
+    after: str
+    bits: float
+    records: int
+
+
+def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
+    """By how many bits each choice moves the precision at which the median error of a year equals the tolerance.
+
+    One choice is changed at a time: deviation states, Hung's form, base 2 and rounding to nearest stay otherwise. A
+    choice is left out if no such formats were run.
+
+    Parameters
+    ----------
+    found : shares of the simple model, in the setting "simple", and of settings of the mission model.
+    """
+    groups: dict[tuple[str, ...], list[Share]] = {}
+    for each in found:
+        fmt = each.fmt
+        groups.setdefault((each.setting, each.states, each.form, str(fmt.base), fmt.rounding.value), []).append(each)
+    moved = []
+    for setting in ("simple", "mission"):
+        usual = setting, "deviation", "hung", "2", "nearest"
+        if usual not in groups:
+            continue
+        for choice, place, after in (("states", 1, "absolute"), ("form", 2, "innovation"), ("rounding", 4, "chop")):
+            other = (*usual[:place], after, *usual[place + 1 :])
+            if other in groups:
+                moved.append(_moved(f"{choice}, {setting} model", usual[place], after, groups[usual], groups[other]))
+    for setting in dict.fromkeys(each.setting for each in found if each.setting != "simple"):
+        before = ("simple" if setting == "mission" else "mission", "deviation", "hung", "2", "nearest")
+        other = (setting, *before[1:])
+        if before in groups and other in groups:
+            moved.append(_moved("model", before[0], setting, groups[before], groups[other]))
+    return tuple(moved)
+
+
+def _moved(choice: str, before: str, after: str, usual: Sequence[Share], other: Sequence[Share]) -> Moved:
+    """Compare two kinds of formats, in the formats that both have if there are any."""
+    common = {each.fmt.precision for each in usual} & {each.fmt.precision for each in other}
+    if common:
+        usual = [each for each in usual if each.fmt.precision in common]
+        other = [each for each in other if each.fmt.precision in common]
+    bits = median_precision(other) - median_precision(usual)
+    return Moved(choice, before, after, bits, min(each.records for each in (*usual, *other)))
