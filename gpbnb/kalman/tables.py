@@ -19,7 +19,8 @@ from gpbnb.kalman.mission import PARAMETERS
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
-from gpbnb.kalman.probability import Moved, Share
+from gpbnb.kalman.probability import Share
+from gpbnb.kalman.sensitivity import Moved
 
 DOUBLE = FloatFormat(2, 53)
 

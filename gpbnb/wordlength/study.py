@@ -329,7 +329,7 @@ def inverse_precision(
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
     conditions = [column_sum_norm(rationals(a)) * column_sum_norm(true_inverse(a)) for a in (matrix, scaled)]
-    expected = precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
+    expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
     proved = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
     return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, proved)
 

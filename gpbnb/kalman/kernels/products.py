@@ -8,9 +8,58 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
+from numba.extending import overload
 
+from gpbnb.arithmetic.kernels.binary import SAFE_TWICE
+from gpbnb.arithmetic.kernels.bits import bits, from_bits
 from gpbnb.arithmetic.kernels.scalar import add, check, compare, load, multiply, multiply_add, one, put, store, zero
+from gpbnb.arithmetic.kernels.tags import Binary
+
+_MAGNITUDE = np.int64(2**63 - 1)
+_LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
+
+
+@njit(nogil=True)
+def _is_moderate(a: Any) -> Any:
+    """Whether all numbers are zero or from 2**-400 to 2**400 in magnitude."""
+    least, largest = _LARGEST, np.int64(0)
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            size = bits(a[i, j]) & _MAGNITUDE
+            least = min(least, size if size != 0 else _LARGEST)
+            largest = max(largest, size)
+    return least >= _LEAST and largest < _LARGEST
+
+
+def _short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """c = a b if the format is short and the numbers are moderate; returns whether it was."""
+    raise TypeError("got a call of _short_product from Python; needed one from a function compiled by numba")
+
+
+@overload(_short_product, strict=False)
+def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    def of_binary(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        # Up to 25 bits, a float64 result rounded again is right, and nothing leaves the range of float64: products are
+        # at least 2**-800, and sums are multiples of 2**-850. So no operation needs a check.
+        if not fmt.nearest or fmt.precision > SAFE_TWICE or not _is_moderate(a) or not _is_moderate(b):
+            return False
+        unit = np.int64(1) << (53 - fmt.precision)
+        half, mask = unit >> 1, -unit
+        for i in range(a.shape[0]):
+            for j in range(b.shape[1]):
+                c[i, j] = 0.0
+        for k in range(a.shape[1]):
+            for i in range(a.shape[0]):
+                factor = a[i, k]
+                if factor != 0.0:
+                    for j in range(b.shape[1]):
+                        p = from_bits((bits(factor * b[k, j]) + half) & mask)
+                        c[i, j] = from_bits((bits(c[i, j] + p) + half) & mask)
+        return True
+
+    return of_binary if getattr(fmt, "instance_class", None) is Binary else lambda fmt, a, b, c: False
 
 
 @njit(nogil=True)
@@ -48,6 +97,8 @@ def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
     One row of c after another grows by a product; a processor computes them at once, as none waits for the last.
     """
+    if _short_product(fmt, a, b, c):
+        return
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
             put(fmt, c, (i, j), zero(fmt))
