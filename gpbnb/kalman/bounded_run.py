@@ -89,8 +89,12 @@ class BoundedRun(Run):
             self.bound = advance_bounded(
                 *inputs, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *outputs
             )
-        except (OverflowError, ZeroDivisionError):
+        except (OverflowError, ZeroDivisionError) as error:
             self.notes[STOPPED] = self.steps + 1
+            self.reason = self.stopped_by(error)
+        else:
+            if self.stopped:
+                self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
 
 
 def emulate_with_bound(

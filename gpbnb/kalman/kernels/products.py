@@ -1,4 +1,4 @@
-"""Compiled: products for the filter's step, which leave out factors of zero and of one.
+"""Compiled: products for the filter's step, which leave out factors of zero and leading factors of one.
 
 Products with zero or one and sums with zero are exact, so no digit changes. The inner loops run along rows, where
 numbers lie side by side in memory and the processor takes several at once.
@@ -14,7 +14,18 @@ from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.binary import SAFE_TWICE
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
-from gpbnb.arithmetic.kernels.scalar import add, check, compare, load, multiply, multiply_add, one, put, store, zero
+from gpbnb.arithmetic.kernels.scalar import (
+    add,
+    check,
+    compare,
+    first_product,
+    load,
+    multiply_add,
+    one,
+    put,
+    store,
+    zero,
+)
 from gpbnb.arithmetic.kernels.tags import Binary
 
 _MAGNITUDE = np.int64(2**63 - 1)
@@ -71,16 +82,12 @@ def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
             factor = load(fmt, a, (i, k))
             if compare(fmt, factor, zero(fmt)) == 0:
                 continue
-            unit = compare(fmt, factor, one(fmt)) == 0
-            if fresh and unit:
+            if fresh and compare(fmt, factor, one(fmt)) == 0:
                 for j in range(b.shape[1]):
                     put(fmt, c, (i, j), load(fmt, b, (k, j)))
             elif fresh:
                 for j in range(b.shape[1]):
-                    put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (k, j))))
-            elif unit:
-                for j in range(b.shape[1]):
-                    put(fmt, c, (i, j), add(fmt, load(fmt, c, (i, j)), load(fmt, b, (k, j))))
+                    put(fmt, c, (i, j), first_product(fmt, factor, load(fmt, b, (k, j))))
             else:
                 for j in range(b.shape[1]):
                     put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
