@@ -17,9 +17,9 @@ from gpbnb.kalman.gravity_probe_b import STATES
 from gpbnb.kalman.independent import FirstStep, ModelShare
 from gpbnb.kalman.mission import PARAMETERS
 from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.printed import Terms
 from gpbnb.kalman.probability import Share
+from gpbnb.kalman.requirement import Requirement
 from gpbnb.kalman.sensitivity import Moved
 
 DOUBLE = FloatFormat(2, 53)

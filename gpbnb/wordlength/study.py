@@ -24,7 +24,8 @@ from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import Requirement, required_precision
+from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.requirement import Requirement
 from gpbnb.kalman.year import Year
 
 

@@ -12,8 +12,8 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles, independent, printed, report_bounds, smallest, tables, year, year_cases
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import gravity_probe_b
-from gpbnb.kalman.precision import Requirement
 from gpbnb.kalman.probability import Share, interval
+from gpbnb.kalman.requirement import Requirement
 
 
 def cells(table):
