@@ -293,3 +293,12 @@ def test_no_page_names_a_host_for_scripts(address):
     text = (tools.HTML / address).read_text(encoding="utf-8")
     for host in ("unpkg.com", "jsdelivr.net", "cdnjs", "googleapis.com", "gstatic.com"):
         assert host not in text
+
+
+def test_every_page_of_the_book_has_a_preview_and_an_entry_in_the_sitemap():
+    listed = (tools.HTML / "sitemap.xml").read_text(encoding="utf-8")
+    for address in (each for each in PAGES if each.startswith("book/")):
+        page = (tools.HTML / address).read_text(encoding="utf-8")
+        assert all(f'<meta property="og:{name}"' in page for name in ("title", "image")), address
+        assert f"{address}</loc>" in listed
+    assert (tools.HTML / "_static" / "preview.png").is_file()
