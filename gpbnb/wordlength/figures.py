@@ -104,3 +104,18 @@ def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     ax.set_xlabel("bits")
     return artists
+
+
+def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axes) -> list[Artist]:
+    """Errors of several ways to compute over that of the first way, a line a way; a refused one is not drawn."""
+    artists: list[Artist] = []
+    for (label_, values), (marker, colour) in zip(errors.items(), line_styles(len(errors), "osD^"), strict=True):
+        points = [(value / values[0], y) for y, value in enumerate(values) if math.isfinite(value)]
+        artists += ax.plot(*zip(*points, strict=True), marker, color=colour, mfc="none", label=label_)
+    ax.axvline(1, color=REFERENCE, lw=0.8)
+    ax.set_xscale("log")
+    ax.set_yticks(range(len(names)), names)
+    ax.invert_yaxis()
+    ax.set_xlabel("error over that of the first way")
+    legend(ax, loc="upper center", bbox_to_anchor=(0.3, -0.18), ncols=2)
+    return artists
