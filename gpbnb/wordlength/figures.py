@@ -119,3 +119,23 @@ def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axe
     ax.set_xlabel("error over that of the first way")
     legend(ax, loc="upper center", bbox_to_anchor=(0.3, -0.18), ncols=2)
     return artists
+
+
+def bands(found: Mapping[str, Sequence[tuple[int, Sequence[float]]]], ax: Axes, share: float = 0.9) -> list[Artist]:
+    """Median, a central share and the largest of many records' errors over the tolerance, against the bits."""
+    artists: list[Artist] = []
+    low, high = (1 - share) / 2, (1 + share) / 2
+    for (name, points), (_, colour) in zip(found.items(), line_styles(len(found)), strict=True):
+        bits = [t for t, _ in points]
+        below, middle, above, most = np.array([np.quantile(each, (low, 0.5, high, 1)) for _, each in points]).T
+        artists.append(
+            ax.fill_between(bits, below, above, color=colour, alpha=0.3, lw=0, label=f"{share:.0%} of records")
+        )
+        artists += ax.plot(bits, middle, "-", color=colour, label=f"{name}: median")
+        artists += ax.plot(bits, most, ":", color=colour, label="the worst record")
+    artists.append(ax.axhline(1, color=REFERENCE, ls="--", lw=1.0))
+    ax.annotate("tolerance", (1, 1), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=REFERENCE)
+    ax.set_yscale("log")
+    legend(ax, loc="lower left")
+    label(ax, "bits", "largest error over the tolerance")
+    return artists
