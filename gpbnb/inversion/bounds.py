@@ -28,7 +28,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import column_sum, gamma, gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -278,8 +278,8 @@ def smallest_precision(
 ) -> Guarantee:
     r"""Find the fewest digits in which the computed inverse of a matrix is proved to be good enough.
 
-    One precision after the other, from one digit on, the matrix is rounded, inverted in the format, and the result held
-    against the matrix as given by :func:`a_posteriori`. Proved is
+    In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
+    and the result held against the matrix as given by :func:`a_posteriori`. Proved is
     :math:`\|X - A^{-1}\| \le \text{goal}\,\|A^{-1}\|`, rounding of the entries included.
 
     Parameters
@@ -292,8 +292,8 @@ def smallest_precision(
 
     Returns
     -------
-    guarantee : the format, the inverse and its bound. By luck an inverse in few digits can be better than one in a few
-        more: what is proved is of this one.
+    guarantee : the format, the inverse and its bound. The next higher precision is enough as well, if it is not above
+        `largest`.
 
     Raises
     ------
@@ -308,17 +308,20 @@ def smallest_precision(
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
         raise ValueError(f"a: got shape {given.shape}; needed a square matrix (n, n), n at least 1")
     true_inverse(given)
-    best = math.inf
-    for precision in range(1, largest + 1):
-        fmt = FloatFormat(base, precision, rounding)
+    tried: dict[FloatFormat, Guarantee] = {}
+
+    def meets(fmt: FloatFormat) -> bool:
         try:
             x = linalg.inv(fmt.array(given), pivot)
-            bound = _relative(a_posteriori(given, x), x)
+            tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
         except (np.linalg.LinAlgError, ValueError):  # singular in so few digits, or nothing proved
-            continue
-        if bound <= goal:
-            return Guarantee(fmt, x, bound)
-        best = min(best, bound)
+            return False
+        return tried[fmt].bound <= goal
+
+    found = search.smallest_precision(meets, base, rounding, largest=largest)
+    if found is not None:
+        return tried[found]
+    best = min((each.bound for each in tried.values()), default=math.inf)
     reached = f"the best bound was {best:.3g}" if best < math.inf else "none had a bound at all"
     raise ValueError(
         f"got the goal {float(goal):.3g}; needed one that an inverse in at most {largest} base-{base} digits is proved "

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounded import BoundedError
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.inversion import bounds, procedure, theory
@@ -48,7 +49,7 @@ MAY_BE_ABSENT = BETTER[1:]
 
 
 @dataclass(frozen=True)
-class Trial:
+class Trial(BoundedError):
     """One computed inverse: its matrix, its error, and the bounds of that error, norms (22).
 
     A bound that proves nothing is absent from `bounds`. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
@@ -71,16 +72,6 @@ class Trial:
     def regular(self) -> bool:
         """Whether the condition number is at most :data:`REGULAR` over β: the inverse has two digits and more."""
         return self.condition * float(self.matrix.format.unit_roundoff) <= REGULAR
-
-    def ratio(self, bound: str) -> float:
-        """Bound over error; infinity for an exact inverse with a bound above zero."""
-        if not self.error:
-            return np.inf if self.bounds[bound] else 1.0
-        return float(Fraction(self.bounds[bound]) / self.error)
-
-    def violates(self, bound: str) -> bool:
-        """Whether the error exceeds the bound, decided exactly."""
-        return self.error > Fraction(self.bounds[bound])
 
 
 def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None, family: str = "") -> Trial:
@@ -355,9 +346,9 @@ class Sample:
             self.violations[name] += one.violates(name)
             self.violations_regular[name] += regular and one.violates(name)
             if one.error:
-                self.ratios[name].append(one.ratio(name))
+                self.ratios[name].append(one.overestimation(name))
                 if regular:
-                    self.ratios_regular[name].append(one.ratio(name))
+                    self.ratios_regular[name].append(one.overestimation(name))
 
     def merge(self, other: Sample) -> None:
         """Count the trials of another sample."""
@@ -445,7 +436,7 @@ def worst(bound: str, sweep: str = "variants") -> Trial:
     row = min(rows, key=lambda row: float(row["smallest_regular"]))
     (cell,) = (cell for cell in SWEEPS[sweep][0]() if all(row[key] == text for key, text in _where(cell).items()))
     regular = (one for one in cell.trials((bound,)) if one is not None and one.error and one.regular)
-    return min(regular, key=lambda one: one.ratio(bound))
+    return min(regular, key=lambda one: one.overestimation(bound))
 
 
 def format_name(fmt: FloatFormat) -> str:

@@ -147,10 +147,12 @@ def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: st
         having = [one for one in trials if name in one.bounds and one.error]
         if against == "condition":
             x = [one.condition for one in having]
-            artists += ax.plot(x, [one.ratio(name) for one in having], marker, ms=3.5, color=colour, label=name)
+            artists += ax.plot(
+                x, [one.overestimation(name) for one in having], marker, ms=3.5, color=colour, label=name
+            )
             continue
         sizes = sorted({one.n for one in having})
-        groups = [[one.ratio(name) for one in having if one.n == n] for n in sizes]
+        groups = [[one.overestimation(name) for one in having if one.n == n] for n in sizes]
         artists.append(
             ax.fill_between(sizes, [min(g) for g in groups], [max(g) for g in groups], color=colour, alpha=0.12)
         )

@@ -115,7 +115,7 @@ def worst(trials: Mapping[str, Trial]) -> Table:
             f"{one.condition:.0f}",
             scientific(float(one.error), 4),
             scientific(one.bounds[name], 4),
-            f"{one.ratio(name):.3g}",
+            f"{one.overestimation(name):.3g}",
         )
         for name, one in trials.items()
     ]

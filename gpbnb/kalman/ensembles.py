@@ -7,7 +7,6 @@ kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb import sweeps
+from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import report_bounds
 from gpbnb.kalman.bounded_run import BoundedHistory, emulate_with_bound
@@ -180,7 +180,7 @@ def _printed_state(
         phi, h = given["Phi"][k % len(given["Phi"])], given["H"][k % len(given["H"])]
         before = phi @ (x[k - 1] if k else given["x0"])
         loop = phi - K[k] @ (h @ phi)
-        F = max(F, float(np.abs(loop).sum(axis=0).max()))
+        F = max(F, float(column_sum(loop)))
         # u = K z = x - F x of the step before, (111)
         u = max(u, float(np.abs(x[k] - before + K[k] @ (h @ before)).max()))
         first, second = report_bounds.coefficients(k + 1, model.n, model.m)
@@ -385,14 +385,13 @@ def load(directory: Path = _HERE) -> tuple[Summary, ...]:
 
 def provenance(directory: Path = _HERE) -> dict[str, Any]:
     """How the sweep was made."""
-    found: dict[str, Any] = json.loads((directory / "ensembles.json").read_text(encoding="utf-8"))
-    return found
+    return sweeps.read_record(directory / "ensembles.json", COMMAND)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog=COMMAND, description="Random filters by thousands.")
     parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
-    parser.add_argument("--output", type=Path, default=_HERE, help="where ensembles.csv and ensembles.json go")
+    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="where the two files go")
     given = parser.parse_args(arguments)
     todo, start = tasks(given.repeats), time.perf_counter()
     outcomes = sweep(todo, progress=True)
@@ -407,9 +406,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "seconds": round(time.perf_counter() - start),
         **machine(),
     }
-    (given.output / "ensembles.json").write_text(
-        json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
+    sweeps.write_record(given.output / "ensembles.json", made)
     return 0
 
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ from gpbnb.kalman.mission import Mission
 from gpbnb.kalman.threshold import COLUMNS as ERROR_COLUMNS
 from gpbnb.kalman.threshold import FORMS, STATES
 from gpbnb.sweeps import Column, Sweep
+from gpbnb.sweeps.command import run_command
 
 #: The settings of the sweep, the model with the report's timing, and with one choice changed.
 SETTINGS = {
@@ -130,19 +130,7 @@ SWEEP: Sweep[Cell] = Sweep(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog=SWEEP.command, description="A year of the mission model.")
-    parser.add_argument("--directory", type=Path, default=Path(".cache/mission"), help="where progress is saved")
-    parser.add_argument("--cells", type=int, default=len(CELLS), help="only so many of the cells")
-    parser.add_argument("--store", action="store_true", help="store the finished cells, and compute nothing")
-    given = parser.parse_args(arguments)
-    if not given.store:
-        try:
-            SWEEP.run(given.directory, cells=CELLS[: given.cells])
-        except KeyboardInterrupt:
-            print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
-            return 130
-    SWEEP.store(SWEEP.finished(given.directory), SWEEP.seconds(given.directory))
-    return 0
+    return run_command(SWEEP, "A year of the mission model.", Path(".cache/mission"), arguments)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ step.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +26,7 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation
 from gpbnb.kalman.year_cases import MODELS, model
 from gpbnb.sweeps import Column, Sweep
+from gpbnb.sweeps.command import run_command
 
 #: States of the filter, either drift angles and rates or their deviations from the predicted drift.
 STATES = ("absolute", "deviation")
@@ -181,19 +181,7 @@ SWEEP: Sweep[Cell] = Sweep(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog=SWEEP.command, description="A year for hundreds of measurement records.")
-    parser.add_argument("--directory", type=Path, default=Path(".cache/threshold"), help="where progress is saved")
-    parser.add_argument("--cells", type=int, default=len(CELLS), help="only so many of the cells")
-    parser.add_argument("--store", action="store_true", help="store the finished cells, and compute nothing")
-    given = parser.parse_args(arguments)
-    if not given.store:
-        try:
-            SWEEP.run(given.directory, cells=CELLS[: given.cells])
-        except KeyboardInterrupt:
-            print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
-            return 130
-    SWEEP.store(SWEEP.finished(given.directory), SWEEP.seconds(given.directory))
-    return 0
+    return run_command(SWEEP, "A year for hundreds of measurement records.", Path(".cache/threshold"), arguments)
 
 
 if __name__ == "__main__":

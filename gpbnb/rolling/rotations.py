@@ -16,6 +16,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
+from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
 from gpbnb.rolling.theory import INTERVAL
@@ -148,15 +149,21 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
 def digits_needed_observed(
     method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
 ) -> int:
-    """Least precision from which on a year's deroll of a drift stays within `error` mas.
+    """Smallest precision with which a year's deroll of a drift stays within `error` mas.
 
-    Tried downwards from what the bound proves to be enough, and no further than to the first that is not: with fewer
-    digits still, it may stay within by luck.
+    Found by :func:`gpbnb.arithmetic.search.smallest_precision` up to what the bound proves to be enough.
+
+    Raises
+    ------
+    ValueError : the precision that is proved to be enough cannot be emulated, and none below it is enough.
     """
     bound = theory.rotation_bound(method, period, steps[-1])
     rotate = {"recursion": recursion, "direct": direct}[method]
     enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
-    for precision in range(min(LARGEST_PRECISION[base], enough), 1, -1):
-        if rotate(FloatFormat(base, precision), period, steps).drift_error(drift) > error:
-            return precision + 1
-    return 2
+    most = min(LARGEST_PRECISION[base], enough)
+    found = smallest_precision(
+        lambda fmt: rotate(fmt, period, steps).drift_error(drift) <= error, base, least=2, largest=most
+    )
+    if found is None:
+        raise ValueError(f"got an error of {error:g} mas; needed one that base {base} reaches within {most} digits")
+    return found.precision

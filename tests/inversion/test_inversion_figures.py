@@ -79,7 +79,7 @@ class TestRatios:
         assert len(drawn) == 2 * 3 + 1
         for line, name in zip(drawn[1::2], self.NAMES, strict=False):
             assert list(line.get_xdata()) == [2, 4]
-            expected = [np.median([one.ratio(name) for one in trials if one.n == n]) for n in (2, 4)]
+            expected = [np.median([one.overestimation(name) for one in trials if one.n == n]) for n in (2, 4)]
             assert list(line.get_ydata()) == expected
         assert list(drawn[-1].get_ydata()) == [1, 1]
         assert colour(drawn[-1]) == style.BOUND
@@ -92,7 +92,7 @@ class TestRatios:
         for artist, name in zip(points, self.NAMES, strict=True):
             having = [one for one in trials if name in one.bounds]
             assert list(artist.get_xdata()) == [one.condition for one in having]
-            assert list(artist.get_ydata()) == [one.ratio(name) for one in having]
+            assert list(artist.get_ydata()) == [one.overestimation(name) for one in having]
         assert list(limit.get_xdata()) == [2**24, 2**24]
         assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
         assert "condition number" in ax.get_xlabel()
