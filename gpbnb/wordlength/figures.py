@@ -10,16 +10,17 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, line_styles
+from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, REFUTED, STRICT, label, legend, line_styles
 from gpbnb.wordlength.examples import STANDARD
 
-#: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).
+#: The looks of each kind of answer, as an emulation observes and a bound bounds. Open markers, in the colour of refuted
+#: formulas, are of (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
     "bound": ("|", BOUND, BOUND),
     "theory": ("D", STRICT, STRICT),
-    "printed": ("o", BOUND, "none"),
-    "corrected": ("s", STRICT, "none"),
+    "printed": ("o", REFUTED, "none"),
+    "corrected": ("s", REFUTED, "none"),
 }
 Curve = Sequence[tuple[int, float]]
 
@@ -32,7 +33,8 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
         if low <= fmt.precision <= high:
             draw = ax.axvline if upright else ax.axhline
             artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
-            x, y = (fmt.precision, 1.0) if upright else (1.0, fmt.precision)
+            above = 1.035 if name == "binary32" else 1.0  # beside binary16, whose name would touch it
+            x, y = (fmt.precision, above) if upright else (1.0, fmt.precision)
             transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
             side: Any = "center" if upright else "right"
             artists.append(
@@ -64,7 +66,8 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
     for (name, curve), (marker, colour) in zip(points.items(), line_styles(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
     for (name, curve), style in zip(lines.items(), ("-", "--", "-.", ":"), strict=False):
-        artists += ax.plot(*zip(*curve, strict=True), style, color=BOUND, label=name)
+        colour = REFUTED if name.startswith("(125)") else BOUND
+        artists += ax.plot(*zip(*curve, strict=True), style, color=colour, label=name)
     ax.set_xscale("log")
     artists += standards(ax, upright=False)
     legend(ax, fontsize=8.5)
