@@ -193,18 +193,13 @@ def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
 def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[Line2D]:
     """Bound (125) at the end of a year against the decimal digits, in mas."""
     betas = [Fraction(0.5 * 10.0 ** (1 - digits)) for digits in _DIGITS.tolist()]
-    heights = [
-        report_bounds.gravity_probe_b_bound(beta, report_bounds.EXAMPLE[0], report_bounds.YEAR_SIZE, **faults)
-        for beta in betas
-    ]
+    heights = [report_bounds.gravity_probe_b_bound(beta, report_bounds.EXAMPLE[0], **faults) for beta in betas]
     return ax.plot(_DIGITS, heights, color=BOUND, **style)
 
 
 def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
     """Bound (125) in one format after some steps, in mas, for :func:`lines`."""
-    return [
-        report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), report_bounds.YEAR_SIZE, **faults) for k in steps
-    ]
+    return [report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), **faults) for k in steps]
 
 
 def _beside(
