@@ -81,7 +81,7 @@ class BoundedRun(Run):
         if self.stopped or not len(z):
             return
         packed = self.as_packed(z)
-        values = double_doubles(self.exactly(packed))
+        values = packed if self.fmt is None else double_doubles(self.exactly(packed))
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         outputs = (self.checkpoint_steps, (self.X, self.G, self.C), self.bounds, self.notes)
         inputs = (self.tag, int(self.form), self.matrices, self._exact, self._plain)

@@ -258,7 +258,8 @@ def test_roundings_of_the_stored_loop_matter() -> None:
 
 def test_what_earlier_steps_carry_on_is_small_when_rows_go_far() -> None:
     found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
-    assert (found.parts[:, START] < 1e-5 * found.bound).all()
+    # Between two rows that are asked, the difference may add a thousandth of the bound.
+    assert (found.parts[:, START] < 1e-3 * found.bound).all()
     assert np.allclose(found.parts.sum(axis=1), found.bound, rtol=1e-8)
 
 
@@ -352,7 +353,7 @@ def test_the_probable_error_is_that_of_independent_roundings() -> None:
     assert np.allclose(np.sqrt(total), probable_error(found), rtol=4 * np.sqrt(2 * 20 / (200 * steps)))
 
 
-@pytest.mark.parametrize("name", ["recursion", "telescope", "induction"])
+@pytest.mark.parametrize("name", ["recursion", "telescope", "induction", "ellipsoid"])
 def test_the_algebra(name: str) -> None:
     for step in getattr(derivation, name)().steps:
         assert step.holds, step.name
