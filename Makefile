@@ -55,12 +55,12 @@ book: .venv/made-for ## execute the notebooks and build the HTML book; what has 
 
 test: .venv/made-for ## unit and property tests, and every notebook against its stored outputs
 	$(PY) scripts/execute_notebooks.py --check
-	$(PY) -m pytest -n 2 --dist loadfile --ignore=tests/pages tests
+	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder --ignore=tests/pages tests
 
 test-pages: .venv/made-for ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
 	@$(PY) -m tests.pages.browser
-	$(PY) -m pytest -n 2 tests/pages
+	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder tests/pages
 
 test-portable: .venv/made-for ## notebooks and numerical tests as on other machines; SETTINGS="nehalem locale-de" picks some
 	$(PY) scripts/portable.py $(SETTINGS)

@@ -3,7 +3,8 @@
 ==================  ==========================================================================  =======================
 what                which operands                                                              compared with
 ==================  ==========================================================================  =======================
-binary16            every pair of finite numbers: + - * /                                       NumPy's float16
+binary16            every pair of finite numbers: + - * /                                       the machine's float32,
+                                                                                                converted to float16
 bfloat16            every pair of finite numbers: + - * /                                       ml_dtypes
 both FP8 formats    every pair, and for E4M3 every triple of the fused multiply-add             ml_dtypes
 conversion to them  every number, and 1/4, 1/2, 3/4 of each gap with their neighbours           NumPy, ml_dtypes
@@ -11,17 +12,25 @@ square roots        every number that is not negative                           
 binary32, binary64  random bit patterns, half of the pairs close to each other                  the machine, by NumPy
 ==================  ==========================================================================  =======================
 
-Ties go to even throughout. NumPy and ml_dtypes compute in float32 and round again, which is right for formats of at
-most 11 bits: no quotient, sum, product or root of theirs is, in 24 bits, a new tie. The other modes are compared
-with their definitions, in Fractions, by the tests.
+Ties go to even throughout. The machine, NumPy and ml_dtypes compute in float32 and round again, which is right for
+formats of at most 11 bits: no quotient, sum, product or root of theirs is, in 24 bits, a new tie. The other modes are
+compared with their definitions, in Fractions, by the tests.
 
-What is finite there must be the same number here; an infinity there must overflow here, and so must the NaN that E4M3
+A finite number there must be the same number here; an infinity there must overflow here, and so must the NaN that E4M3
 has in its place.
+
+The full comparison takes minutes to an hour. It writes each finished part to a journal in ``.cache`` and resumes from
+it, as long as the compared code stays the same. When all parts are done it writes the counts to
+``benchmarks/results/processors.csv``.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
+import datetime
+import hashlib
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -30,13 +39,15 @@ from typing import Any, NamedTuple
 
 import ml_dtypes
 import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gpbnb.arithmetic import named
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels import elementwise
-from gpbnb.display.tables import Table
+from gpbnb.arithmetic.kernels import bits, elementwise, processor, rules
 
 RESULTS = Path(__file__).parent / "results"
 SMALL: dict[str, tuple[FloatFormat, Any]] = {
@@ -52,6 +63,8 @@ MACHINE: dict[str, tuple[FloatFormat, Any]] = {
 OPERATIONS = ("add", "subtract", "multiply", "divide")
 RANDOM = 4_000_000  # pairs of each operation of binary32 and binary64
 _BATCH = 1 << 16
+_PART = 4096  # numbers, each with every other, in one line of the journal
+JOURNAL = Path(__file__).parent.parent / ".cache" / "exactness.csv"
 
 
 class Count(NamedTuple):
@@ -61,6 +74,70 @@ class Count(NamedTuple):
     operation: str
     compared: int
     different: int
+
+
+class Journal:
+    """Finished parts of the comparison, one a line, for the code as it is now."""
+
+    def __init__(self, file: Path) -> None:
+        self.file, self.code = file, code_digest()
+        self.parts: dict[str, Count] = {}
+        if file.exists():
+            with file.open(encoding="utf-8", newline="") as stream:
+                for code, part, fmt, operation, compared, different in csv.reader(stream):
+                    if code == self.code:
+                        self.parts[part] = Count(fmt, operation, int(compared), int(different))
+
+    def add(self, part: str, count: Count) -> None:
+        self.parts[part] = count
+        self.file.parent.mkdir(parents=True, exist_ok=True)
+        with self.file.open("a", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerow((self.code, part, *count))
+
+
+def code_digest() -> str:
+    """Eight characters that change with the code that rounds."""
+    files = [module.__file__ for module in (bits, named, processor, rules)]
+    return hashlib.sha256(b"".join(Path(str(file)).read_bytes() for file in files)).hexdigest()[:8]
+
+
+@intrinsic
+def _half(typingctx: Any, x: Any) -> Any:
+    """The bits of the float16 nearest to a float32, by the machine's own conversion."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.bitcast(builder.fptrunc(args[0], ir.HalfType()), ir.IntType(16))
+
+    return types.uint16(types.float32), codegen
+
+
+@njit
+def _halves(x: Any, out: Any) -> None:
+    for i in range(x.shape[0]):
+        out[i] = _half(x[i])
+
+
+@njit
+def _unequal(found: Any, expected: Any, values: Any) -> Any:
+    """How many results differ; `expected` are the bit patterns of the type, `values` their float64, NaN if infinite."""
+    count = 0
+    for i in range(found.shape[0]):
+        wanted = values[expected[i]]
+        same = (found[i] == wanted) & (np.copysign(1.0, found[i]) > -1.0 or found[i] != 0.0)
+        count += not (same or (wanted != wanted and found[i] != found[i]))
+    return count
+
+
+def operate(operation: str, dtype: Any, a: Any, b: NDArray[Any]) -> NDArray[Any]:
+    """The bit patterns of ``a operation b`` for one number and many."""
+    with np.errstate(all="ignore"):
+        if dtype is not np.float16:
+            return np.asarray(getattr(np, operation)(a, b)).view(f"u{np.dtype(dtype).itemsize}")
+        # NumPy does the same, but spends most of its time on flags of overflow and underflow.
+        single = getattr(np, operation)(a.astype(np.float32), b.astype(np.float32))
+    out = np.empty(single.shape, np.uint16)
+    _halves(single, out)
+    return out
 
 
 def finite(dtype: Any) -> NDArray[Any]:
@@ -90,24 +167,34 @@ def differing(found: NDArray[np.float64], expected: NDArray[Any]) -> int:
     return int(np.count_nonzero(~same | ((found == 0) & np.signbit(found))))
 
 
-def pairs(name: str, share: float, rng: np.random.Generator) -> Iterator[Count]:
+def pairs(name: str, share: float, rng: np.random.Generator, journal: Journal | None = None) -> Iterator[Count]:
     """Each number, or a share of them, with every other."""
     fmt, dtype = SMALL[name]
     every = finite(dtype)
     wide = every.astype(np.float64)
+    size = np.dtype(dtype).itemsize
+    with np.errstate(all="ignore"):
+        values = np.arange(256**size, dtype=f"u{size}").view(dtype).astype(np.float64)
+    values[~np.isfinite(values)] = np.nan
     rows = np.flatnonzero(rng.random(every.size) < share) if share < 1 else np.arange(every.size)
     for operation in OPERATIONS:
         second, wide_second = (every[wide != 0], wide[wide != 0]) if operation == "divide" else (every, wide)
-        group = max(1, _BATCH // second.size)
-        different = 0
-        for start in tqdm(range(0, rows.size, group), desc=f"{name} {operation}", disable=share < 1, leave=False):
-            chosen = rows[start : start + group]
-            a, b = np.repeat(every[chosen], second.size), np.tile(second, chosen.size)
-            with np.errstate(all="ignore"):
-                expected = getattr(np, operation)(a, b)
-            x, y = np.repeat(wide[chosen], second.size), np.tile(wide_second, chosen.size)
-            different += differing(computed(fmt, operation, x, y), expected)
-        yield Count(name, operation, rows.size * second.size, different)
+        compared = different = 0
+        for start in tqdm(range(0, rows.size, _PART), desc=f"{name} {operation}", disable=share < 1, leave=False):
+            part = f"{name} {operation} {start}"
+            if journal is None or part not in journal.parts:
+                chosen, wrong = rows[start : start + _PART], 0
+                for i in chosen:
+                    expected = operate(operation, dtype, every[i], second)
+                    found = computed(fmt, operation, np.full(second.size, wide[i]), wide_second)
+                    wrong += _unequal(found, expected, values)
+                count = Count(name, operation, chosen.size * second.size, int(wrong))
+                if journal is not None:
+                    journal.add(part, count)
+            else:
+                count = journal.parts[part]
+            compared, different = compared + count.compared, different + count.different
+        yield Count(name, operation, compared, different)
 
 
 def unary(name: str) -> Iterator[Count]:
@@ -164,7 +251,7 @@ def machine(name: str, share: float, rng: np.random.Generator) -> Iterator[Count
         yield Count(name, operation, compared, different)
 
 
-def run(share: float, seed: int) -> Iterator[Count]:
+def run(share: float, seed: int, journal: Journal | None = None) -> Iterator[Count]:
     """Compare everything, or a share; the slowest last."""
     rng = np.random.default_rng(seed)
     yield from triples(share, rng)
@@ -173,7 +260,7 @@ def run(share: float, seed: int) -> Iterator[Count]:
     for name in reversed(SMALL):
         yield from unary(name)
         # Of the FP8 formats always all pairs: there are few.
-        yield from pairs(name, 1 if name.startswith("FP8") else share, rng)
+        yield from pairs(name, 1 if name.startswith("FP8") else share, rng, journal)
 
 
 def main() -> int:
@@ -183,18 +270,28 @@ def main() -> int:
     options = parser.parse_args()
     start = time.perf_counter()
     counts = []
-    for count in run(options.share, options.seed):
+    for count in run(options.share, options.seed, Journal(JOURNAL) if options.share == 1 else None):
         counts.append(count)
         print(f"{count.fmt:<10} {count.operation:<11} {count.compared:>15,} {count.different:>10,}", flush=True)
-    body = tuple((c.fmt, c.operation, f"{c.compared:,}", f"{c.different:,}") for c in counts)
     total, different = sum(c.compared for c in counts), sum(c.different for c in counts)
     print(f"{total:,} results compared in {time.perf_counter() - start:.0f} s, {different or 'none'} different")
     if options.share == 1:
-        RESULTS.mkdir(exist_ok=True)
-        table = Table("results compared", ("format", "operation", "compared", "different"), body).markdown()
-        about = f"Compared with numpy {np.__version__} and ml_dtypes {ml_dtypes.__version__}."
-        (RESULTS / "processors.md").write_text(f"{table}\n\n{about}\n", encoding="utf-8")
+        write(counts)
     return 1 if different else 0
+
+
+def write(counts: list[Count]) -> None:
+    """Store the counts with the date, the commit and what they were compared with."""
+    RESULTS.mkdir(exist_ok=True)
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short=10", "HEAD"], capture_output=True, text=True, cwd=RESULTS, check=False
+    ).stdout.strip()
+    date = datetime.datetime.now(datetime.UTC).date().isoformat()
+    with (RESULTS / "processors.csv").open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow((*Count._fields, "date", "commit", "code", "numpy", "ml_dtypes"))
+        for count in counts:
+            writer.writerow((*count, date, commit, code_digest(), np.__version__, ml_dtypes.__version__))
 
 
 if __name__ == "__main__":

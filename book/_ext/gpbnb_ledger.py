@@ -39,7 +39,10 @@ class Ledger(SphinxDirective):
             self.env.note_dependency(str(path))
         what, *detail = self.arguments
         if what == "counts":
-            return self.parse_text_to_nodes(ledger.count_table(all_rows(), detail[0]).markdown())
+            parsed = self.parse_text_to_nodes(ledger.count_table(all_rows(), detail[0]).markdown())
+            for table in (found for node in parsed for found in node.findall(nodes.table)):
+                table["classes"].append("counts")
+            return parsed
         return [nodes.raw("", self.html(what, *detail), format="html")]
 
     def html(self, what: str, detail: str = "") -> str:

@@ -82,8 +82,7 @@ function keepPunctuation(formula) {
 }
 
 // What scrolls sideways must be reachable by keyboard. Formulas get their width late, boxes with the window's.
-function markScrolling() {
-  const boxes = [...document.querySelectorAll("article :is(div, pre, mjx-container)")];
+function markScrolling(boxes = [...document.querySelectorAll("article :is(div, pre, mjx-container)")]) {
   const scrolls = boxes.map((box) => box.scrollWidth > box.clientWidth && /auto|scroll/.test(getComputedStyle(box).overflowX));
   boxes.forEach((box, i) => {
     if (scrolls[i]) box.tabIndex = 0;

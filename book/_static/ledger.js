@@ -68,7 +68,7 @@ function setFormulas(rows, whenReady) {
   const reach = (formulas) => {
     const boxes = formulas.map((formula) => formula.firstElementChild).filter(Boolean);
     breakFormulas(boxes);
-    for (const box of boxes) if (box.scrollWidth > box.clientWidth) box.tabIndex = 0;
+    markScrolling(boxes);
   };
   let last = Promise.resolve();
   const watch = new IntersectionObserver(

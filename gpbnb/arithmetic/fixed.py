@@ -15,7 +15,14 @@ from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel
 from gpbnb.arithmetic.kernels.limited import limited_kernel
-from gpbnb.arithmetic.kernels.limited_backends import LimitedExact, limited_backend, limited_exact, run_tag
+from gpbnb.arithmetic.kernels.limited_backends import (
+    Accumulator,
+    LimitedExact,
+    limited_backend,
+    limited_exact,
+    mixed_tag,
+    run_tag,
+)
 from gpbnb.arithmetic.kernels.rules import Limits, Rounding, Rules
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rational import exact
@@ -124,17 +131,20 @@ class FixedFormat:
         """What holds every number of this format, slowly."""
         return limited_exact(self._rules)
 
-    def run_tag(self, fused: bool = False) -> Tag:
+    def run_tag(self, fused: bool = False, sums: Accumulator | None = None) -> Tag:
         """The arithmetic for a compiled loop of its own; random roundings begin with the first number of the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
+        sums : the format that keeps sums of products until they are stored; this one, if none is given.
 
         Raises
         ------
-        ValueError : the format has no compiled loops, or none with fused multiply-add.
+        ValueError : the format has no compiled loops, or none with fused multiply-add or with sums in `sums`.
         """
+        if sums is not None:
+            return mixed_tag(self.run_tag(), sums.run_tag(fused))
         return run_tag(self.backend, self._rules, fused)
 
     def round(self, value: Any) -> Fraction:

@@ -18,7 +18,14 @@ from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
 from gpbnb.arithmetic.kernels.limited import LimitedKernel, limited_kernel
-from gpbnb.arithmetic.kernels.limited_backends import LimitedFloats, limited_backend, limited_exact, run_tag
+from gpbnb.arithmetic.kernels.limited_backends import (
+    Accumulator,
+    LimitedFloats,
+    limited_backend,
+    limited_exact,
+    mixed_tag,
+    run_tag,
+)
 from gpbnb.arithmetic.kernels.rules import Limits, Rounding, Rules
 from gpbnb.arithmetic.kernels.tags import Tag
 
@@ -160,17 +167,20 @@ class FloatFormat:
             return limited_kernel(self._rules)
         return kernel(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
-    def run_tag(self, fused: bool = False) -> Tag:
+    def run_tag(self, fused: bool = False, sums: Accumulator | None = None) -> Tag:
         """The arithmetic for a compiled loop of its own; random roundings begin with the first number of the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
+        sums : the format that keeps sums of products until they are stored; this one, if none is given.
 
         Raises
         ------
-        ValueError : the format has no compiled loops, or none with fused multiply-add.
+        ValueError : the format has no compiled loops, or none with fused multiply-add or with sums in `sums`.
         """
+        if sums is not None:
+            return mixed_tag(self.run_tag(), sums.run_tag(fused))
         return run_tag(self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused)
 
     def restart(self) -> None:

@@ -8,13 +8,17 @@ Operands are FloatArrays of one format, and so are results. Where their backend 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.kernels.backends import Compiled
+
+if TYPE_CHECKING:
+    from gpbnb.arithmetic.fixed import FixedFormat
+    from gpbnb.arithmetic.formats import FloatFormat
 
 Order = Literal["left", "pairwise", "blocked"]
 
@@ -27,7 +31,14 @@ class LU(NamedTuple):
     permutation: NDArray[np.intp]
 
 
-def dot(x: FloatArray, y: FloatArray, order: Order = "left", fused: bool = False, block: int = 32) -> FloatArray:
+def dot(
+    x: FloatArray,
+    y: FloatArray,
+    order: Order = "left",
+    fused: bool = False,
+    block: int = 32,
+    sums: FloatFormat | FixedFormat | None = None,
+) -> FloatArray:
     r"""Inner product, from left to right unless another order is asked for.
 
     .. math:: \mathrm{fl}(\dots\mathrm{fl}(\mathrm{fl}(x_1 y_1) + \mathrm{fl}(x_2 y_2)) + \dots)
@@ -35,7 +46,7 @@ def dot(x: FloatArray, y: FloatArray, order: Order = "left", fused: bool = False
     Parameters
     ----------
     x, y : (n,) vectors of one format.
-    order, fused, block : as in :func:`matmul`.
+    order, fused, block, sums : as in :func:`matmul`.
 
     Returns
     -------
@@ -52,10 +63,17 @@ def dot(x: FloatArray, y: FloatArray, order: Order = "left", fused: bool = False
     """
     _check(x, "x", 1)
     _check(y, "y", 1)
-    return matmul(x, y, order, fused, block)
+    return matmul(x, y, order, fused, block, sums)
 
 
-def matmul(a: FloatArray, b: FloatArray, order: Order = "left", fused: bool = False, block: int = 32) -> FloatArray:
+def matmul(
+    a: FloatArray,
+    b: FloatArray,
+    order: Order = "left",
+    fused: bool = False,
+    block: int = 32,
+    sums: FloatFormat | FixedFormat | None = None,
+) -> FloatArray:
     """Matrix product; each entry is :func:`dot` of a row and a column. By default the same as ``a @ b``.
 
     Parameters
@@ -67,11 +85,15 @@ def matmul(a: FloatArray, b: FloatArray, order: Order = "left", fused: bool = Fa
     fused : each product is added by a fused multiply-add, which rounds once; not with "pairwise", where products are
         not added to sums.
     block : products in a block.
+    sums : the format in which products and sums are computed; each entry is then rounded once into the format of the
+        operands. Tensor cores keep sums of bfloat16 products in binary32, signal processors keep them in a long
+        accumulator.
 
     Raises
     ------
     TypeError : not FloatArrays.
-    ValueError : interface dimensions or formats differ; an unknown order, a block below 1, or pairwise and fused.
+    ValueError : interface dimensions or formats differ; an unknown order, a block below 1, or pairwise and fused; sums
+        of another base or with fewer digits than the operands.
 
     References
     ----------
@@ -85,6 +107,13 @@ def matmul(a: FloatArray, b: FloatArray, order: Order = "left", fused: bool = Fa
         raise ValueError(f"block: got {block}; needed at least 1")
     if fused and order == "pairwise":
         raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
+    if sums is not None:
+        a.operand(b)
+        if sums.base != a.format.base or sums.precision < a.format.precision:
+            raise ValueError(
+                f"sums: got {sums} with operands in {a.format}; needed the same base and at least as many digits"
+            )
+        return a.format.array(matmul(sums.array(a), sums.array(b), order, fused, block))
     n = a.shape[-1] if a.ndim else 0
     if not b.ndim or n == 0 or (order == "left" and not fused) or n != b.shape[max(b.ndim - 2, 0)]:
         return a @ b  # which also names shapes that do not fit

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+
+CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
+"""Precisions that a run is always tried in above the answer: those of binary32 and binary64, and their like."""
 
 
 def smallest_precision(
@@ -62,3 +67,69 @@ def smallest_precision(
     while answer < largest and not (suffices(answer) and (monotone or suffices(answer + 1))):
         answer += 1
     return FloatFormat(base, answer, rounding) if suffices(answer) else None
+
+
+class Search:
+    """The smallest precision that meets a tolerance and above which no precision tried misses it.
+
+    Parameters
+    ----------
+    error : gives the error over the tolerance in a format, and why it is infinite.
+    checks : precisions that are tried if they lie above the answer.
+    tick : called after each run.
+    bounds : whether the errors are bounds, which need not exist: precisions above the answer that have none are then
+        listed as undecided, and do not count against it.
+    """
+
+    def __init__(
+        self,
+        error: Callable[[FloatFormat], tuple[float, str]],
+        base: int,
+        rounding: Rounding,
+        checks: Sequence[int],
+        tick: Callable[[], object] = lambda: None,
+        bounds: bool = False,
+    ) -> None:
+        self._ratios, self._why = dict[int, float](), dict[int, str]()
+        #: Precisions above the answer for which there is no bound.
+        self.undecided: tuple[int, ...] = ()
+        #: Precisions that met the tolerance although a higher one missed it; empty if all is regular.
+        self.irregular: tuple[int, ...] = ()
+        largest = LARGEST_PRECISION[base]
+
+        def meets(fmt: FloatFormat) -> bool:
+            if fmt.precision not in self._ratios:
+                self._ratios[fmt.precision], self._why[fmt.precision] = error(fmt)
+                tick()
+            return self._ratios[fmt.precision] <= 1
+
+        #: The answer, or None.
+        self.fmt = smallest_precision(meets, base, rounding, least=2, largest=largest)
+        if self.fmt is None or not checks:
+            return
+        above = {digits for digits in (self.fmt.precision + 2, *checks) if self.fmt.precision < digits <= largest}
+        missed = [digits for digits in sorted(above) if not meets(FloatFormat(base, digits, rounding))]
+        if not missed:
+            return
+        if bounds and all(math.isinf(self._ratios[digits]) for digits in missed):
+            self.undecided = tuple(missed)
+            return
+        every = [FloatFormat(base, digits, rounding) for digits in range(self.fmt.precision, largest + 1)]
+        most = max(fmt.precision for fmt in every if not meets(fmt))
+        self.irregular = tuple(digits for digits, ratio in self.tried if ratio <= 1 and digits < most)
+        # a single precision above would be luck
+        self.fmt = FloatFormat(base, most + 1, rounding) if most + 1 < largest else None
+
+    @property
+    def tried(self) -> tuple[tuple[int, float], ...]:
+        """Each precision tried, and its error over the tolerance."""
+        return tuple(sorted(self._ratios.items()))
+
+    @property
+    def why(self) -> str:
+        """Why the largest precision below the answer without a number for its error has none."""
+        below = math.inf if self.fmt is None else self.fmt.precision
+        reasons = [
+            f"in {digits} digits {reason}" for digits, reason in sorted(self._why.items()) if reason and digits < below
+        ]
+        return reasons[-1] if reasons else ""

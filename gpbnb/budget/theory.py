@@ -5,11 +5,16 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
+
+from gpbnb.sweeps import plain_number
 
 GOAL = 1.0
 """The basis of Figure II-2 and the design goal of ch. I, in milliarcseconds a year."""
@@ -120,8 +125,8 @@ class Budget:
     sources: tuple[Source, ...]
 
     def __post_init__(self) -> None:
-        names = [source.name for source in self.sources]
-        twice = sorted({name for name in names if names.count(name) > 1})
+        counts = Counter(source.name for source in self.sources)
+        twice = sorted(name for name, count in counts.items() if count > 1)
         if twice:
             raise ValueError(f"got {', '.join(map(repr, twice))} more than once; needed one name a source: rename one")
 
@@ -132,10 +137,15 @@ class Budget:
             found.setdefault(f"group {source.group}" if source.group else f"source {source.name}", []).append(source)
         return tuple(map(tuple, found.values()))
 
-    @property
+    @cached_property
+    def _sums(self) -> dict[str, float]:
+        """By name of a source, the sum over its group."""
+        return {source.name: total for group in self.groups() for total in (_sum(group),) for source in group}
+
+    @cached_property
     def total(self) -> float:
         r"""Root-sum-square over groups, :math:`\sqrt{\sum_g (\sum_{j\in g} e_j)^2}`; milliarcseconds."""
-        return root_sum_square(math.fsum(source.residual for source in group) for group in self.groups())
+        return root_sum_square(map(_sum, self.groups()))
 
     @property
     def worst_case(self) -> float:
@@ -147,14 +157,17 @@ class Budget:
 
         Shares add up to one. All are 0 where the total is 0.
         """
-        group = next(group for group in self.groups() if source in group)
         square = self.total**2
-        return source.residual * math.fsum(other.residual for other in group) / square if square else 0.0
+        return source.residual * self._sums[source.name] / square if square else 0.0
 
     def allowance(self, goal: float = GOAL) -> float:
         """What one more independent source may be before the total is `goal`; milliarcseconds. NaN if it is already."""
         left = goal**2 - self.total**2
         return math.sqrt(left) if left >= 0 else math.nan
+
+
+def _sum(group: Iterable[Source]) -> float:
+    return math.fsum(source.residual for source in group)
 
 
 # -- sums -----------------------------------------------------------------------------------------
@@ -324,16 +337,39 @@ def write(budget: Budget, path: str | Path) -> None:
 
 
 def to_csv(sources: Sequence[Source]) -> str:
-    """Sources as CSV with the columns `HEADER`; a factor of 1 is left empty."""
+    """Sources as CSV with the columns `HEADER`; a factor of 1 is left empty.
+
+    Text that a spreadsheet would take for a formula gets an apostrophe in front, which :func:`read` removes.
+    """
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(HEADER)
     for source in sources:
         factors = ("" if getattr(source, method) == 1 else repr(getattr(source, method)) for method in METHODS)
         writer.writerow(
-            [source.name, source.kind.value, source.form.value, repr(source.error), *factors, source.group, source.note]
+            [
+                _guarded(source.name),
+                source.kind.value,
+                source.form.value,
+                repr(source.error),
+                *factors,
+                _guarded(source.group),
+                _guarded(source.note),
+            ]
         )
     return out.getvalue()
+
+
+_FORMULA = re.compile(r"'*[=+\-@]")
+
+
+def _guarded(text: str) -> str:
+    """Text that no spreadsheet takes for a formula."""
+    return f"'{text}" if _FORMULA.match(text) else text
+
+
+def _unguarded(text: str) -> str:
+    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text
 
 
 def _source(header: tuple[str, ...], cells: list[str]) -> Source:
@@ -344,19 +380,19 @@ def _source(header: tuple[str, ...], cells: list[str]) -> Source:
     )
     factors = {method: _number(method, row[method]) if row[method] else 1.0 for method in METHODS}
     return Source(
-        row["name"],
+        _unguarded(row["name"]),
         _member(Kind, "kind", row["kind"]),
         _member(ErrorForm, "form", row["form"]),
         _number("error_mas", row["error_mas"]),
         **factors,
-        group=row["group"],
-        note=row["note"],
+        group=_unguarded(row["group"]),
+        note=_unguarded(row["note"]),
     )
 
 
 def _number(column: str, text: str) -> float:
     try:
-        return float(text)
+        return plain_number(text)
     except ValueError:
         raise ValueError(f"{column} is {text!r}; a number is needed, or leave the row out until it is known") from None
 

@@ -1,4 +1,10 @@
-"""The one figure style: what was observed is drawn as points, a bound as a line, a print as an open marker."""
+"""The figure style of the book: its size, its palette, and direct labels.
+
+Every figure uses the same three colours: :data:`OBSERVED` for errors that were measured or simulated, :data:`VALID` for
+bounds and formulas that hold, :data:`REFUTED` for printed formulas that fail. Points show observations, a solid line
+a valid formula, a dashed line a refuted one. The background is transparent. In dark mode the style sheet of the book
+inverts the lightness of a picture and keeps its hues, so that a figure needs no second version.
+"""
 
 from __future__ import annotations
 
@@ -8,26 +14,44 @@ from typing import Any
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 from numpy.typing import NDArray
 
-# Okabe and Ito's colours, told apart by colour-blind readers and on paper.
 OBSERVED = "#0072B2"
-OBSERVED_OTHERS = ("#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Colour of errors that were measured or simulated."""
+OBSERVED_OTHERS = ("#56B4E9", "#7B3FA0", "#CC79A7", "#1F2F6B")
 COLOURS = (OBSERVED, *OBSERVED_OTHERS)
-MARKERS = "osD^v"
-BOUND = "#D55E00"
+"""Blues and purples for several observed series in one figure."""
+VALID = "#007D5F"
+"""Colour of bounds and formulas that hold."""
+REFUTED = "#C44E00"
+"""Colour of printed formulas that fail."""
+BOUND = VALID
+"""Another name of :data:`VALID`; draw a bound that fails in :data:`REFUTED`."""
 STRICT = "#000000"
-REFERENCE = "#767676"
+REFERENCE = "#6B6B6B"
+MARKERS = "osD^v"
+
+WIDTH = 6.4
+"""Width of a figure in inches."""
+TEXT = 10.5
+"""Size of the text in points. It gives 16 pixels on a desktop and more than 8 on a phone 390 pixels wide."""
 
 _STYLE: dict[Any, Any] = {
     "figure.dpi": 110,
     "savefig.dpi": 110,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.facecolor": "none",
     "figure.constrained_layout.use": True,
-    "font.size": 10.5,
+    "font.size": TEXT,
+    "axes.titlesize": TEXT,
+    "axes.labelsize": TEXT,
+    "xtick.labelsize": TEXT,
+    "ytick.labelsize": TEXT,
+    "legend.fontsize": TEXT,
     "axes.grid": True,
-    "grid.color": "#E0E0E0",
+    "grid.color": "#8080804D",
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "axes.spines.top": False,
@@ -36,22 +60,22 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def figure(columns: int = 1, height: float = 3.6) -> tuple[Figure, NDArray[Any]]:
-    """Start a figure of panels side by side.
+def figure(columns: int = 1, height: float = 3.6, rows: int = 1) -> tuple[Figure, NDArray[Any]]:
+    """Start a figure of panels, side by side or one below the other.
 
     Parameters
     ----------
-    columns : number of panels.
-    height : in inches; the width is that of a page of the book.
+    columns, rows : number of panels; rows suit a phone better than columns.
+    height : of the whole figure in inches; its width is that of a page of the book.
 
     Returns
     -------
-    figure, axes : `axes` is an array (columns,).
+    figure, axes : `axes` is an array (rows · columns,), row by row.
     """
     plt.draw_if_interactive()  # loads the backend: what it sets inside rc_context would be undone
     with plt.rc_context(_STYLE):
-        fig, axes = plt.subplots(1, columns, figsize=(8.0, height), squeeze=False)
-    return fig, axes[0]
+        fig, axes = plt.subplots(rows, columns, figsize=(WIDTH, height), squeeze=False)
+    return fig, axes.ravel()
 
 
 def colours(count: int, palette: Sequence[str] = COLOURS) -> Sequence[str]:
@@ -79,7 +103,31 @@ def loglog(ax: Axes) -> None:
 
 def legend(ax: Axes, **options: Any) -> None:
     """Show the legend without a frame."""
+    options.setdefault("fontsize", TEXT)
     ax.legend(frameon=False, **options)
+
+
+def name(
+    ax: Axes,
+    text: str,
+    at: tuple[float, float],
+    colour: str,
+    shift: tuple[float, float] = (6.0, 0.0),
+    **options: Any,
+) -> Annotation:
+    """Write the name of a curve beside it, in its colour.
+
+    Parameters
+    ----------
+    at : point of the curve, in data coordinates.
+    shift : of the text from that point, in points; the text grows away from the point.
+    options : of :meth:`matplotlib.axes.Axes.annotate`.
+    """
+    across, up = shift
+    options.setdefault("ha", "left" if across > 0 else "right" if across < 0 else "center")
+    options.setdefault("va", "bottom" if up > 0 else "top" if up < 0 else "center")
+    options.setdefault("fontsize", TEXT)
+    return ax.annotate(text, at, shift, textcoords="offset points", color=colour, **options)
 
 
 def label(ax: Axes, x: str, y: str, title: str = "") -> None:
@@ -87,4 +135,4 @@ def label(ax: Axes, x: str, y: str, title: str = "") -> None:
     ax.set_xlabel(x)
     ax.set_ylabel(y)
     if title:
-        ax.set_title(title, fontsize=10.5, loc="left")
+        ax.set_title(title, fontsize=TEXT, loc="left")

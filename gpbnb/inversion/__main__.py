@@ -1,4 +1,4 @@
-"""``python -m gpbnb.inversion``: compute the long sweeps of the chapter anew and keep their results in the package."""
+"""``python -m gpbnb.inversion``: compute the long sweeps of the chapter anew and write their results to a folder."""
 
 from __future__ import annotations
 
@@ -9,14 +9,12 @@ from pathlib import Path
 
 from gpbnb.inversion import experiment, stored
 
-HERE = Path(__file__).parent
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
     parser = argparse.ArgumentParser(prog="python -m gpbnb.inversion", description=__doc__)
     parser.add_argument("sweeps", nargs="*", default=list(experiment.SWEEPS), help="variants, random; both by default")
-    parser.add_argument("--folder", type=Path, default=HERE, help="where to write; by default into the package")
+    parser.add_argument("--folder", type=Path, default=Path(".cache/inversion"), help="where to write")
     parser.add_argument("--first", type=int, help="compute only so many cells")
     parser.add_argument("--directory", type=Path, default=Path(".cache/inversion"), help="where progress is saved")
     given = parser.parse_args(arguments)
@@ -25,9 +23,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for name in given.sweeps:
         sweep = stored.sweep(name)
         results = sweep.run(given.directory / name, cells=sweep.cells()[: given.first])
+        given.folder.mkdir(parents=True, exist_ok=True)
         file = given.folder / f"{name}.csv"
         sweep.store(results, file=file)
-        print(f"{file.name}: {sweep.load(file).records()[-1]['trials']} inversions")
+        print(f"{file}: {sweep.load(file).records()[-1]['trials']} inversions")
     return 0
 
 

@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.kernels.tags import Decimal
 from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import advance_bounded
-from gpbnb.kalman.kernels.step import STOPPED
+from gpbnb.kalman.kernels.bounded import advance_bound, widen
+from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED, advance
 from gpbnb.kalman.model import LinearModel
+
+_BLOCK = 256  # steps whose results are kept for the bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +84,64 @@ class BoundedRun(Run):
         if self.stopped or not len(z):
             return
         packed = self.as_packed(z)
-        values = packed if self.fmt is None else double_doubles(self.exactly(packed))
+        values = (packed if self.fmt is None else double_doubles(self.exactly(packed)))[:, :, np.newaxis]
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        outputs = (self.checkpoint_steps, (self.X, self.G, self.C), self.bounds, self.notes)
-        inputs = (self.tag, int(self.form), self.matrices, self._exact, self._plain)
+        for begin in range(0, len(packed), _BLOCK):
+            self._take_block(packed[begin : begin + _BLOCK], values[begin : begin + _BLOCK])
+            if self.stopped:
+                return
+
+    def _take_block(self, z: NDArray[Any], exact_z: NDArray[Any]) -> None:
+        """Take some steps, keep all that they give, and take the bound over them."""
+        first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
+        x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
+        x[0], P[0] = self.x, self.P
+        every, notes = np.arange(first + 1, first + len(z) + 1), self.notes.copy()
+        notes[NEXT_CHECKPOINT] = 0
+        failure: ArithmeticError | None = None
         try:
-            self.bound = advance_bounded(
-                *inputs, packed, values[:, :, np.newaxis], self.steps, self.x, self.P, self.bound, *outputs
+            advance(
+                self.tag, int(self.form), self.matrices, z, first, self.x, self.P, every, x[1:], K[1:], P[1:], notes
             )
-        except (OverflowError, ZeroDivisionError):
-            self.notes[STOPPED] = self.steps + 1
+        except (OverflowError, ZeroDivisionError) as error:
+            notes[STOPPED], failure = notes[DONE] + 1, error
+        done = int(notes[DONE]) - first
+        notes[NEXT_CHECKPOINT] = np.searchsorted(self.checkpoint_steps, notes[DONE], side="right")
+        saved = slice(at, notes[NEXT_CHECKPOINT])
+        rows = self.checkpoint_steps[saved] - first
+        self.X[saved], self.G[saved], self.C[saved], self.notes[:] = x[rows], K[rows], P[rows], notes
+        if self.stopped:
+            pivot = f"a zero pivot in the innovation covariance at step {self.stopped}"
+            self.reason = self.stopped_by(failure) if failure else pivot
+        if not done:
+            return
+        computed = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        try:
+            self.bound = advance_bound(
+                int(self.form),
+                self._exact,
+                self._plain,
+                exact_z[:done],
+                first,
+                *computed,
+                self.bound,
+                self.checkpoint_steps,
+                at,
+                self.bounds,
+            )
+        except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
+            self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
+
+
+def _widened(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """What the compiled loops of any format gave, (k, n, m) or (k, n, m, 2), as double-double."""
+    if packed.ndim == 3:
+        return np.stack([packed, np.zeros_like(packed)], axis=-1)
+    if packed.dtype == np.float64:
+        return np.ascontiguousarray(packed)
+    wide = np.empty(packed.shape)
+    widen(Decimal(1, True), packed, wide)  # of any precision
+    return wide
 
 
 def emulate_with_bound(

@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
@@ -95,6 +96,8 @@ def emulate(
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
     fused: bool = False,
+    sums: FloatFormat | FixedFormat | None = None,
+    compensated: bool = False,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
 
@@ -107,10 +110,11 @@ def emulate(
     true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
         errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
     fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
+    sums, compensated : as of :class:`~gpbnb.kalman.filter_run.Run`.
     """
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
-    run = Run(model, fmt, form, chosen, fused)
+    run = Run(model, fmt, form, chosen, fused, sums, compensated)
     run.take(measured)
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)

@@ -7,7 +7,6 @@ kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
@@ -385,14 +384,13 @@ def load(directory: Path = _HERE) -> tuple[Summary, ...]:
 
 def provenance(directory: Path = _HERE) -> dict[str, Any]:
     """How the sweep was made."""
-    found: dict[str, Any] = json.loads((directory / "ensembles.json").read_text(encoding="utf-8"))
-    return found
+    return sweeps.read_record(directory / "ensembles.json", COMMAND)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog=COMMAND, description="Random filters by thousands.")
     parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
-    parser.add_argument("--output", type=Path, default=_HERE, help="where ensembles.csv and ensembles.json go")
+    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="where the two files go")
     given = parser.parse_args(arguments)
     todo, start = tasks(given.repeats), time.perf_counter()
     outcomes = sweep(todo, progress=True)
@@ -407,9 +405,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "seconds": round(time.perf_counter() - start),
         **machine(),
     }
-    (given.output / "ensembles.json").write_text(
-        json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
+    sweeps.write_record(given.output / "ensembles.json", made)
     return 0
 
 

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, STOPPED, advance, prepare
+from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, QUANTITIES, STOPPED, advance, prepare
 from gpbnb.kalman.model import LinearModel
 
 
@@ -30,10 +31,13 @@ class Run:
     form : how a step is computed.
     checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in rising order.
     fused : whether products are added by fused multiply-add; base 2 or 16.
+    sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
+    compensated : whether the estimate is updated by Kahan's compensated summation, which carries what a step rounds
+        away over to the next; only for the innovation form and Joseph's.
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not rise.
+    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation in another form.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -44,6 +48,8 @@ class Run:
         form: Form,
         checkpoint_steps: Sequence[int],
         fused: bool = False,
+        sums: FloatFormat | FixedFormat | None = None,
+        compensated: bool = False,
     ) -> None:
         self.model, self.fmt, self.form = model, fmt, Form(form)
         self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
@@ -55,8 +61,10 @@ class Run:
             raise ValueError(
                 f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
             )
+        if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
+            raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
         #: In which arithmetic the compiled loops work.
-        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused)
+        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums)
         Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
@@ -76,7 +84,12 @@ class Run:
                 f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
                 "this format; use more digits, or add a little to the diagonals of Q and P0"
             )
-        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, identity)
+        increment = self.as_packed(model.Phi - np.eye(n, dtype=int) if compensated else np.zeros((0, n, n)))
+        self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
+        rest = (identity, increment, np.zeros_like(self.x), self._place)
+        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, *rest)
+        #: Why the run stopped, if it has.
+        self.reason = ""
 
     @property
     def steps(self) -> int:
@@ -104,8 +117,17 @@ class Run:
         outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
             advance(self.tag, int(self.form), self.matrices, packed, self.steps, self.x, self.P, *outputs)
-        except (OverflowError, ZeroDivisionError):
+        except (OverflowError, ZeroDivisionError) as error:
             self.notes[STOPPED] = self.steps + 1
+            self.reason = self.stopped_by(error)
+        else:
+            if self.stopped:
+                self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
+
+    def stopped_by(self, error: ArithmeticError) -> str:
+        """Name what ended the last step: "overflow in the gain at step 812"."""
+        kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
+        return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Numbers, each rounded into the format, as the compiled loops take them."""

@@ -26,8 +26,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.kalman.covariance import factor
 from gpbnb.kalman.kernels.simulation import measured
-from gpbnb.kalman.model import LinearModel, factor
+from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import BLOCK
 
 STATES = (

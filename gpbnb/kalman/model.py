@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from fractions import Fraction
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.covariance import Repair, check_covariance, in_floats, repaired
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,12 @@ class LinearModel:
     x0 : (n,), the first estimate.
     P0 : (n, n), its covariance, positive semidefinite.
     name : what tables and figures call it.
+    repair : whether to undo roundings in Q, R and P0, as :mod:`gpbnb.kalman.covariance` states. By default only in
+        those that are given in floats; covariances of strings, whole numbers and Fractions are taken at their word.
+
+    Attributes
+    ----------
+    repairs : what was changed; empty if nothing was.
 
     Raises
     ------
@@ -47,8 +53,14 @@ class LinearModel:
     x0: NDArray[Any]
     P0: NDArray[Any]
     name: str = "a linear model"
+    repair: bool | None = None
+    repairs: tuple[Repair, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
+        repairable = {
+            letter: in_floats(getattr(self, letter)) if self.repair is None else self.repair
+            for letter in ("Q", "R", "P0")
+        }
         for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
             try:
                 entries = exact(getattr(self, letter))
@@ -75,9 +87,15 @@ class LinearModel:
                 )
         if self.P0.shape != (n, n):
             raise ValueError(f"got P0 of shape {self.P0.shape}; needed ({n}, {n}), as x0 has {n} states")
-        for letter, matrices, strictly in (("Q", self.Q, False), ("R", self.R, True), ("P0", self.P0[None], False)):
-            for matrix in matrices:
-                _check_covariance(letter, matrix, strictly)
+        repairs: list[Repair] = []
+        for letter, strictly in (("Q", False), ("R", True), ("P0", False)):
+            matrices = getattr(self, letter)
+            if repairable[letter]:
+                object.__setattr__(self, letter, _repaired_cycle(letter, matrices, strictly, repairs))
+                continue
+            for matrix in matrices.reshape(-1, *matrices.shape[-2:]):
+                check_covariance(letter, matrix, strictly)
+        object.__setattr__(self, "repairs", tuple(repairs))
 
     @property
     def n(self) -> int:
@@ -112,50 +130,14 @@ class LinearModel:
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 
 
-def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Exact L and d of a symmetric matrix L diag(d) L', L lower with ones on its diagonal.
-
-    Raises
-    ------
-    ValueError : the matrix is not positive semidefinite.
-    """
-    rest, n = covariance.copy(), len(covariance)
-    lower = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
-    d = np.array([Fraction(0)] * n, dtype=object)
-    for j in range(n):
-        d[j] = rest[j, j]
-        if d[j] < 0 or (d[j] == 0 and np.any(rest[j + 1 :, j] != 0)):
-            raise ValueError("not positive semidefinite")
-        if d[j] > 0:
-            lower[j + 1 :, j] = rest[j + 1 :, j] / d[j]
-            rest[j + 1 :, j + 1 :] -= np.multiply.outer(lower[j + 1 :, j], rest[j, j + 1 :])
-    return lower, d
-
-
-def _check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None:
-    if np.any(matrix != matrix.T):
-        i, j = np.argwhere(matrix != matrix.T)[0]
-        raise ValueError(
-            f"got {letter} with {float(matrix[i, j])!r} at ({i}, {j}) and {float(matrix[j, i])!r} at ({j}, {i}); "
-            f"needed a symmetric matrix; take ({letter} + {letter}.T) / 2 if you mean their mean"
-        )
-    needed = "definite" if strictly else "semidefinite"
-    try:
-        definite = bool(np.all(factor(matrix)[1] > 0)) or not strictly
-    except ValueError:
-        definite = False
-    if not definite:
-        values = np.linalg.eigvalsh(matrix.astype(np.float64))
-        cure = ""
-        if not strictly and abs(values[0]) < 2.0**-10 * abs(
-            values[-1]
-        ):  # such as G @ G.T in floats, or stored in few bits
-            more = 2 * max(-values[0], 2.0**-52 * values[-1])
-            cure = (
-                "; it misses that by no more than roundings may: compute its entries as Fractions, or add a little to "
-                f"its diagonal, {more:.0e} or more"
-            )
-        raise ValueError(
-            f"got {letter} with a least eigenvalue near {values[0]:.3g}; needed a positive {needed} matrix: "
-            f"no variance may be {'zero or ' if strictly else ''}negative, in any direction{cure}"
-        )
+def _repaired_cycle(letter: str, matrices: NDArray[Any], strictly: bool, repairs: list[Repair]) -> NDArray[Any]:
+    """The covariances of a cycle, or the only one, each repaired where it needs to be; `repairs` gets the changes."""
+    result = []
+    for member, matrix in enumerate(matrices.reshape(-1, *matrices.shape[-2:])):
+        sound, changed = repaired(letter, member, matrix, strictly)
+        result.append(sound)
+        if changed is not None:
+            repairs.append(changed)
+    whole = np.array(result, dtype=object).reshape(matrices.shape)
+    whole.flags.writeable = False
+    return whole

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -13,7 +13,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
-from gpbnb.arithmetic.search import smallest_precision
+from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -22,7 +22,8 @@ from gpbnb.kalman.guarantee.bound import guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.simulation import Simulation
+from gpbnb.kalman.named import form_named, rounding_named, whole_number
+from gpbnb.kalman.simulation import Simulation, fine_resolution
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
@@ -33,13 +34,17 @@ class Requirement:
 
     Parameters
     ----------
-    fmt : None if no format with compiled loops meets the tolerance.
+    fmt : None if no format with compiled loops meets the tolerance, or if the largest precision tried misses it.
     basis : "emulation", what happened with these measurements; or "bound", what could at most have happened.
     steps : of the filter.
     tried : precision, and largest error over tolerance of all states and checkpoints; infinite where the run stopped, a
         variance was lost, or no bound exists.
-    why : of the largest precision tried that has no number for an error, why not; empty if all have one. Shown where it
-        kept the answer from being a smaller one.
+    why : of the largest precision below the answer that has no number for an error, why not; empty if all have one.
+        Shown where it kept the answer from being a smaller one.
+    form : of the filter.
+    irregular : precisions that meet the tolerance although a higher one was run and misses it; empty if all is regular.
+    advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
+    repairs : changes of the model's covariances, each as text.
     """
 
     fmt: FloatFormat | None
@@ -47,17 +52,46 @@ class Requirement:
     steps: int
     tried: tuple[tuple[int, float], ...]
     why: str = ""
+    form: Form | None = None
+    irregular: tuple[int, ...] = ()
+    advice: str = ""
+    repairs: tuple[str, ...] = ()
+
+    @property
+    def precision(self) -> int | None:
+        """Digits of the answer, or None."""
+        return None if self.fmt is None else self.fmt.precision
 
     def __str__(self) -> str:
+        notes = [*self.repairs]
+        if self.irregular:
+            missed = [digits for digits, ratio in self.tried if not ratio <= 1 and digits > self.irregular[0]]
+            notes.insert(0, f"{_listed(self.irregular)} digits meet it, but {_listed(missed)} do not")
+        if self.advice:
+            notes.append(self.advice)
+        end = "".join(f"; {note}" for note in notes)
         if self.fmt is None:
             most, why = self.tried[-1][0], f"; {self.why}" if self.why else ""
-            return f"no precision up to {most} digits meets the tolerance ({self.basis}, {self.steps} steps){why}"
+            met = "meets the tolerance reliably" if self.irregular else "meets the tolerance"
+            return f"no precision up to {most} digits {met} ({self.basis}, {self.steps} steps){why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
         return (
             f"{self.fmt.precision} digits of base {self.fmt.base}, {self.fmt.rounding.value}: "
-            f"{tried[self.fmt.precision]:.2g} of the tolerance ({self.basis}, {self.steps} steps){why}"
+            f"{tried[self.fmt.precision]:.2g} of the tolerance ({self.basis}, {self.steps} steps){why}{end}"
         )
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """Whole numbers in rising order as text, runs of three and more as ranges: "2, 5–8"."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    texts = [f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
+    return ", ".join(texts)
 
 
 def required_precision(
@@ -65,8 +99,8 @@ def required_precision(
     steps: int,
     tolerance: float | Sequence[float],
     base: int = 2,
-    rounding: Rounding = Rounding.NEAREST,
-    form: Form = Form.INNOVATION,
+    rounding: Rounding | str = Rounding.NEAREST,
+    form: Form | str = Form.INNOVATION,
     basis: Basis = "emulation",
     z: Any = None,
     seed: int = 0,
@@ -75,57 +109,78 @@ def required_precision(
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a tolerance.
 
-    A precision qualifies only if the next higher one also meets the tolerance. The search is a bisection, which assumes
-    that no precision above a qualifying one misses the tolerance. Whether or not that assumption holds, the answer and
-    the next higher precision were run and meet the tolerance; the next lower one, if any, was run and does not qualify.
+    The search is a bisection. It checks what it assumes: the answer, the next two precisions, and those of binary32 and
+    binary64 above it (:data:`gpbnb.arithmetic.search.CHECKED`) were run and meet the tolerance; the next lower one, if
+    any, was run and does not qualify. If a higher precision misses the tolerance, every precision up to the largest is
+    run, the answer lies above the highest that misses it, and the other forms are tried.
 
     Parameters
     ----------
+    model : with repaired covariances, the answer lists the repairs.
     tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
         accuracy does not matter an infinite tolerance.
     base : 2, 10 or 16.
+    rounding, form : or their names, such as "nearest" and "UD".
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
         the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
         contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
         asks for more digits. "guarantee" bounds the error for every measurement sequence within limits, and for ever
         (``guarantee``); "probable" takes three standard deviations of the error that independent
-        roundings would cause. Neither depends on `z` or `steps`.
+        roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
-    z : (steps, m), measurements; by default simulated by the model, from its first estimate.
+    z : (steps, m), measurements; by default simulated by the model, from its first estimate, and rounded to
+        :func:`gpbnb.kalman.simulation.fine_resolution`.
     seed : of the simulation.
     progress : show a bar, a tick a precision.
 
     Raises
     ------
-    ValueError : a tolerance that is not positive; another basis; a base without compiled loops; more or fewer
-        measurements than steps.
+    ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops; more
+        or fewer measurements than steps.
     """
-    tolerances = _checked(model, tolerance, base, form, basis)
-    if not isinstance(steps, (int, np.integer)) or steps < 1:
-        raise ValueError(f"got {steps!r} steps; needed a whole number, at least 1")
+    form, rounding = form_named(form), rounding_named(rounding)
+    tolerances = _checked(model, tolerance, base, basis)
+    steps = whole_number("steps", steps)
     for_ever = basis in ("guarantee", "probable")
     if for_ever and within is None:
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
     if z is None:
-        z = Simulation(model, tuple(model.x0.astype(np.float64)), seed, resolution=2.0**-30).measurements(steps)
+        z = Simulation(
+            model, tuple(model.x0.astype(np.float64)), whole_number("seed", seed, 0), fine_resolution(model)
+        ).measurements(steps)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
-    tried, why = dict[int, float](), dict[int, str]()
+
+    def errors_of(chosen: Form) -> Callable[[FloatFormat], tuple[float, str]]:
+        if within is not None and for_ever:
+            return lambda fmt: _guaranteed(model, fmt, chosen, within, tolerances, basis)
+        return lambda fmt: _error_over_tolerance(model, measured, fmt, chosen, checkpoint_steps, true, tolerances)
+
+    checks = () if for_ever else CHECKED[base]
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
+        found = Search(errors_of(form), base, rounding, checks, bar.update, bounds=basis == "bound")
+        advice = f"no bound exists in {_listed(found.undecided)} digits" if found.undecided else ""
+        if not for_ever and (found.irregular or found.fmt is None):
+            advice = _better_form(errors_of, form, base, rounding, checks, bar.update, basis == "bound")
+    repairs = tuple(str(each) for each in model.repairs)
+    return Requirement(found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs)
 
-        def meets(fmt: FloatFormat) -> bool:
-            if within is not None and for_ever:
-                ratio, reason = _guaranteed(model, fmt, form, within, tolerances, basis)
-            else:
-                ratio, reason = _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)
-            tried[fmt.precision], why[fmt.precision] = ratio, reason
-            bar.update()
-            return ratio <= 1
 
-        found = smallest_precision(meets, base, rounding, least=2, largest=LARGEST_PRECISION[base])
-    reasons = [f"in {digits} digits {reason}" for digits, reason in sorted(why.items()) if reason]
-    return Requirement(found, basis, int(steps), tuple(sorted(tried.items())), reasons[-1] if reasons else "")
+def _better_form(
+    errors_of: Callable[[Form], Callable[[FloatFormat], tuple[float, str]]],
+    form: Form,
+    base: int,
+    rounding: Rounding,
+    checks: Sequence[int],
+    tick: Callable[[], Any],
+    bounds: bool,
+) -> str:
+    """Advice: the form that meets the tolerance with the fewest digits; empty if none does."""
+    others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not form]
+    answers = [(other, Search(errors_of(other), base, rounding, checks, tick, bounds).fmt) for other in others]
+    met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
+    return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
 
 
 def survey(
@@ -134,8 +189,8 @@ def survey(
     tolerance: float | Sequence[float],
     precisions: Sequence[int],
     base: int = 2,
-    rounding: Rounding = Rounding.NEAREST,
-    form: Form = Form.INNOVATION,
+    rounding: Rounding | str = Rounding.NEAREST,
+    form: Form | str = Form.INNOVATION,
     basis: Basis = "emulation",
 ) -> tuple[tuple[int, float], ...]:
     """Run a filter in each of some precisions; arguments as of :func:`required_precision`.
@@ -148,7 +203,8 @@ def survey(
     ------
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
-    tolerances, measured = _checked(model, tolerance, base, form, basis), _measured(model, z)
+    form, rounding = form_named(form), rounding_named(rounding)
+    tolerances, measured = _checked(model, tolerance, base, basis), _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
@@ -162,7 +218,7 @@ def survey(
     )
 
 
-def _checked(model: LinearModel, tolerance: Any, base: int, form: Form, basis: str) -> NDArray[np.float64]:
+def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
     """The tolerance of each state, if all that was asked makes sense."""
     needed = f"needed an error above 0 for each of the {model.n} states, one finite"
     try:
@@ -179,8 +235,6 @@ def _checked(model: LinearModel, tolerance: Any, base: int, form: Form, basis: s
         raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
     if base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
-    if not isinstance(form, Form):
-        raise ValueError(f"got form {form!r}; needed one of {', '.join(f'Form.{each.name}' for each in Form)}")
     return np.broadcast_to(tolerances, (model.n,))
 
 
@@ -218,7 +272,7 @@ def _error_over_tolerance(
         return math.inf, str(error)
     run.take(measured)
     if run.stopped is not None:
-        return math.inf, f"the run stopped at step {run.stopped}, by a division by zero or a number out of range"
+        return math.inf, f"the run is refused: {run.reason}"
     if isinstance(run, BoundedRun):
         errors = run.bounds[0]
     elif true is not None:

@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.kalman.covariance import factor
 from gpbnb.kalman.kernels.simulation import measured
-from gpbnb.kalman.model import LinearModel, factor
+from gpbnb.kalman.model import LinearModel
 
 #: Steps whose noise one seeded generator draws, so that a run may begin again at any block.
 BLOCK = 4096
+
+#: Bits of a resolution that is fine beside the noise.
+FINE_BITS = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,19 +30,22 @@ class Simulation:
     model : says how the truth moves and is measured.
     start : (n,), the truth at step 0.
     seed : of the noise; block b is drawn by ``default_rng([seed, b])``.
-    resolution : measurements are rounded to its multiples, as by an analogue-to-digital converter.
+    resolution : measurements are rounded to its multiples, as by an analogue-to-digital converter; one number, or (m,).
     """
 
     model: LinearModel
     start: tuple[float, ...]
     seed: int
-    resolution: float
+    resolution: float | tuple[float, ...]
 
     def __post_init__(self) -> None:
         if len(self.start) != self.model.n:
             raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one a state")
-        if not 0 < self.resolution < math.inf:
-            raise ValueError(f"got resolution {self.resolution}; needed a number above 0")
+        given = np.asarray(self.resolution, dtype=np.float64)
+        if given.shape not in ((), (self.model.m,)) or not ((given > 0) & (given < math.inf)).all():
+            raise ValueError(
+                f"got resolution {self.resolution}; needed a number above 0, or {self.model.m}, one a measurement"
+            )
 
     @cached_property
     def _given(self) -> tuple[NDArray[np.float64], ...]:
@@ -61,7 +68,8 @@ class Simulation:
         v = rng.standard_normal((BLOCK, self.model.m))
         x, z = np.array(truth, dtype=np.float64), np.empty((min(steps, BLOCK), self.model.m))
         measured(*self._given, number * BLOCK, w, v, x, z)
-        return np.rint(z / self.resolution) * self.resolution, x
+        unit = np.asarray(self.resolution, dtype=np.float64)
+        return np.rint(z / unit) * unit, x
 
     def measurements(self, steps: int) -> NDArray[np.float64]:
         """The first measurements, (steps, m)."""
@@ -70,6 +78,16 @@ class Simulation:
             z, truth = self.block(number, truth, steps - number * BLOCK)
             blocks.append(z)
         return np.concatenate(blocks)
+
+
+def fine_resolution(model: LinearModel) -> tuple[float, ...]:
+    r"""A resolution far below the noise, in the units of each measurement; (m,).
+
+    :math:`2^{\lfloor\log_2\sqrt{R_{ii}}\rfloor - 30}` with the least variance of a cycle. A change of units by powers
+    of two changes it by the same powers, so that it changes no answer.
+    """
+    least = [min(float(R[i, i]) for R in model.R) for i in range(model.m)]
+    return tuple(2.0 ** ((math.frexp(variance)[1] - 1) // 2 - FINE_BITS) for variance in least)
 
 
 def _root(covariance: NDArray[Any]) -> NDArray[np.float64]:

@@ -184,7 +184,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog=SWEEP.command, description="A year for hundreds of measurement records.")
     parser.add_argument("--directory", type=Path, default=Path(".cache/threshold"), help="where progress is saved")
     parser.add_argument("--cells", type=int, default=len(CELLS), help="only so many of the cells")
-    parser.add_argument("--store", action="store_true", help="store the finished cells, and compute nothing")
+    parser.add_argument("--store", action="store_true", help="write the finished cells, and compute nothing")
+    parser.add_argument("--output", type=Path, help="folder for the table; by default where progress is saved")
     given = parser.parse_args(arguments)
     if not given.store:
         try:
@@ -192,7 +193,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
             return 130
-    SWEEP.store(SWEEP.finished(given.directory), SWEEP.seconds(given.directory))
+    folder = given.output or given.directory
+    folder.mkdir(parents=True, exist_ok=True)
+    SWEEP.store(SWEEP.finished(given.directory), SWEEP.seconds(given.directory), folder / SWEEP.file.name)
     return 0
 
 

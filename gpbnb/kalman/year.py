@@ -7,7 +7,6 @@ The command continues where it was interrupted. Its results are stored beside th
 from __future__ import annotations
 
 import argparse
-import json
 import platform
 import sys
 from collections.abc import Iterable, Sequence
@@ -163,7 +162,7 @@ def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = 
         "references": references,
         "cases": about,
     }
-    (to / "year.json").write_text(json.dumps(made, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    sweeps.write_record(to / "year.json", made)
 
 
 def machine() -> dict[str, Any]:
@@ -233,8 +232,7 @@ def _read(file: Path, columns: tuple[Column, ...]) -> dict[Case, NDArray[np.floa
 
 def provenance(directory: Path = _HERE) -> dict[str, Any]:
     """How the years were made."""
-    found: dict[str, Any] = json.loads((directory / "year.json").read_text(encoding="utf-8"))
-    return found
+    return sweeps.read_record(directory / "year.json", _COMMAND)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -242,7 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="where runs are saved on the way")
     parser.add_argument("--steps", type=int, default=YEAR, help="fewer, for a trial")
     parser.add_argument("--cases", type=int, default=len(CASES), help="only so many of the cases")
-    parser.add_argument("--output", type=Path, default=_HERE, help="where year.csv and year.json go")
+    parser.add_argument("--output", type=Path, default=Path(".cache/year"), help="where year.csv and year.json go")
     given = parser.parse_args(arguments)
     try:
         run_cases(CASES[: given.cases], given.directory, given.steps)

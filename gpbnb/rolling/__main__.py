@@ -1,8 +1,29 @@
-"""``python -m gpbnb.rolling``: simulate the years of all gyros again, and write ``drift_rates.csv``."""
+"""``python -m gpbnb.rolling``: simulate the years of all gyros again, and write ``drift_rates.csv`` to a folder."""
 
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from gpbnb.rolling.stored import SWEEP
 
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    parser = argparse.ArgumentParser(
+        prog=SWEEP.command, description="Simulate the drift rates of all gyros, about 40 s of processor time."
+    )
+    parser.add_argument(
+        "--output", type=Path, default=Path(".cache/drift_rates"), help="folder for drift_rates.csv and for progress"
+    )
+    given = parser.parse_args(arguments)
+    file = given.output / SWEEP.file.name
+    SWEEP.store(SWEEP.run(given.output), file=file)
+    print(file)
+    return 0
+
+
 if __name__ == "__main__":
-    SWEEP.store(SWEEP.run(Path(".cache/drift_rates")))
+    sys.exit(main())

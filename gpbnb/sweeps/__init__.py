@@ -3,7 +3,22 @@
 ``python -m gpbnb.sweeps verify`` computes a sample of every stored sweep again on this machine and compares.
 """
 
+from gpbnb.sweeps.numbers import plain_integer, plain_number
+from gpbnb.sweeps.record import read_record, write_record
 from gpbnb.sweeps.sweep import Difference, Sweep, machine
 from gpbnb.sweeps.table import Column, DamagedFileError, Table, read, write
 
-__all__ = ["Column", "DamagedFileError", "Difference", "Sweep", "Table", "machine", "read", "write"]
+__all__ = [
+    "Column",
+    "DamagedFileError",
+    "Difference",
+    "Sweep",
+    "Table",
+    "machine",
+    "plain_integer",
+    "plain_number",
+    "read",
+    "read_record",
+    "write",
+    "write_record",
+]

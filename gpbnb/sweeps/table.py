@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from gpbnb.sweeps.numbers import plain_integer, plain_number
+
 CHECK = "crc32"
 """Name of the last column."""
 
@@ -54,7 +56,7 @@ class Column:
         if self.kind == "text":
             return f"needed one of {', '.join(self.choices)}" if self.choices and text not in self.choices else None
         try:
-            value = int(text) if self.kind == "integer" else float(text)
+            value = plain_integer(text) if self.kind == "integer" else plain_number(text)
         except ValueError:
             return "needed an integer" if self.kind == "integer" else "needed a number"
         return None if self.low <= value <= self.high else f"needed {self.low:g} to {self.high:g}"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import math
+import time
 from dataclasses import replace
 from fractions import Fraction
 
@@ -275,3 +277,30 @@ def test_a_bad_header_is_refused(header, message):
 def test_bad_input_is_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("text", ["1_0", "٣", "1e999", "nan", "inf", "0x10", "１"])
+def test_only_plain_finite_numbers_are_read(text):
+    """Python's float reads the first two as 10 and 3."""
+    reading = theory.parse(f"name,kind,form,error_mas\nmast,random constant,bias,{text}\n")
+    assert not reading.budget.sources
+    assert [refused.line for refused in reading.refused] == [2]
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+mast", "-mast", "@mast", "'=1", "''-x", "'mast", "mast'"])
+def test_formulas_are_escaped_and_read_back(text):
+    source = Source(text, Kind.CONSTANT, ErrorForm.BIAS, -1.0, group=text, note=text)
+    written = theory.to_csv([source])
+    assert theory.parse(written).budget.sources == (source,)
+    cells = next(csv.reader(written.splitlines()[1:]))
+    assert not any(cell.startswith(("=", "+", "@")) for cell in cells)
+    assert sum(cell.startswith("-") for cell in cells) == 1  # the error, a number
+
+
+def test_reading_takes_time_in_proportion_to_the_rows():
+    """Twice 30,000 rows, with their shares: comparing each name with all others would take minutes."""
+    text = "name,kind,form,error_mas\n" + "".join(f"s{i},random constant,bias,0.5\n" for i in range(30_000))
+    begin = time.process_time()
+    budget = theory.parse(text).budget
+    assert math.fsum(map(budget.share, budget.sources)) == pytest.approx(1)
+    assert time.process_time() - begin < 10

@@ -5,7 +5,7 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_rgb, to_rgba
 
 from gpbnb.display import style
 
@@ -21,7 +21,40 @@ def test_panels_side_by_side_in_the_width_of_the_page(columns):
     fig, axes = style.figure(columns, height=4.2)
     assert axes.shape == (columns,)
     assert fig.axes == list(axes)
-    assert tuple(fig.get_size_inches()) == (8.0, 4.2)
+    assert tuple(fig.get_size_inches()) == (style.WIDTH, 4.2)
+
+
+def test_panels_one_below_the_other():
+    _, axes = style.figure(rows=3)
+    assert axes.shape == (3,)
+    tops = [ax.get_position().y1 for ax in axes]
+    assert tops == sorted(tops, reverse=True)
+    assert len({ax.get_position().x0 for ax in axes}) == 1
+
+
+def test_text_can_be_read_on_a_phone():
+    """A phone 390 pixels wide shows a figure 358 pixels wide."""
+    fig, (ax,) = style.figure()
+    style.label(ax, "x (no unit)", "y (no unit)", "a title")
+    ax.plot([1, 2], label="a line")
+    style.legend(ax)
+    named = style.name(ax, "a line", (1, 1), style.OBSERVED)
+    fig.canvas.draw()
+    texts = [ax.xaxis.label, ax.yaxis.label, ax.title, named, *ax.get_legend().get_texts()]
+    texts += [*ax.get_xticklabels(), *ax.get_yticklabels()]
+    assert min(text.get_fontsize() for text in texts) * 358 / (72 * fig.get_size_inches()[0]) >= 8
+
+
+@pytest.mark.parametrize(
+    ("shift", "alignment"),
+    [((6, 0), ("left", "center")), ((-6, 3), ("right", "bottom")), ((0, -4), ("center", "top"))],
+)
+def test_a_name_grows_away_from_its_curve(shift, alignment):
+    _, (ax,) = style.figure()
+    text = style.name(ax, "valid", (0.5, 0.5), style.VALID, shift)
+    assert (text.get_ha(), text.get_va()) == alignment
+    assert text.get_color() == style.VALID
+    assert (text.xy, text.get_position()) == ((0.5, 0.5), shift)
 
 
 def test_the_style_is_that_of_the_figure_only():
@@ -29,7 +62,7 @@ def test_the_style_is_that_of_the_figure_only():
     fig, axes = style.figure()
     assert dict(plt.rcParams) == before
     assert fig.get_layout_engine() is not None
-    assert to_rgb(fig.get_facecolor()) == (1, 1, 1)
+    assert to_rgba(fig.get_facecolor())[3] == to_rgba(axes[0].get_facecolor())[3] == 0
     assert not axes[0].spines["top"].get_visible()
     assert not axes[0].spines["right"].get_visible()
     assert axes[0].get_axisbelow()
@@ -53,11 +86,18 @@ def test_the_legend_has_no_frame():
 
 
 def test_no_two_colours_are_alike_and_all_stand_out_from_white():
-    colours = [style.OBSERVED, *style.OBSERVED_OTHERS, style.BOUND, style.STRICT, style.REFERENCE]
+    colours = [style.OBSERVED, *style.OBSERVED_OTHERS, style.VALID, style.REFUTED, style.STRICT, style.REFERENCE]
     rgb = np.array([to_rgb(colour) for colour in colours])
     distance = np.abs(rgb[:, None] - rgb).sum(axis=2)[np.triu_indices(len(rgb), 1)]
     assert distance.min() > 0.25
     assert (np.abs(rgb - 1).max(axis=1) > 0.5).all()
+
+
+@pytest.mark.parametrize("colour", [style.OBSERVED, style.VALID, style.REFUTED, style.REFERENCE])
+def test_words_in_the_main_colours_have_the_contrast_that_wcag_asks_for(colour):
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    assert 1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05) >= 4.5
 
 
 def test_every_curve_has_a_colour_and_a_marker_of_its_own():

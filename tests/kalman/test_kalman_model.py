@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.covariance import factor
 from gpbnb.kalman.gravity_probe_b import STATES, YEAR, gravity_probe_b
-from gpbnb.kalman.model import LinearModel, factor
+from gpbnb.kalman.model import LinearModel
 
 GOOD = {
     "Phi": [["0.9", "0.1"], [0, "0.8"]],

@@ -15,15 +15,16 @@ from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import log_spaced, reference
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
-from gpbnb.kalman.simulation import Simulation
+from gpbnb.kalman.simulation import Simulation, fine_resolution
 
 STEPS = 60
 MODEL = LinearModel(
     [["0.99", "0.1"], [0, "0.97"]], [[1, "0.3"]], [["1e-3", 0], [0, "2e-3"]], [["0.4"]], [3, -1], [[2, 0], [0, 1]]
 )
-Z = Simulation(MODEL, (3.0, -1.0), 0, resolution=2.0**-30).measurements(STEPS)
+Z = Simulation(MODEL, (3.0, -1.0), 0, fine_resolution(MODEL)).measurements(STEPS)
 
 
 @cache
@@ -123,14 +124,14 @@ MODELS = {
 def test_bisection_finds_what_trying_each_precision_finds(name, base, options):
     model, z = MODELS[name]
     if z is model:
-        z = Simulation(model, tuple(model.x0.astype(float)), 0, resolution=2.0**-30).measurements(40)
+        z = Simulation(model, tuple(model.x0.astype(float)), 0, fine_resolution(model)).measurements(40)
     largest = errors_in(model, z, base, options)
     for tolerance in (1e-1, 1e-4, 1e-7):
         found = required_precision(model, len(z), tolerance, base, z=z, **options)
         digits, met = upward(largest, tolerance, base)
         assert (found.fmt.precision if found.fmt else None) == digits
         assert all(met[t - 2] == (ratio <= 1) for t, ratio in found.tried if t - 2 < len(met))
-        assert len(found.tried) <= 8  # of up to 52
+        assert len(found.tried) <= 11  # of up to 52
 
 
 def test_a_lucky_precision_does_not_count(monkeypatch):
@@ -230,7 +231,7 @@ def test_its_own_measurements_are_seeded():
         ({"tolerance": ((1.0, 1.0),)}, r"of shape \(1, 2\)"),
         ({"tolerance": "small"}, "got tolerance 'small'; needed an error above 0 for each of the 2 states"),
         ({"tolerance": None}, "got tolerance None"),
-        ({"form": "ud"}, "got form 'ud'; needed one of Form.HUNG, .*Form.UD"),
+        ({"form": "square"}, "got form 'square'; needed one of Form.HUNG, .*Form.UD"),
         ({"steps": 0}, "got 0 steps; needed a whole number, at least 1"),
         ({"steps": 2.5}, "got 2.5 steps; needed a whole number"),
         ({"z": np.where(np.arange(60) == 7, np.nan, 1.0)[:, None]}, "got nan for measurement 0 of step 8; .*H a cycle"),
@@ -279,3 +280,84 @@ def test_an_answer_says_why_fewer_digits_were_refused():
     below = found.fmt.precision - 1
     assert (below in refused) == (f"; in {below} digits got Q with a least eigenvalue near -" in str(found))
     assert required_precision(MODEL, STEPS, 1e-3, z=Z).why == ""
+
+
+ALMOST_KNOWN = LinearModel([[1]], [["0.59"]], [[0]], [["1e-18"]], [0], [[10**4]], "a sensor far better than the prior")
+
+
+def test_an_answer_that_higher_precisions_miss_is_refused():
+    """50 and 51 bits keep this filter's variance positive, 52 and 53 do not."""
+    found = required_precision(ALMOST_KNOWN, 100, 0.1)
+    ratios = dict(found.tried)
+    assert ratios[50] <= 1
+    assert ratios[51] <= 1
+    assert ratios[53] == math.inf
+    assert found.fmt is None
+    assert found.precision is None
+    assert found.irregular == (50, 51)
+    assert "50, 51 digits meet it, but 52, 53 do not" in str(found)
+    assert "reliably" in str(found)
+    other = found.advice.split()[2]
+    assert required_precision(ALMOST_KNOWN, 100, 0.1, form=other).precision == int(found.advice.split()[-2])
+
+
+def test_an_answer_lies_above_every_precision_that_misses():
+    model = LinearModel(
+        [[1, "0.1"], [0, 1]], [["-0.09", "-0.26"]], [["1e-8", 0], [0, "1e-8"]], [["1e-23"]], [0, 0], 10**4 * np.eye(2)
+    )
+    found = required_precision(model, 100, 1e-3)
+    missed = [digits for digits, ratio in found.tried if not ratio <= 1]
+    assert found.irregular  # bisection alone would have stopped at one of these
+    assert found.precision == max(missed) + 1
+    assert set(range(found.irregular[0], 54)) <= {digits for digits, _ in found.tried}
+
+
+def test_the_precisions_of_processors_are_always_tried():
+    tried = {digits for digits, _ in required_precision(MODEL, STEPS, 1e-1, z=Z).tried}
+    assert {24, 53} <= tried
+
+
+def test_names_of_forms_and_roundings_are_taken():
+    by_name = required_precision(MODEL, 20, 1e-4, form="ud", rounding="chop", z=Z[:20])
+    assert by_name == required_precision(MODEL, 20, 1e-4, form=Form.UD, rounding=Rounding.CHOP, z=Z[:20])
+    assert by_name.precision == by_name.fmt.precision
+
+
+def in_other_units(model, states, measurements):
+    """The same filter with state i in units of 2**-states[i], and measurements likewise."""
+    x, y = (np.array([Fraction(2) ** power for power in powers]) for powers in (states, measurements))
+    return LinearModel(
+        model.Phi * np.multiply.outer(x, 1 / x),
+        model.H * np.multiply.outer(y, 1 / x),
+        model.Q * np.multiply.outer(x, x),
+        model.R * np.multiply.outer(y, y),
+        model.x0 * x,
+        model.P0 * np.multiply.outer(x, x),
+    )
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.JOSEPH, Form.UD, Form.HUNG])
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+@pytest.mark.parametrize("unit", [-40, 30])
+def test_answers_do_not_depend_on_units(basis, form, unit):
+    """Powers of two change no rounding, hence no answer: here a simulation in coarse steps did."""
+    other = in_other_units(MODEL, (unit, unit - 3), (unit + 5,))
+    tolerance = np.array([1e-4, 3e-4])
+    asked = {"basis": basis, "form": form}
+    first = required_precision(MODEL, STEPS, tolerance, **asked)
+    second = required_precision(other, STEPS, tolerance * 2.0 ** np.array([unit, unit - 3]), **asked)
+    assert first.fmt is not None
+    assert first.tried == second.tried
+
+
+@pytest.mark.parametrize("basis", ["guarantee", "probable"])
+def test_guarantees_do_not_depend_on_units(basis):
+    tolerance, state, innovation = np.array([1e-3, 1e-3]), np.array([100.0, 100.0]), np.array([20.0])
+    scale = 2.0 ** np.array([-40, -43])
+    other = in_other_units(MODEL, (-40, -43), (-35,))
+    first = required_precision(MODEL, 1, tolerance, basis=basis, within=limits(2, 1, state, innovation))
+    within = limits(2, 1, state * scale, innovation * 2.0**-35)
+    second = required_precision(other, 1, tolerance * scale, basis=basis, within=within)
+    assert first.fmt is not None
+    assert first.fmt == second.fmt
+    assert [ratio <= 1 for _, ratio in first.tried] == [ratio <= 1 for _, ratio in second.tried]

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from alterations import altered
 
+from gpbnb.ledger.checking import owners
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.finding import Verdict
 from gpbnb.ledger.registry import takes_statement
@@ -14,6 +15,7 @@ from gpbnb.ledger.statements import Statement, load_statements
 
 STATEMENTS = load_statements()
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
+TOPIC = owners(STATEMENTS)
 MOST = 5
 """Alterations tried of one statement; which ones depends on its id alone."""
 
@@ -40,12 +42,18 @@ def judged(statement):
     return checks.run(statement)
 
 
-WITH_FORM = [
-    statement for statement in STATEMENTS if statement.form and takes_statement(CHECKED[statement.id][statement.id])
-]
+# The checks of a topic share what they compute: one process runs them.
+WITH_FORM = pytest.mark.parametrize(
+    "statement",
+    [
+        pytest.param(each, id=each.id, marks=pytest.mark.xdist_group(f"alterations of {TOPIC[each.id]}"))
+        for each in STATEMENTS
+        if each.form and takes_statement(CHECKED[each.id][each.id])
+    ],
+)
 
 
-@pytest.mark.parametrize("statement", WITH_FORM, ids=lambda statement: statement.id)
+@WITH_FORM
 def test_no_altered_statement_is_judged_right(statement):
     right = []
     for name, other in some(statement).items():
@@ -58,7 +66,7 @@ def test_no_altered_statement_is_judged_right(statement):
     assert right == []
 
 
-@pytest.mark.parametrize("statement", WITH_FORM, ids=lambda statement: statement.id)
+@WITH_FORM
 def test_a_statement_has_enough_alterations(statement):
     words_alone = all("|" in part.text for part in statement.parts)
     enough = len(dict(altered(statement))) >= (1 if words_alone else 3)

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from gpbnb.ledger import __main__ as command
 from gpbnb.ledger import load_statements, rows, table
 from gpbnb.ledger.render import to_csv
 
@@ -26,16 +27,30 @@ DRIVER = (
 ROOT = Path(__file__).parents[2]
 
 
-def run(command, *arguments, tmp_path=None, **options):
-    path = os.pathsep.join(str(part) for part in (ROOT, tmp_path) if part)
-    environment = {**os.environ, "PYTHONPATH": path, "PYTHONIOENCODING": "ascii"}
-    return subprocess.run([sys.executable, *command, *arguments], capture_output=True, env=environment, **options)
+class Unclosed(io.BytesIO):
+    """Bytes that stay readable when the stream on top of them is closed."""
+
+    def close(self):
+        pass
 
 
 @pytest.fixture
-def ledger(tmp_path):
-    def call(topics, *arguments, **options):
-        return run(["-c", DRIVER, topics], *arguments, tmp_path=tmp_path, **options)
+def ledger(monkeypatch):
+    """The command in this process, which has loaded the checks of the package already."""
+
+    def call(topics, *arguments):
+        stdout, stderr = Unclosed(), Unclosed()
+        with monkeypatch.context() as patch:
+            patch.setattr(command, "TOPICS", made(*topics.split()))
+            patch.setattr(sys, "stdout", io.TextIOWrapper(stdout, encoding="ascii"))
+            patch.setattr(sys, "stderr", io.TextIOWrapper(stderr, encoding="ascii", errors="backslashreplace"))
+            try:
+                status = command.main(arguments)
+            except SystemExit as end:
+                status = end.code
+            sys.stdout.flush()
+            sys.stderr.flush()
+        return subprocess.CompletedProcess(arguments, status, stdout.getvalue(), stderr.getvalue())
 
     return call
 
@@ -49,7 +64,9 @@ def records(stdout):
 
 
 def test_the_command_itself_runs_the_topics_of_the_package():
-    done = run(["-m", "gpbnb.ledger"], "--format", "csv", "--document", "savage2016")
+    arguments = [sys.executable, "-m", "gpbnb.ledger", "--format", "csv", "--document", "savage2016"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(arguments, capture_output=True, env=environment, check=False)
     found = records(done.stdout)
     assert list(found[0]) == ["id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note"]
     assert [record["id"] for record in found] == [entry.id for entry in INVENTORY if entry.document == "savage2016"]
@@ -185,8 +202,8 @@ def test_a_reader_that_leaves_early_gets_no_traceback(complete, tmp_path, merged
     reading, writing = os.pipe()
     os.close(reading)
     errors = writing if merged else subprocess.PIPE
-    command = [sys.executable, "-c", DRIVER, complete]
-    done = subprocess.run(command, stdout=writing, stderr=errors, env=environment, check=False)
+    started = [sys.executable, "-c", DRIVER, complete]
+    done = subprocess.run(started, stdout=writing, stderr=errors, env=environment, check=False)
     os.close(writing)
     assert done.returncode == 1
     if not merged:
@@ -197,8 +214,8 @@ def test_a_progress_bar_on_a_terminal_only(complete, tmp_path):
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), str(tmp_path)])}
     main_end, terminal = pty.openpty()
     termios.tcsetwinsize(terminal, (24, 80))
-    command = [sys.executable, "-c", DRIVER, complete, "--document", "hung1984", "--chapter", "I"]
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=terminal, env=environment, check=False)
+    started = [sys.executable, "-c", DRIVER, complete, "--document", "hung1984", "--chapter", "I"]
+    done = subprocess.run(started, stdout=subprocess.PIPE, stderr=terminal, env=environment, check=False)
     os.close(terminal)
     shown = b""
     try:

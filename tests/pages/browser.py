@@ -77,6 +77,8 @@ def chromium() -> str | None:
 
 
 class QuietHandler(SimpleHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"  # connections stay open
+
     def log_message(self, *args: object) -> None:
         pass
 

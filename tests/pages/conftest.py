@@ -7,6 +7,7 @@ import pytest
 from . import browser as tools
 
 MISSING = tools.missing()
+APART = ("test_pages.py", "test_calculators.py")
 
 
 class Skipped(pytest.Module):
@@ -22,12 +23,21 @@ def pytest_pycollect_makemodule(module_path, parent):
 
 @pytest.fixture(scope="session")
 def open_page():
-    """Open a page of the book and wait for its formulas, if it does not lead elsewhere; `page.faults` collects."""
+    """Open a page of the book and wait for its formulas, if it does not lead elsewhere; `page.faults` collects.
+
+    Pages have their own settings and cache, unless they are `shared`: then scripts and fonts are loaded once.
+    """
     with tools.serve() as base, tools.launch() as browser:
+        contexts = {}
+
+        def new_context(size):
+            return browser.new_context(viewport=tools.SIZES[size], reduced_motion="reduce")
 
         @contextmanager
-        def open_page(address, size="desktop"):
-            context = browser.new_context(viewport=tools.SIZES[size], reduced_motion="reduce")
+        def open_page(address, size="desktop", shared=False):
+            if shared and size not in contexts:
+                contexts[size] = new_context(size)
+            context = contexts[size] if shared else new_context(size)
             page = context.new_page()
             page.faults = faults = []
             page.on("console", lambda m: faults.append(f"console: {m.text}") if m.type == "error" else None)
@@ -39,16 +49,27 @@ def open_page():
             if address:
                 page.evaluate(tools.SETTLED)
             yield page
-            context.close()
+            (page if shared else context).close()
 
         yield open_page
 
 
-# One page is opened at a time, and serves all tests of it.
-@pytest.fixture(scope="module", params=[(a, s) for a in tools.opened() for s in tools.SIZES], ids="-".join)
+EVERY = [pytest.param((a, s), marks=pytest.mark.xdist_group(f"{s} {a}")) for a in tools.opened() for s in tools.SIZES]
+
+
+# One page is opened at a time, and serves all tests of it, which run in one process.
+@pytest.fixture(scope="module", params=EVERY, ids="-".join)
 def page(request, open_page):
-    with open_page(*request.param) as page:
+    with open_page(*request.param, shared=True) as page:
         yield page
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Let several processes share the other tests of these files."""
+    for item in items:
+        if item.path.name in APART and item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(item.originalname))
 
 
 @pytest.fixture(scope="session")

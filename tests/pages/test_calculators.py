@@ -39,6 +39,22 @@ def fresh(calculators):
     return calculators
 
 
+@pytest.fixture(scope="module")
+def opened(open_page):
+    """The page as it is when it is opened."""
+    with open_page(ADDRESS) as page:
+        yield page
+
+
+@pytest.fixture(scope="module", params=tools.SIZES)
+def mistyped(request, open_page):
+    """The page with an error in each form."""
+    with open_page(ADDRESS, request.param) as page:
+        for calculator in forms.CALCULATORS:
+            field(page, calculator.id, calculator.inputs[0].name).fill("x")
+        yield page
+
+
 # -- numbers ---------------------------------------------------------------------------------------
 
 
@@ -256,18 +272,17 @@ def sentence(page, calculator):
 
 
 @CALCULATORS
-def test_begins_with_the_first_example_computed(open_page, calculator):
+def test_begins_with_the_first_example_computed(opened, calculator):
     example = next(iter(calculator.examples))
     computed = calculator.reference(calculator.values(example))
-    with open_page(ADDRESS) as page:
-        assert page.get_by_role("form", name=calculator.title).is_visible()
-        for line in calculator.lines:
-            for name in line.names:
-                assert cell(page, calculator.id, name).inner_text() == show(computed[name])
-        said = sentence(page, calculator.id).inner_text()
-        assert said
-        assert "{" not in said
-        assert page.faults == []
+    assert opened.get_by_role("form", name=calculator.title).is_visible()
+    for line in calculator.lines:
+        for name in line.names:
+            assert cell(opened, calculator.id, name).inner_text() == show(computed[name])
+    said = sentence(opened, calculator.id).inner_text()
+    assert said
+    assert "{" not in said
+    assert opened.faults == []
 
 
 @CALCULATORS
@@ -406,19 +421,15 @@ def test_what_changed_is_said_once_it_rests(fresh):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", list(tools.SIZES))
-def test_axe_finds_no_violation_among_errors(open_page, axe, size, scheme):
-    with open_page(ADDRESS, size) as page:
-        page.emulate_media(color_scheme=scheme)
-        page.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")
-        for calculator in forms.CALCULATORS:
-            field(page, calculator.id, calculator.inputs[0].name).fill("x")
-        page.evaluate("window.scrollTo(0, 0)")
-        page.wait_for_function("!document.querySelector('#pst-back-to-top')?.checkVisibility({opacityProperty: true})")
-        found = axe.run(page).response["violations"]
-        assert [f"{v['id']}: {node['target']}" for v in found for node in v["nodes"]] == []
-        page.evaluate("window.scrollTo(1000, 0)")
-        assert page.evaluate("window.scrollX") == 0
+def test_axe_finds_no_violation_among_errors(mistyped, axe, scheme):
+    mistyped.emulate_media(color_scheme=scheme)
+    mistyped.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")
+    mistyped.evaluate("window.scrollTo(0, 0)")
+    mistyped.wait_for_function("!document.querySelector('#pst-back-to-top')?.checkVisibility({opacityProperty: true})")
+    found = axe.run(mistyped).response["violations"]
+    assert [f"{v['id']}: {node['target']}" for v in found for node in v["nodes"]] == []
+    mistyped.evaluate("window.scrollTo(1000, 0)")
+    assert mistyped.evaluate("window.scrollX") == 0
 
 
 def test_the_figure_follows_the_width(open_page):

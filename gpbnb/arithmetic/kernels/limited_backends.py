@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 
@@ -24,6 +24,13 @@ _MODES: dict[Rounding, Any] = {
 _REACH = 320  # bits of exponent up to which products, quotients and their rests are normal float64
 _HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
 _UNLIMITED = 2**60  # exponent of base 10
+
+
+class Accumulator(Protocol):
+    """A format that can keep sums of products."""
+
+    def run_tag(self, fused: bool = False) -> tags.Tag:
+        """The arithmetic for a compiled loop."""
 
 
 class LimitedExact(Exact):
@@ -141,6 +148,30 @@ def run_tag(backend: Backend, rules: Rules, fused: bool) -> tags.Tag:
     if tag is None:
         raise ValueError(f"got fused multiply-add in {rules}; needed base 2 up to 52 digits, or 16 up to 13")
     return cast(tags.Limited, tag._replace(sums=tags.Fused()))
+
+
+def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
+    """The tag for sums of products that are kept in another arithmetic until they are stored.
+
+    Raises
+    ------
+    ValueError : one of the two is not on float64, or sums have fewer digits than what is stored.
+    """
+    for tag in (stored, sums):
+        if not isinstance(tag, tags.FLOATS) or isinstance(tag, tags.Mixed):
+            raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")
+    if _digits(sums) < _digits(stored):
+        raise ValueError(
+            f"got sums of {_digits(sums)} digits with numbers of {_digits(stored)}; needed at least as many digits "
+            "for sums as for numbers"
+        )
+    return tags.Mixed(stored, sums)
+
+
+def _digits(tag: tags.Tag) -> int:
+    if isinstance(tag, tags.Hardware32):
+        return 24
+    return tag.precision if isinstance(tag, tags.Binary | tags.Hexadecimal | tags.Limited) else 53
 
 
 @lru_cache(maxsize=256)

@@ -15,6 +15,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     check,
     compare,
     divide,
+    first_product,
     load,
     multiply,
     multiply_add,
@@ -75,7 +76,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
                 continue
             if fresh:
                 for j in range(b.shape[1]):
-                    put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (k, j))))
+                    put(fmt, c, (i, j), first_product(fmt, factor, load(fmt, b, (k, j))))
                 fresh = False
             else:
                 for j in range(b.shape[1]):
@@ -97,7 +98,7 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
                 continue
             if fresh:
                 for i in range(a.shape[0]):
-                    put(fmt, c, (i, j), multiply(fmt, load(fmt, a, (i, k)), factor))
+                    put(fmt, c, (i, j), first_product(fmt, load(fmt, a, (i, k)), factor))
                 fresh = False
             else:
                 for i in range(a.shape[0]):

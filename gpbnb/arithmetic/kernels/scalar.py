@@ -39,6 +39,7 @@ from gpbnb.arithmetic.kernels.tags import (
     Hardware64,
     Limited,
     LimitedDecimal,
+    Mixed,
     ShortDecimal,
 )
 
@@ -159,6 +160,21 @@ def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise _only_compiled("multiply_add")
 
 
+def first_product(fmt: Any, a: Any, b: Any) -> Any:
+    """fl(a * b), the first term of a sum of products; exact where the tag keeps such sums longer."""
+    raise _only_compiled("first_product")
+
+
+def stored_sum(fmt: Any, x: Any) -> Any:
+    """A sum of products as it is stored: rounded, where the tag keeps such sums longer."""
+    raise _only_compiled("stored_sum")
+
+
+def settle(fmt: Any, c: Any) -> None:
+    """Round a matrix of sums of products to what is stored; only ``Mixed`` has any to round."""
+    raise _only_compiled("settle")
+
+
 # -- plain float64 -----------------------------------------------------------------------------------
 
 
@@ -228,6 +244,8 @@ def _overloaded_fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 def _overload_two(stub: Callable[..., Any]) -> None:
     @overload(stub, strict=False, jit_options=_INLINE)
     def choose(fmt: Any, a: Any, b: Any) -> Any:
+        if _tag(fmt) is Mixed:
+            return lambda fmt, a, b: stub(fmt.stored, a, b)
         function = _implementation(fmt, stub.__name__)
         return None if function is None else lambda fmt, a, b: function(fmt, a, b)
 
@@ -237,6 +255,8 @@ def _overload_one(stub: Callable[..., Any], argument: str) -> None:
 
         @overload(stub, strict=False, jit_options=_INLINE)
         def choose_a(fmt: Any, a: Any) -> Any:
+            if _tag(fmt) is Mixed:
+                return lambda fmt, a: stub(fmt.stored, a)
             function = _implementation(fmt, stub.__name__)
             return None if function is None else lambda fmt, a: function(fmt, a)
 
@@ -244,6 +264,8 @@ def _overload_one(stub: Callable[..., Any], argument: str) -> None:
 
         @overload(stub, strict=False, jit_options=_INLINE)
         def choose_x(fmt: Any, x: Any) -> Any:
+            if _tag(fmt) is Mixed:
+                return lambda fmt, x: stub(fmt.stored, x)
             function = _implementation(fmt, stub.__name__)
             return None if function is None else lambda fmt, x: function(fmt, x)
 
@@ -270,6 +292,8 @@ def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
     # A fixed-point format has one negative number more.
     if _tag(fmt) is Limited:
         return lambda fmt, a: fmt.over if a > fmt.largest else a
+    if _tag(fmt) is Mixed:
+        return lambda fmt, a: _beyond_largest(fmt.stored, a)
     return lambda fmt, a: a
 
 
@@ -332,7 +356,31 @@ def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
         return lambda fmt, a, b, c: fused(fmt, a, b, c)
     if _tag(fmt) is ShortDecimal:
         return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
+    if _tag(fmt) is Mixed:
+        return lambda fmt, a, b, c: multiply_add(fmt.sums, a, b, c)
     return lambda fmt, a, b, c: add(fmt, c, multiply(fmt, a, b))
+
+
+@overload(first_product, strict=False, jit_options=_INLINE)
+def _overloaded_first_product(fmt: Any, a: Any, b: Any) -> Any:
+    if _tag(fmt) is Mixed:
+        return lambda fmt, a, b: multiply(fmt.sums, a, b)
+    return lambda fmt, a, b: multiply(fmt, a, b)
+
+
+@overload(stored_sum, strict=False, jit_options=_INLINE)
+def _overloaded_stored_sum(fmt: Any, x: Any) -> Any:
+    return (lambda fmt, x: round_(fmt.stored, x)) if _tag(fmt) is Mixed else lambda fmt, x: x
+
+
+@overload(settle, strict=False)
+def _overloaded_settle(fmt: Any, c: Any) -> Any:
+    def rounded(fmt: Any, c: Any) -> None:
+        for i in range(c.shape[0]):
+            for j in range(c.shape[1]):
+                c[i, j] = round_(fmt.stored, c[i, j])
+
+    return rounded if _tag(fmt) is Mixed else lambda fmt, c: None
 
 
 # -- arrays ------------------------------------------------------------------------------------------
@@ -404,10 +452,10 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
     n = len(x)
     if n == 0:
         return zero(fmt)
-    s = multiply(fmt, load(fmt, x, 0), load(fmt, y, 0))
+    s = first_product(fmt, load(fmt, x, 0), load(fmt, y, 0))
     for k in range(1, n):
         s = multiply_add(fmt, load(fmt, x, k), load(fmt, y, k), s)
-    return s
+    return stored_sum(fmt, s)
 
 
 @njit(nogil=True)
@@ -424,7 +472,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
         else:
             factor = load(fmt, a, (i, 0))
             for j in range(b.shape[1]):
-                put(fmt, c, (i, j), multiply(fmt, factor, load(fmt, b, (0, j))))
+                put(fmt, c, (i, j), first_product(fmt, factor, load(fmt, b, (0, j))))
         for k in range(1, a.shape[1]):
             factor = load(fmt, a, (i, k))
             for j in range(b.shape[1]):
@@ -434,7 +482,8 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @njit(nogil=True)
 def check(fmt: Any, c: Any) -> None:
-    """OverflowError if a number in the matrix c has left the range of its backend."""
+    """Settle the matrix c; OverflowError if a number in it has left the range of its backend."""
+    settle(fmt, c)
     gone = False
     for i in range(c.shape[0]):
         for j in range(c.shape[1]):

@@ -116,6 +116,13 @@ class Hardware64(NamedTuple):
     """IEEE binary64, ties to even, with its range, computed by the machine."""
 
 
+class Mixed(NamedTuple):
+    """Numbers of one arithmetic, whose sums of products are kept in another until they are stored; single float64."""
+
+    stored: Any
+    sums: Any
+
+
 class LimitedDecimal(NamedTuple):
     """Base 10, precision 1 to 18, with any rounding mode but the random one, and a range; numbers as of ``Decimal``."""
 
@@ -126,7 +133,7 @@ class LimitedDecimal(NamedTuple):
     flush: bool  # whether numbers below become zero; else they are beyond the backend
 
 
-FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64)  # whose numbers are single float64
+FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Mixed)  # whose numbers are single float64
 PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
 
 Tag = (
@@ -140,4 +147,5 @@ Tag = (
     | Hardware32
     | Hardware64
     | LimitedDecimal
+    | Mixed
 )

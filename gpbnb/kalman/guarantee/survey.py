@@ -7,7 +7,6 @@ of its rows, chosen at random, and compares them.
 from __future__ import annotations
 
 import argparse
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -19,13 +18,27 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman.guarantee.adversary import responses, run_against
 from gpbnb.kalman.guarantee.bound import closed_loops, from_schedule, limits
 from gpbnb.kalman.guarantee.linear import state_space
+from gpbnb.sweeps import Column, machine, read, write
 
 FILE = Path(__file__).with_name("survey.csv")
+COMMAND = "python -m gpbnb.kalman.guarantee.survey"
 ROWS = 2_000
 RANDOM, CONSTANT, CHOSEN = 40, 6, 5
 """Runs of each kind for a filter."""
 STEPS = 300
 _WHOLE = {"seed", "n", "m", "base", "precision", "runs"}
+COLUMNS = (
+    Column("seed", "integer", 0),
+    Column("n", "integer", 1, 4),
+    Column("m", "integer", 1, 2),
+    Column("base", "integer", choices=("2", "10")),
+    Column("precision", "integer", 3, 30),
+    Column("rounding", "text", choices=tuple(each.value for each in Rounding)),
+    Column("radius", "number", 0),
+    Column("runs", "integer", 0, RANDOM + CONSTANT + CHOSEN),
+    *(Column(kind, "number", 0) for kind in ("random", "constant", "chosen")),
+)
+"""Columns of the stored table."""
 
 
 class Row(NamedTuple):
@@ -77,11 +90,10 @@ def compute(seed: int) -> Row:
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
     """The stored rows."""
-    with file.open(encoding="utf-8", newline="") as stream:
-        return tuple(
-            Row(**{f: int(v) if f in _WHOLE else v for f, v in line.items()})  # type: ignore[arg-type]
-            for line in csv.DictReader(stream)
-        )
+    return tuple(
+        Row(**{name: int(value) if name in _WHOLE else value for name, value in line.items()})  # type: ignore[arg-type]
+        for line in read(file, COLUMNS, COMMAND).records()
+    )
 
 
 def sample(count: int, seed: int) -> list[tuple[Row, Row]]:
@@ -94,22 +106,20 @@ def sample(count: int, seed: int) -> list[tuple[Row, Row]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compute the survey, or recompute a sample of it; non-zero if that differs."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Emulated runs against guarantees.")
     parser.add_argument("--sample", type=int, default=0, help="rows to recompute and compare")
     parser.add_argument("--seed", type=int, default=0, help="which rows")
-    parser.add_argument("--rows", type=int, default=ROWS)
+    parser.add_argument("--rows", type=int, default=ROWS, help="how many to compute")
+    parser.add_argument("--output", type=Path, default=Path(".cache/guarantee"), help="folder for survey.csv")
     given = parser.parse_args(arguments)
     if given.sample:
         different = sample(given.sample, given.seed)
         for stored, again in different:
             print(f"stored {stored}, recomputed {again}")
         return bool(different)
-    with FILE.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(Row._fields)
-        for seed in tqdm(range(given.rows)):
-            writer.writerow(compute(seed))
-            stream.flush()
+    rows = [tuple(map(str, compute(seed))) for seed in tqdm(range(given.rows))]
+    given.output.mkdir(parents=True, exist_ok=True)
+    write(given.output / FILE.name, COLUMNS, rows, {"command": COMMAND, **machine()})
     return 0
 
 

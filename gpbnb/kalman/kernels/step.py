@@ -36,12 +36,25 @@ from gpbnb.arithmetic.kernels.scalar import (
     zero,
 )
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.compensated import compensated_update
 
 _HUNG, _HUNG_SECOND_GAIN, _INNOVATION, _JOSEPH, _UD = (int(each) for each in Form)
 
 #: Entries of the status of a run: steps done, the next checkpoint, the first step with a variance or pivot that is
 #: not positive, and the step that a division by zero ended.
 DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
+
+#: What a step computes, in this order; a run that overflows says where.
+QUANTITIES = (
+    "the predicted covariance",
+    "the innovation covariance",
+    "its inverse",
+    "the gain",
+    "the covariance",
+    "the estimate",
+    "the update of factors and estimate",
+)
+_PREDICTED, _OF_INNOVATION, _INVERSE, _GAIN, _COVARIANCE, _ESTIMATE, _FACTORS = range(len(QUANTITIES))
 
 
 @njit(nogil=True)
@@ -189,14 +202,16 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
 
     Returns 1 if all variances and pivots are positive, -1 if one is not, 0 if one is zero: x is then void.
     """
-    Phi, PhiT, H, HT, Q, R, RI, UQ, UR, identity = model
+    Phi, PhiT, H, HT, Q, R, RI, UQ, UR, identity, increment, carried, place = model
     (V, T, W, F, WT), (K, PHt, B), (KT, HD), (S, SI, pivots), (y, g, u, v), stacked = work
     phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
     phiT, hT = PhiT[k % Phi.shape[0]], HT[k % H.shape[0]]
     answer = 1
+    place[0] = _PREDICTED
     if form == _UD:
         if not _predict_ud(fmt, phi, UQ[k % Q.shape[0]], P, stacked[0], stacked[1], stacked[2], T):
             answer = -1
+        place[0] = _FACTORS
         product(fmt, phi, x, u)
         copy(fmt, u, x)
         ur = UR[k % R.shape[0]]
@@ -211,14 +226,18 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
     product(fmt, phi, P, T)
     product_by_sparse(fmt, T, phiT, V)
     matrix_sum(fmt, V, Q[k % Q.shape[0]], V)
+    place[0] = _OF_INNOVATION
     product_by_sparse(fmt, V, hT, PHt)
     product(fmt, h, PHt, S)
     matrix_sum(fmt, S, r, S)
+    place[0] = _INVERSE
     copy(fmt, S, pivots)
     answer = inverse(fmt, pivots, SI)
     if answer == 0:
         return 0
+    place[0] = _GAIN
     product(fmt, PHt, SI, K)
+    place[0] = _COVARIANCE
     product_by_sparse(fmt, K, h, T)
     difference(fmt, identity, T, W)
     if form == _JOSEPH:
@@ -232,20 +251,25 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
     else:
         product(fmt, W, V, P)
     if form == _HUNG_SECOND_GAIN:
+        place[0] = _GAIN
         product_by_sparse(fmt, P, hT, B)
         product(fmt, B, RI[k % R.shape[0]], K)
         product_by_sparse(fmt, K, h, T)
         difference(fmt, identity, T, W)
-    if form in (_HUNG, _HUNG_SECOND_GAIN):
-        product_by_sparse(fmt, W, phi, F)
-        product(fmt, F, x, u)
-        product(fmt, K, z, v)
+    place[0] = _ESTIMATE
+    if increment.shape[0] > 0:
+        compensated_update(fmt, increment[k % Phi.shape[0]], h, K, z, x, carried, v, u, y, g)
     else:
-        product(fmt, phi, x, u)
-        product(fmt, h, u, y)
-        difference(fmt, z, y, g)
-        product(fmt, K, g, v)
-    matrix_sum(fmt, u, v, x)
+        if form in (_HUNG, _HUNG_SECOND_GAIN):
+            product_by_sparse(fmt, W, phi, F)
+            product(fmt, F, x, u)
+            product(fmt, K, z, v)
+        else:
+            product(fmt, phi, x, u)
+            product(fmt, h, u, y)
+            difference(fmt, z, y, g)
+            product(fmt, K, g, v)
+        matrix_sum(fmt, u, v, x)
     for i in range(x.shape[0]):
         if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
             answer = -1

@@ -1,0 +1,34 @@
+"""Compiled: the update of the state by compensated (Kahan) summation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit
+
+from gpbnb.arithmetic.kernels.matrices import copy, difference, matrix_sum, product
+
+
+@njit(nogil=True)
+def compensated_update(
+    fmt: Any, increment: Any, h: Any, K: Any, z: Any, x: Any, carried: Any, d: Any, u: Any, y: Any, g: Any
+) -> None:
+    """Add (Phi - I) x + K (z - H Phi x) to x, and keep what the addition rounded away for the next step.
+
+    Parameters
+    ----------
+    increment : Phi - I, rounded.
+    carried : what the estimate has too much, from the step before and for the next.
+    d, u, y, g : workspaces of the sizes of x, x, z and z.
+    """
+    product(fmt, increment, x, d)
+    matrix_sum(fmt, x, d, u)
+    product(fmt, h, u, y)
+    difference(fmt, z, y, g)
+    product(fmt, K, g, u)
+    matrix_sum(fmt, d, u, d)
+    difference(fmt, d, carried, d)
+    matrix_sum(fmt, x, d, u)
+    difference(fmt, u, x, carried)
+    difference(fmt, carried, d, carried)
+    copy(fmt, u, x)

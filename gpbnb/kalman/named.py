@@ -1,0 +1,72 @@
+"""Arguments as users write them: forms and roundings by name, whole numbers."""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from gpbnb.arithmetic.formats import Rounding
+from gpbnb.kalman.forms import Form
+
+
+def form_named(form: Form | str) -> Form:
+    """A form, or the form of this name; capitals, blanks and hyphens do not count.
+
+    Raises
+    ------
+    ValueError : no such form.
+
+    Examples
+    --------
+    >>> form_named("ud")
+    <Form.UD: 4>
+    """
+    if isinstance(form, Form):
+        return form
+    if isinstance(form, str):
+        wanted = form.strip().upper().replace(" ", "_").replace("-", "_")
+        for each in Form:
+            if wanted in (each.name, str(each).upper()):
+                return each
+    raise ValueError(f"got form {form!r}; needed one of {', '.join(f'Form.{each.name}' for each in Form)}, or its name")
+
+
+def rounding_named(rounding: Rounding | str) -> Rounding:
+    """A rounding, or the rounding of this name.
+
+    Raises
+    ------
+    ValueError : no such rounding.
+
+    Examples
+    --------
+    >>> rounding_named("nearest")
+    <Rounding.NEAREST: 'nearest'>
+    """
+    if isinstance(rounding, Rounding):
+        return rounding
+    if isinstance(rounding, str):
+        wanted = rounding.strip().lower().replace("_", " ")
+        for each in Rounding:
+            if wanted in (each.value.lower(), each.name.lower().replace("_", " ")):
+                return each
+    names = ", ".join(repr(each.value) for each in Rounding)
+    raise ValueError(f"got rounding {rounding!r}; needed a Rounding or one of {names}")
+
+
+def whole_number(name: str, value: Any, least: int = 1) -> int:
+    """A whole number that is not below `least`; True and False are no numbers.
+
+    Raises
+    ------
+    ValueError : anything else.
+    """
+    if not isinstance(value, bool):
+        try:
+            number = operator.index(value)
+        except TypeError:
+            pass
+        else:
+            if number >= least:
+                return number
+    raise ValueError(f"got {value!r} {name}; needed a whole number, at least {least}")

@@ -1,0 +1,45 @@
+"""Numbers in text files: ASCII digits only, without the underscores and foreign digits that Python itself reads."""
+
+from __future__ import annotations
+
+import re
+
+_INTEGER = re.compile(r"[+-]?[0-9]+")
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?inf|nan", re.ASCII)
+
+
+def plain_integer(text: str) -> int:
+    """Read a whole number in ASCII digits.
+
+    Raises
+    ------
+    ValueError : anything else, such as ``1_0`` or ``٣``.
+
+    Examples
+    --------
+    >>> plain_integer("-12")
+    -12
+    """
+    if not _INTEGER.fullmatch(text):
+        raise ValueError(f"got {text!r}; needed a whole number such as 12, in the digits 0 to 9")
+    return int(text)
+
+
+def plain_number(text: str) -> float:
+    """Read a decimal number in ASCII digits; or ``inf`` or ``nan``, but no number that only float64 makes infinite.
+
+    Raises
+    ------
+    ValueError : anything else, such as ``1_0``, ``٣`` or ``1e999``.
+
+    Examples
+    --------
+    >>> plain_number("1.5e-3")
+    0.0015
+    """
+    if not _NUMBER.fullmatch(text):
+        raise ValueError(f"got {text!r}; needed a number such as -1.5 or 2e-3, in the digits 0 to 9")
+    value = float(text)
+    if abs(value) == float("inf") and "inf" not in text:
+        raise ValueError(f"got {text!r}; needed a number that float64 holds, below 1.8e308")
+    return value

@@ -1,0 +1,60 @@
+"""A stored record: a JSON file with a checksum, checked when it is read."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gpbnb.sweeps.table import DamagedFileError
+
+CHECK = "sha256"
+"""Key of the checksum; it covers everything else."""
+
+
+def write_record(file: Path, values: Mapping[str, Any]) -> None:
+    """Write a record; all of it, or nothing."""
+    draft = file.with_suffix(".draft")
+    whole = {CHECK: _digest(values), **values}
+    draft.write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8", newline="")
+    draft.replace(file)
+
+
+def read_record(file: Path, cure: str) -> dict[str, Any]:
+    """Read a record and check all of it.
+
+    Parameters
+    ----------
+    cure : the command that computes the file again; part of every message.
+
+    Raises
+    ------
+    DamagedFileError : the file is not as it was written; the message names the line, as far as there is one.
+    """
+
+    def damaged(line: int, problem: str) -> DamagedFileError:
+        return DamagedFileError(
+            f"{file.parent.name}/{file.name}, line {line}: {problem}. Restore the file from the repository, or compute "
+            f"it again: {cure}"
+        )
+
+    try:
+        found = json.loads(file.read_bytes().decode("utf-8"))
+    except FileNotFoundError:
+        raise damaged(1, "the file is missing") from None
+    except UnicodeDecodeError as error:
+        raise damaged(1, f"the file is not UTF-8: {error}") from None
+    except json.JSONDecodeError as error:
+        raise damaged(error.lineno, f"the file is not JSON: {error.msg}") from None
+    if not isinstance(found, dict) or CHECK not in found:
+        raise damaged(1, f"the entry {CHECK!r} is missing")
+    check = found.pop(CHECK)
+    if check != _digest(found):
+        raise damaged(1, f"the checksum of the file is {_digest(found)}, not {check}: some value differs")
+    return found
+
+
+def _digest(values: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(values, ensure_ascii=False).encode()).hexdigest()

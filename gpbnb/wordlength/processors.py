@@ -1,0 +1,211 @@
+"""The same filters on different processors: formats with a range, wide sums, fused operations, compensated updates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.named import BFLOAT16, BINARY32
+from gpbnb.kalman.emulation import compare_runs
+from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.model import LinearModel
+
+Format = FloatFormat | FixedFormat
+
+
+@dataclass(frozen=True)
+class Processor:
+    """How a processor computes.
+
+    Parameters
+    ----------
+    name : what tables call it.
+    fmt : the format of stored numbers and of results.
+    sums : the format that keeps the sums of matrix products until they are stored; `fmt` by default.
+    fused : whether products are added by fused multiply-add.
+    compensated : whether the program updates the estimate by Kahan's compensated summation.
+    """
+
+    name: str
+    fmt: Format
+    sums: Format | None = None
+    fused: bool = False
+    compensated: bool = False
+
+
+#: A microcontroller with single precision, an accelerator with and without wide sums, and 16-bit fixed point.
+PROCESSORS = (
+    Processor("Cortex-M4F, binary32", BINARY32),
+    Processor("accelerator, bfloat16 with binary32 sums", BFLOAT16, sums=BINARY32),
+    Processor("bfloat16 alone", BFLOAT16),
+    Processor("16-bit fixed point, 9 bits before the point", FixedFormat(9, 6, Rounding.EVEN)),
+)
+
+
+def variants(precision: int) -> tuple[Processor, ...]:
+    """One precision with the properties of processors added one by one; the first is Hung's arithmetic.
+
+    The range is that of binary32.
+    """
+    away, even = FloatFormat(2, precision), FloatFormat(2, precision, Rounding.EVEN)
+    ranged = FloatFormat(2, precision, Rounding.EVEN, emin=-126, emax=127)
+    found = [
+        Processor("ties away from zero, any exponent", away),
+        Processor("ties to even", even),
+        Processor("and the range of binary32", ranged),
+        Processor("and fused multiply-add", ranged, fused=True),
+    ]
+    if precision < BINARY32.precision:
+        found.append(Processor("and binary32 sums instead", ranged, sums=BINARY32))
+    return (
+        *found,
+        Processor("and a compensated update instead", ranged, compensated=True),
+        Processor("chopped, any exponent", FloatFormat(2, precision, Rounding.CHOP)),
+    )
+
+
+class Outcome(NamedTuple):
+    """What a filter does on a processor: the largest error of each state, or why it is refused."""
+
+    processor: Processor
+    error: NDArray[np.float64]
+    refused: str
+
+
+def outcome(
+    model: LinearModel, z: Any, processor: Processor, form: Form = Form.INNOVATION, true: Checkpoints | None = None
+) -> Outcome:
+    """Run a filter on a processor and compare it with the filter as given, in double-double.
+
+    Errors of storing the model and the measurements are included.
+
+    Parameters
+    ----------
+    z : (steps, m).
+    true : the reference at :func:`~gpbnb.kalman.filter_run.log_spaced` steps, 16 a decade, if it is known.
+    """
+    steps = log_spaced(len(z), 16)
+    nothing = np.full(model.n, math.inf)
+    options = {"fused": processor.fused, "sums": processor.sums, "compensated": processor.compensated}
+    try:
+        run = Run(model, processor.fmt, form, steps, **options)  # type: ignore[arg-type]
+        run.take(processor.fmt.array(z))
+    except OverflowError as error:
+        return Outcome(processor, nothing, f"overflow in the model or the measurements: {error}")
+    except ValueError as error:
+        return Outcome(processor, nothing, str(error))
+    if run.stopped is not None:
+        return Outcome(processor, nothing, run.reason)
+    history = compare_runs(run, reference(model, z, steps) if true is None else true)
+    if run.indefinite is not None:
+        return Outcome(processor, nothing, f"a computed variance was not positive at step {run.indefinite}")
+    return Outcome(processor, np.abs(history.state).max(axis=0), "")
+
+
+def typical_errors(
+    model: LinearModel,
+    records: Sequence[Any],
+    processors: Sequence[Processor],
+    form: Form = Form.INNOVATION,
+) -> NDArray[np.float64]:
+    """Root mean square, over records, of the largest error of each state; (processors, n), infinite where refused."""
+    squares = np.zeros((len(processors), model.n))
+    for z in records:
+        true = reference(model, z, log_spaced(len(z), 16))
+        squares += np.array([outcome(model, z, each, form, true).error for each in processors]) ** 2
+    return np.asarray(np.sqrt(squares / len(records)))
+
+
+def by_arrays(
+    model: LinearModel, z: Any, processor: Processor, order: linalg.Order = "left", block: int = 32
+) -> NDArray[Any]:
+    """The innovation form written with arrays, slowly, for any order of summation; one measurement or more a step.
+
+    With the order "left" it gives the digits of :class:`~gpbnb.kalman.filter_run.Run`; a test compares them.
+
+    Returns
+    -------
+    estimates : (steps, n), exact Fractions.
+    """
+    fmt, n = processor.fmt, model.n
+    Phi, H, Q, R = ([fmt.array(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R))
+    increments = [fmt.array(each - np.eye(n, dtype=int)) for each in model.Phi]
+    x, P = fmt.array(model.x0.reshape(n, 1)), fmt.array(model.P0)
+    carried, identity = fmt.array(np.zeros((n, 1))), fmt.array(np.eye(n))
+
+    def times(a: FloatArray, b: FloatArray) -> FloatArray:
+        return linalg.matmul(a, b, order, processor.fused, block, processor.sums)
+
+    estimates = []
+    for k, measured in enumerate(fmt.array(z)):
+        phi, h, q, r = (each[k % len(each)] for each in (Phi, H, Q, R))
+        V = times(times(phi, P), phi.T) + q
+        PHt = times(V, h.T)
+        K = times(PHt, _inverse(times(h, PHt) + r))
+        P = times(identity - times(K, h), V)
+        if processor.compensated:
+            d = times(increments[k % len(increments)], x)
+            d = (d + times(K, measured[:, np.newaxis] - times(h, x + d))) - carried
+            total = x + d
+            carried, x = (total - x) - d, total
+        else:
+            u = times(phi, x)
+            x = u + times(K, measured[:, np.newaxis] - times(h, u))
+        estimates.append(x[:, 0].to_fractions())
+    return np.array(estimates, dtype=object)
+
+
+def _inverse(a: FloatArray) -> FloatArray:
+    return linalg.inv(a)
+
+
+class Sum(NamedTuple):
+    """How an integrator adds its increments."""
+
+    name: str
+    add: Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+def integrators() -> tuple[Sum, ...]:
+    """An integrator on several processors: increments (samples, paths) in, sums (paths,) out."""
+    fixed = FixedFormat(1, 14)
+    return (
+        Sum("Cortex-M4F, binary32", lambda x: _left(BINARY32, BINARY32, x)),
+        Sum("accelerator, bfloat16 with binary32 sums", lambda x: _left(BFLOAT16, BINARY32, x)),
+        Sum("bfloat16 alone", lambda x: _left(BFLOAT16, BFLOAT16, x)),
+        Sum("bfloat16 alone, compensated", lambda x: compensated_sum(BFLOAT16.array(x))),
+        Sum(
+            "bfloat16 alone, stochastic rounding",
+            lambda x: _left(BFLOAT16, replace(BFLOAT16, rounding=Rounding.STOCHASTIC, seed=704), x),
+        ),
+        Sum("16-bit fixed point, nearest", lambda x: _left(fixed, fixed, x)),
+        Sum("16-bit fixed point, floor", lambda x: _left(*2 * (replace(fixed, rounding=Rounding.DOWN),), x)),
+        Sum("Apollo's 15 bits, chopped", lambda x: _left(*2 * (FixedFormat(1, 13, Rounding.CHOP),), x)),
+    )
+
+
+def _left(stored: Format, kept: Format, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    if isinstance(kept, FloatFormat):
+        kept.restart()
+    return np.asarray(kept.array(stored.array(x)).sum(axis=0).to_float())
+
+
+def compensated_sum(x: FloatArray) -> NDArray[np.float64]:
+    """Kahan's sum along the first axis, each operation rounded in the format of the array."""
+    total = x[0]
+    carried = total - total
+    for each in x[1:]:
+        d = each - carried
+        new = total + d
+        carried, total = (new - total) - d, new
+    return np.asarray(total.to_float())

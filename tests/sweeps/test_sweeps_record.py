@@ -1,0 +1,60 @@
+"""gpbnb.sweeps.record and numbers: damaged records and numbers that only Python reads are refused."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from gpbnb.sweeps import Column, DamagedFileError, plain_integer, plain_number, read_record, write_record
+
+VALUES = {"command": "python -m x", "seconds": 1.5, "names": ["é", "b"], "nothing": None}
+
+
+def test_a_record_is_read_as_it_was_written(tmp_path):
+    write_record(tmp_path / "a.json", VALUES)
+    assert read_record(tmp_path / "a.json", "cure") == VALUES
+
+
+def test_every_damage_of_a_record_is_an_error_with_file_and_cure(tmp_path):
+    file = tmp_path / "a.json"
+    write_record(file, VALUES)
+    good = file.read_bytes()
+    for at in range(len(good) - 1):  # a record cut anywhere
+        file.write_bytes(good[:at])
+        with pytest.raises(DamagedFileError, match=r"a.json, line \d+: .*python -m cure"):
+            read_record(file, "python -m cure")
+    for old, new in (("1.5", "1.25"), ("python -m x", "python -m y"), ('"b"', '"b", "c"')):
+        file.write_bytes(good.replace(old.encode(), new.encode()))
+        with pytest.raises(DamagedFileError, match="checksum"):
+            read_record(file, "python -m cure")
+    file.unlink()
+    with pytest.raises(DamagedFileError, match="missing"):
+        read_record(file, "python -m cure")
+
+
+def test_a_record_without_a_checksum_is_refused(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps(VALUES), encoding="utf-8")
+    with pytest.raises(DamagedFileError, match="'sha256' is missing"):
+        read_record(tmp_path / "a.json", "cure")
+
+
+@pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "1e999", "0x1", "1e", ".", "--1", "infinity"])
+def test_what_is_no_plain_number(text):
+    with pytest.raises(ValueError, match="needed"):
+        plain_number(text)
+    assert Column("a").fault(text)
+    assert Column("a", "integer").fault(text)
+
+
+@pytest.mark.parametrize(("text", "value"), [("1", 1.0), ("-1.5e-3", -0.0015), ("+.5", 0.5), ("-inf", -math.inf)])
+def test_plain_numbers(text, value):
+    assert plain_number(text) == value
+    assert Column("a", low=0, high=1).fault("nan") == "needed 0 to 1"
+
+
+@pytest.mark.parametrize("text", ["1.0", "1_0", "٣", "1e3"])
+def test_what_is_no_plain_integer(text):
+    with pytest.raises(ValueError, match="needed a whole number"):
+        plain_integer(text)

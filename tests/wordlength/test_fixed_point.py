@@ -1,0 +1,128 @@
+"""Constant-coefficient filters in fixed point: emulation, guarantee, scaling."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.kernels.rules import Rounding
+from gpbnb.kalman.guarantee.linear import biquad, controller
+from gpbnb.kalman.guarantee.program import steps_in_python
+from gpbnb.kalman.simulation import Simulation
+from gpbnb.wordlength import examples, fixed_point
+from gpbnb.wordlength.fixed_point import ScaledFilter
+
+MODES = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
+
+
+def tracked() -> tuple[ScaledFilter, np.ndarray[Any, Any]]:
+    model = examples.tracker()
+    z = Simulation(model, (5.0, 1.0), 0, resolution=2.0**-12).measurements(300)
+    return fixed_point.constant_gain(model, z), z
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_every_step_is_that_of_the_fixed_point_kernel(mode: Rounding) -> None:
+    """The integers against the correctly rounded scalar operations of the format."""
+    given, z = tracked()
+    fmt = FixedFormat(fixed_point.integer_bits(given, z), 12, mode)
+    coefficients = fixed_point.stored_coefficients(given.filter, 9)
+    program, unit = given.filter.program, fmt.unit
+    state, true = [Fraction(0)] * program.n, [Fraction(0)] * program.n
+    errors = fixed_point.emulated(given, z[:40], fmt, 9)
+    for k, row in enumerate(z[:40]):
+        seen = [
+            Fraction(math.floor(float(v) / 2.0**e / float(unit) + 0.5)) * unit
+            for v, e in zip(row, given.measurement, strict=True)
+        ]
+        state = steps_in_python(program, fmt.round, coefficients, state, seen)
+        true = steps_in_python(program, lambda x: x, coefficients, true, seen)
+        expected = [float(a - b) * 2.0 ** float(e) for a, b, e in zip(state, true, given.state, strict=True)]
+        assert np.allclose(errors[k], expected, rtol=1e-9, atol=1e-12)
+    assert np.abs(errors).max() > 0
+
+
+def test_a_long_accumulator_rounds_each_sum_once() -> None:
+    """A section whose two products are rounded together instead of one by one."""
+    given = fixed_point.unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
+    z = np.random.default_rng(1).uniform(-1, 1, (50, 1))
+    fmt = FixedFormat(2, 8)
+    coefficients = fixed_point.stored_coefficients(given.filter, 15)
+    b0, b1, b2, a1, a2 = coefficients
+    s1 = s2 = t1 = t2 = Fraction(0)
+    errors = fixed_point.emulated(given, z, fmt, wide=True)
+    for k, (value,) in enumerate(z.tolist()):
+        u = Fraction(math.floor(value / float(fmt.unit) + 0.5)) * fmt.unit
+        y = fmt.round(b0 * u + s1)
+        s1, s2 = fmt.round(b1 * u + s2 - a1 * y), fmt.round(b2 * u - a2 * y)
+        exact_y = b0 * u + t1
+        t1, t2 = b1 * u + t2 - a1 * exact_y, b2 * u - a2 * exact_y
+        assert np.allclose(errors[k], [float(s1 - t1), float(s2 - t2), float(y - exact_y)], atol=1e-12)
+
+
+@pytest.mark.parametrize("wide", [False, True])
+@pytest.mark.parametrize("mode", [Rounding.NEAREST, Rounding.DOWN])
+def test_the_guarantee_holds_and_is_not_far_off(mode: Rounding, wide: bool) -> None:
+    given, z = tracked()
+    fmt = FixedFormat(fixed_point.integer_bits(given, z), 14, mode)
+    bound = fixed_point.guaranteed(given, fmt, wide=wide)
+    worst = np.abs(fixed_point.emulated(given, z, fmt, wide=wide)).max(axis=0)
+    assert (worst <= bound).all()
+    assert (worst > bound / 40).all()
+
+
+def test_the_bound_of_one_state_is_its_geometric_series() -> None:
+    """s <- s / 2 + z: one product a step, half a unit each, halved from step to step."""
+    given = fixed_point.unscaled(controller("0.5", "1", "0", "0"))
+    fmt = FixedFormat(2, 10)
+    bound = fixed_point.guaranteed(given, fmt)
+    assert bound[0] == pytest.approx(float(fmt.unit) / 2 / (1 - 0.5), rel=1e-9)
+    chopped = fixed_point.guaranteed(given, FixedFormat(2, 10, Rounding.CHOP))
+    assert np.allclose(chopped, 2 * bound)
+
+
+def test_an_integrator_has_no_bound_for_ever() -> None:
+    given = fixed_point.unscaled(controller("1", "0.01", "0", "0"))
+    answer = fixed_point.required_fraction_bits(given, np.ones((20, 1)), 0.1, "guarantee")
+    assert answer.fmt is None
+    assert "contract" in answer.why
+
+
+def test_answers_count_fraction_bits() -> None:
+    given, z = tracked()
+    tolerance = [0.1, math.inf]
+    observed = fixed_point.required_fraction_bits(given, z, tolerance)
+    proved = fixed_point.required_fraction_bits(given, z, tolerance, "guarantee")
+    assert observed.fmt is not None
+    assert proved.fmt is not None
+    assert observed.fmt.fraction_bits <= proved.fmt.fraction_bits
+    for answer in (observed, proved):
+        ratios = dict(answer.tried)
+        bits = answer.fmt.fraction_bits  # type: ignore[union-attr]
+        assert ratios[bits] <= 1 >= ratios[bits + 1]
+        assert ratios[bits - 1] > 1
+        assert f"{bits} fraction bits in a word of" in str(answer)
+        assert f"{bits - 1} fraction bits give" in answer.why
+
+
+def test_overflow_names_operation_and_step() -> None:
+    given, z = tracked()
+    narrow = FixedFormat(fixed_point.integer_bits(given, z) - 2, 15)
+    with pytest.raises(OverflowError, match=r"overflow in a (sum|product), operation \d+ of \d+, at step \d+"):
+        fixed_point.emulated(given, z, narrow)
+    for overflow in ("saturate", "wrap"):
+        fmt = FixedFormat(narrow.integer_bits, 15, overflow=overflow)
+        assert np.isfinite(fixed_point.emulated(given, z, fmt)).all()
+
+
+def test_scaling_keeps_what_occurs_below_one() -> None:
+    given, z = tracked()
+    assert fixed_point.integer_bits(given, z) <= 0
+    assert (np.abs(z).max(axis=0) * 2 < 2.0 ** given.measurement.astype(float)).all()
+    with pytest.raises(ValueError, match="needed errors above 0"):
+        fixed_point.required_fraction_bits(given, z, 0.0)
