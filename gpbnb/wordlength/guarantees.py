@@ -31,7 +31,6 @@ from gpbnb.kalman.guarantee.published import (
     dynamax_tracking,
     elaenia_gold,
     filterpy_fusion,
-    filterpy_velocity,
     fixif_longitudinal,
     nile_local_level,
     px4_landing_target,
@@ -82,7 +81,6 @@ CASES = (
     Case(elaenia_gold, (1200,), 60, center=(1000,), steps=10, horizon=10),
     Case(tracker, (1000, 30), 8, center=(750, 0)),
     Case(filterpy_fusion, (1000, 30), 8, center=(750, 0)),
-    Case(filterpy_velocity, (2000, 120), 10, center=(1500, 0)),
     Case(px4_landing_target, (10, 3), 1, center=(9, 0)),
     Case(dyer_mcreynolds, (10, 10, 10), 0.02, steps=1, horizon=1),
     Case(dynamax_tracking, (100, 100, 10, 10), 8, center=(80, 80, 0, 0)),
@@ -90,7 +88,7 @@ CASES = (
     Case(tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000),
     Case(lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), measurement=1.0),
     Case(lambda: controller("0.999", "0.01", "2", "5"), measurement=1.0),
-    Case(_longitudinal, measurement=10.0, candidates=2_000),
+    Case(_longitudinal, measurement=10.0, candidates=100),
 )
 """Filters with their limits."""
 
@@ -130,11 +128,13 @@ def compute(case: Case) -> Row:
     if not outcome.admissible or outcome.ratio > 1:
         raise RuntimeError(f"{made.name}: {outcome}")
     noise = scatter = ""
+    known = {"guarantee": found.bound, "probable": found.bound, "bound": found.bound, "emulation": outcome.errors}
     if found.for_ever:
+        known["probable"] = 3 * probable_error(found)
         expected = probable_error(found)[worst]
         errors = random_errors(found, 10 * case.steps, center)[5 * case.steps :, worst]
         noise, scatter = f"{expected:.2g}", f"{errors.std() / expected:.2f}"
-    bits = {basis: _bits(case, made, basis, SHARE * sizes) for basis in BASES}
+    bits = {basis: _bits(case, made, basis, SHARE * sizes, known[basis]) for basis in BASES}
     schedule = found.schedule
     return Row(
         made.name,
@@ -164,8 +164,14 @@ def _found(case: Case, made: LinearModel | LinearFilter, fmt: FloatFormat) -> Gu
     return from_schedule(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
 
 
-def _bits(case: Case, made: LinearModel | LinearFilter, basis: Basis, tolerance: NDArray[np.float64]) -> str:
-    """Bits that a basis asks for; empty where it does not apply."""
+def _bits(
+    case: Case,
+    made: LinearModel | LinearFilter,
+    basis: Basis,
+    tolerance: NDArray[np.float64],
+    known: NDArray[np.float64],
+) -> str:
+    """Bits that a basis asks for; empty where it does not apply. `known` are its errors in binary32."""
     finite = case.horizon is not None
     if basis == "bound" or (basis == "emulation" and isinstance(made, LinearModel)):
         if not isinstance(made, LinearModel):
@@ -188,7 +194,12 @@ def _bits(case: Case, made: LinearModel | LinearFilter, basis: Basis, tolerance:
             errors = 3 * probable_error(found) if found.for_ever else np.full(len(tolerance), math.inf)
         return bool((errors <= tolerance).all())
 
-    fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=2, largest=LARGEST_PRECISION[2])
+    # Errors are nearly proportional to the unit roundoff: look near the precision that this predicts first.
+    near = FORMAT.precision + math.ceil(math.log2((known / tolerance).max()))
+    least, largest = max(near - 2, 2), min(near + 3, LARGEST_PRECISION[2])
+    fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=least, largest=largest)
+    if fmt is None or fmt.precision == least:
+        fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=2, largest=LARGEST_PRECISION[2])
     return str(fmt.precision) if fmt else ""
 
 
@@ -251,6 +262,8 @@ def bits_table() -> Table:
 def main(words: Sequence[str] = ()) -> int:
     """Compute the rows whose names contain one of the words, or all, and store them."""
     rows = {row.name: row for row in load()} if words and FILE.exists() else {}
+    for case in (CASES[0], CASES[-2]):  # what is compiled or loaded now does not count as time of a guarantee
+        _found(case, case.make(), FORMAT)
     for case in CASES:
         name = case.make().name
         if not words or any(word in name for word in words):
