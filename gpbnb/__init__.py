@@ -7,6 +7,7 @@ The public interface::
     BINARY32, BFLOAT16, ...    the formats of processors; NAMED_FORMATS lists them
     linalg                     dot, matmul, lu, solve, inv with every operation rounded
     LinearModel                a linear dynamic model for a Kalman filter
+    LinearSystem               a linear filter, controller or observer with known inputs
     required_precision         the smallest precision that keeps a filter within a tolerance
 
 Each chapter of the book has a sub-package: rounding, inversion, kalman, rolling, integration, budget, geometry and
@@ -23,9 +24,19 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.formats import FloatFormat, Rounding
     from gpbnb.kalman.model import LinearModel
     from gpbnb.kalman.precision import required_precision
+    from gpbnb.kalman.system import LinearSystem
 
 __version__ = "0.1.0"
-__all__ = ["FixedFormat", "FloatArray", "FloatFormat", "LinearModel", "Rounding", "linalg", "required_precision"]
+__all__ = [
+    "FixedFormat",
+    "FloatArray",
+    "FloatFormat",
+    "LinearModel",
+    "LinearSystem",
+    "Rounding",
+    "linalg",
+    "required_precision",
+]
 
 # fmt: off
 NAMED_FORMATS = (
@@ -39,6 +50,7 @@ _HOME = {
     "FloatArray": "gpbnb.arithmetic.array",
     "FloatFormat": "gpbnb.arithmetic.formats",
     "LinearModel": "gpbnb.kalman.model",
+    "LinearSystem": "gpbnb.kalman.system",
     "Rounding": "gpbnb.arithmetic.formats",
     "required_precision": "gpbnb.kalman.precision",
 }

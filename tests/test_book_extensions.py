@@ -6,6 +6,7 @@ import importlib.util
 from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
+from xml.etree import ElementTree
 
 import pytest
 from docutils import nodes
@@ -24,7 +25,7 @@ def load(name):
     return module
 
 
-book, ledger = load("gpbnb_book"), load("gpbnb_ledger")
+book, ledger, metadata = load("gpbnb_book"), load("gpbnb_ledger"), load("gpbnb_metadata")
 
 
 # -- docstrings, labels, first page, MathJax -----------------------------------------------------------
@@ -250,3 +251,44 @@ def test_pages_whose_source_is_gone_are_removed(tmp_path):
     notebooks.remove_old_pages(app, None)
     there = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.html")]
     assert sorted(there) == sorted(kept)
+
+
+# -- descriptions, Open Graph, sitemap ------------------------------------------------------------------
+
+
+def page_with(*paragraphs):
+    document = new_document("page")
+    section = nodes.section()
+    document += section
+    for text in paragraphs:
+        section += nodes.paragraph(text, text)
+    return document
+
+
+def test_the_description_is_made_of_whole_sentences_without_formulas():
+    long = "This sentence is long enough to end the description, " * 4 + "as it should."
+    short = "How far is the computed angle from the true one? Two\nmiles."
+    assert metadata.description(page_with(f"{short} [Hung, 1984] {long}")) == " ".join(short.split())
+    question = "Which of the nine misalignments change the drift"
+    found = metadata.description(page_with(r"With \beta it fails.", "Too short.", f"{question} in a year:"))
+    assert found == f"{question} in a year"
+    assert metadata.description(new_document("empty")) == ""
+
+
+def test_addresses_are_full_if_the_address_of_the_book_is_known():
+    app = SimpleNamespace(config=SimpleNamespace(html_baseurl=""))
+    assert metadata.address(app, "book/index.html") == "book/index.html"
+    app.config.html_baseurl = "https://example.org/gpbnb/"
+    assert metadata.address(app, "book/index.html") == "https://example.org/gpbnb/book/index.html"
+
+
+def test_the_sitemap_lists_every_page(tmp_path):
+    builder = SimpleNamespace(format="html", get_target_uri=lambda page: f"{page}.html")
+    app = SimpleNamespace(config=SimpleNamespace(html_baseurl="https://example.org"), builder=builder, outdir=tmp_path)
+    app.env = SimpleNamespace(found_docs={"book/b&c", "book/a"})
+    metadata.write_sitemap(app, None)
+    tree = ElementTree.parse(tmp_path / "sitemap.xml")
+    assert [loc.text for loc in tree.iter("{http://www.sitemaps.org/schemas/sitemap/0.9}loc")] == [
+        "https://example.org/book/a.html",
+        "https://example.org/book/b&c.html",
+    ]

@@ -103,7 +103,7 @@ def test_the_readme_says_what_the_book_computes(phrase):
     assert round(glued(page, key), places) == number
 
 
-@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"])
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md", "CODE_OF_CONDUCT.md", "CHANGELOG.md"])
 def test_links_to_files_lead_to_files(name):
     targets = re.findall(r"\]\(([^)\s]+)\)", (ROOT / name).read_text(encoding="utf-8"))
     assert [each for each in targets if "://" not in each and not (ROOT / each.partition("#")[0]).exists()] == []

@@ -1,4 +1,4 @@
-"""What does happen: budgets drawn at random, and averages of simulated errors."""
+"""Simulations: budgets with random errors, and averages of simulated errors."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ class Draws:
 
     @property
     def deviation(self) -> float:
-        """Root mean square of the errors; its standard error is itself over the root of twice the trials."""
+        """Root mean square of the errors; its relative standard error is 1 over the root of twice the trials."""
         return float(np.sqrt(np.mean(self.errors**2)))
 
     def beyond(self, limit: float) -> float:
-        """Share of the trials whose size is above `limit`."""
+        """Return the fraction of the trials whose total exceeds `limit` in size."""
         return float(np.mean(np.abs(self.errors) > limit))
 
 
 def draw(budget: Budget, trials: int, rng: np.random.Generator) -> Draws:
-    """Draw the total error: each group a normal number times the signed sum of its residuals.
+    """Draw total errors: for each group, a normal random number times the signed sum of its residuals.
 
     Raises
     ------
-    ValueError : no source, or fewer than one trial.
+    ValueError : the budget has no source, or fewer than one trial is asked for.
     """
     if not budget.sources or trials < 1:
         raise ValueError(f"got {len(budget.sources)} sources and {trials} trials; needed at least one of each")
@@ -47,19 +47,19 @@ def draw(budget: Budget, trials: int, rng: np.random.Generator) -> Draws:
 
 
 def turning_mean(cycles: float, samples: int = 20000) -> float:
-    """Largest mean, over its phase, of a unit constant that turns through `cycles`: from samples at midpoints."""
+    """Return the length of the mean of a unit vector that rotates through `cycles`, sampled at midpoints."""
     angle = 2 * np.pi * cycles * (np.arange(samples) + 0.5) / samples
     return float(np.hypot(np.cos(angle).mean(), np.sin(angle).mean()))
 
 
 SAMPLES = 400
-"""Samples of one mean of correlated noise."""
+"""Number of samples in one mean of correlated noise."""
 
 
 def correlated_means(time: float, correlation_time: float, trials: int, rng: np.random.Generator) -> Floats:
-    r"""Means (trials,) over a time of unit noise with an exponential correlation, by the trapezoidal rule.
+    r"""Simulate means (trials,) of unit noise with an exponential correlation, by the trapezoidal rule.
 
-    The samples are exact; the rule makes the variance of the mean too large by :math:`(T/(400\tau))^2/12` of itself.
+    The samples are exact; the rule overestimates the variance of the mean by a fraction :math:`(T/(400\tau))^2/12`.
     """
     keep = math.exp(-time / SAMPLES / correlation_time)
     value = rng.standard_normal(trials)

@@ -9,7 +9,7 @@ from gpbnb.display.tables import Table
 
 
 def sources(budget: Budget) -> Table:
-    """Every source with its residual and its share; the sums in the last lines."""
+    """Tabulate every source with its residual and its share; the last rows hold the totals."""
     body = [
         (
             source.name,
@@ -28,21 +28,21 @@ def sources(budget: Budget) -> Table:
         ("root-sum-square", *blanks, f"{budget.total:.4g}", f"{100 * sum(map(budget.share, budget.sources)):.1f} %")
     )
     body.append(("worst case", *blanks, f"{budget.worst_case:.4g}", ""))
-    header = ("source", "kind", "form", "error (mas)", "reduced by", "group", "left (mas)", "share")
+    header = ("source", "kind", "form", "error (mas)", "reduced by", "group", "remaining (mas)", "share")
     return Table(f"{len(budget.sources)} sources", header, tuple(body))
 
 
 def refused(reading: Reading) -> Table:
-    """Rows that were refused, by line."""
+    """Tabulate the rejected rows by line."""
     body = tuple((str(row.line), ", ".join(row.cells), row.reason) for row in reading.refused)
-    return Table(f"{len(body)} rows refused", ("line", "row", "reason"), body)
+    return Table(f"{len(body)} rejected rows", ("line", "row", "reason"), body)
 
 
 def curve(rows: Sequence[tuple[str, int, float]]) -> Table:
-    """Statements of so many sources of one size each: name, number, milliarcseconds."""
+    """Tabulate cases of equal sources, given as name, number of sources, and size of each in milliarcseconds."""
     body = tuple(
         (name, str(count), f"{each:.4f}", f"{each * count**0.5:.4f}", f"{each * count:.3f}")
         for name, count, each in rows
     )
-    header = ("case", "sources", "each (mas)", "root-sum-square (mas)", "all of one sign (mas)")
+    header = ("case", "sources", "each (mas)", "root-sum-square (mas)", "all of the same sign (mas)")
     return Table(f"{len(body)} cases", header, body)

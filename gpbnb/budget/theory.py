@@ -1,4 +1,4 @@
-"""A list of error sources: its root-sum-square, worst case and shares, and what averaging leaves of each."""
+"""Error budgets: root-sum-square, worst case, the share of each source, and how much averaging reduces it."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from typing import TypeVar
 from gpbnb.sweeps import plain_number
 
 GOAL = 1.0
-"""The basis of Figure II-2 and the design goal of ch. I, in milliarcseconds a year."""
+"""The total that Figure II-2 assumes and the design goal in ch. I; milliarcseconds per year."""
 
 
 class Kind(Enum):
-    """The first classification, by statistics."""
+    """How an error behaves statistically: the first classification in ch. II."""
 
     DETERMINISTIC = "deterministic"
     CONSTANT = "random constant"
@@ -29,7 +29,7 @@ class Kind(Enum):
 
 
 class ErrorForm(Enum):
-    """The second classification, by form."""
+    """How an error enters a reading: the second classification in ch. II."""
 
     BIAS = "bias"
     DRIFT = "drift"
@@ -38,7 +38,7 @@ class ErrorForm(Enum):
 
 
 METHODS = ("roll", "orbit", "filter")
-"""Ways to reduce an error. Averaging over rolls, averaging over orbits, filtering."""
+"""Ways to reduce an error: averaging over rolls, averaging over orbits, and filtering."""
 
 _BY_KIND: dict[Kind, set[str]] = {
     Kind.DETERMINISTIC: set(),
@@ -54,27 +54,27 @@ _BY_FORM: dict[ErrorForm, set[str]] = {
 
 
 def foreseen(kind: Kind, form: ErrorForm) -> frozenset[str]:
-    """Methods that ch. II names for errors of this kind or of this form; what is deterministic is compensated."""
+    """List the methods that ch. II names for errors of this kind or form; deterministic errors are compensated."""
     return frozenset(_BY_KIND[kind] | _BY_FORM[form])
 
 
 @dataclass(frozen=True)
 class Source:
-    """One error source.
+    """One source of error in a budget.
 
     Parameters
     ----------
-    name : unique in a budget.
-    kind, form : both classifications.
-    error : its standard deviation before reduction, in milliarcseconds; of a deterministic error what compensation
-        leaves. The sign counts only among sources of one group.
-    roll, orbit, filter : what each method leaves, as a factor from 0 to 1; 1 where it is not used.
-    group : sources of one group are fully correlated and add up with their signs; empty for a source by itself.
+    name : unique within a budget.
+    kind, form : its class in each of the two classifications.
+    error : standard deviation before reduction, in milliarcseconds; for a deterministic error, the part that remains
+        after compensation. The sign matters only within a group.
+    roll, orbit, filter : fraction of the error that remains after each method, from 0 to 1; 1 if it is not used.
+    group : sources of the same group are fully correlated and add up with their signs; empty for an independent one.
     note : free text.
 
     Raises
     ------
-    ValueError : a blank name, an error that is not finite, a factor outside 0 to 1.
+    ValueError : the name is blank, the error is not finite, or a factor is outside 0 to 1.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Source:
         for name in ("name", "group", "note"):
             text = getattr(self, name)
             if text != text.strip() or (name == "name" and not text):
-                raise ValueError(f"got {name} {text!r}; needed text without blanks at its ends; a name, at least")
+                raise ValueError(f"got {name} {text!r}; remove blanks at its ends, and give every source a name")
         if not isinstance(self.kind, Kind) or not isinstance(self.form, ErrorForm):
             raise ValueError(f"got kind {self.kind!r} and form {self.form!r}; needed a Kind and an ErrorForm")
         if not math.isfinite(self.error):
@@ -99,7 +99,9 @@ class Source:
         for method in METHODS:
             factor = getattr(self, method)
             if not 0 <= factor <= 1:
-                raise ValueError(f"got {method} {factor}; needed a factor from 0 (nothing left) to 1 (not used)")
+                raise ValueError(
+                    f"got {method} {factor}; needed a factor from 0 (nothing remains) to 1 (method not used)"
+                )
 
     @property
     def residual(self) -> float:
@@ -108,18 +110,18 @@ class Source:
 
     @property
     def unforeseen(self) -> tuple[str, ...]:
-        """Methods used that ch. II does not name for such an error."""
+        """The methods used that ch. II does not name for such an error."""
         allowed = foreseen(self.kind, self.form)
         return tuple(method for method in METHODS if getattr(self, method) < 1 and method not in allowed)
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Error sources together.
+    """A list of error sources.
 
     Raises
     ------
-    ValueError : two sources of one name.
+    ValueError : two sources have the same name.
     """
 
     sources: tuple[Source, ...]
@@ -128,10 +130,12 @@ class Budget:
         counts = Counter(source.name for source in self.sources)
         twice = sorted(name for name, count in counts.items() if count > 1)
         if twice:
-            raise ValueError(f"got {', '.join(map(repr, twice))} more than once; needed one name a source: rename one")
+            raise ValueError(
+                f"got {', '.join(map(repr, twice))} more than once; every source needs its own name: rename one"
+            )
 
     def groups(self) -> tuple[tuple[Source, ...], ...]:
-        """Sources that add up with their signs, together; in order of appearance."""
+        """Group the sources that add up with their signs, in order of appearance."""
         found: dict[str, list[Source]] = {}
         for source in self.sources:
             found.setdefault(f"group {source.group}" if source.group else f"source {source.name}", []).append(source)
@@ -149,19 +153,20 @@ class Budget:
 
     @property
     def worst_case(self) -> float:
-        """All errors with one sign; milliarcseconds."""
+        """Sum of all residuals as if they had the same sign; milliarcseconds."""
         return math.fsum(abs(source.residual) for source in self.sources)
 
     def share(self, source: Source) -> float:
-        """Part of the total's square that is due to `source`; below 0 where it cancels others of its group.
+        """Return the part of the square of the total that is due to `source`.
 
-        Shares add up to one. All are 0 where the total is 0.
+        Shares add up to one. A share is negative if the source cancels others in its group. For a total of 0 all
+        shares are 0.
         """
         square = self.total**2
         return source.residual * self._sums[source.name] / square if square else 0.0
 
     def allowance(self, goal: float = GOAL) -> float:
-        """What one more independent source may be before the total is `goal`; milliarcseconds. NaN if it is already."""
+        """Return the largest error allowed for one more independent source; NaN if the total already exceeds `goal`."""
         left = goal**2 - self.total**2
         return math.sqrt(left) if left >= 0 else math.nan
 
@@ -174,16 +179,16 @@ def _sum(group: Iterable[Source]) -> float:
 
 
 def root_sum_square(errors: Iterable[float]) -> float:
-    """Root of the sum of squares, without overflow; hung1982, ch. II."""
+    """Return the root of the sum of squares, without overflow; hung1982, ch. II."""
     return math.hypot(*errors)
 
 
 def equal_error(total: float, sources: float) -> float:
-    r"""Size of each of N equal, independent errors, :math:`e = \text{total}/\sqrt N`: Figure II-2.
+    r"""Return the size of each of N equal, independent errors, :math:`e = \text{total}/\sqrt N`: Figure II-2.
 
     Parameters
     ----------
-    total : their root-sum-square, in any unit; 0 or above.
+    total : root-sum-square of all errors, in any unit; 0 or above.
     sources : N, above 0.
     """
     if not (total >= 0 and sources > 0):
@@ -192,7 +197,7 @@ def equal_error(total: float, sources: float) -> float:
 
 
 def equal_sources(total: float, each: float) -> float:
-    """How many equal, independent errors of the size `each` make up `total`; need not be whole."""
+    """Return how many equal, independent errors of size `each` have the root-sum-square `total`; a real number."""
     if not (total >= 0 and each > 0):
         raise ValueError(f"got a total of {total} from errors of {each}; needed total >= 0 and each > 0")
     return (total / each) ** 2
@@ -202,9 +207,10 @@ def equal_sources(total: float, each: float) -> float:
 
 
 def cycles_factor(cycles: float) -> float:
-    r"""What a mean over `cycles` turns leaves of a constant that turns, at most: :math:`|\sin\pi c|/(\pi c)`.
+    r"""Return the largest fraction of a rotating constant left by a mean over `cycles`: :math:`|\sin\pi c|/(\pi c)`.
 
-    The constant stands in the spacecraft and rolls, or keeps step with the orbit. It vanishes for whole cycles.
+    The constant is fixed in the spacecraft and rolls with it, or it repeats with the orbit. A mean over whole cycles
+    removes it.
     """
     if not cycles >= 0:
         raise ValueError(f"got {cycles} cycles; needed 0 or more")
@@ -215,22 +221,23 @@ def cycles_factor(cycles: float) -> float:
 
 
 def white_factor(readings: float) -> float:
-    r"""What a mean of N independent readings leaves of noise: :math:`1/\sqrt N`."""
+    r"""Return the fraction of noise that a mean of N independent readings leaves: :math:`1/\sqrt N`."""
     if not readings >= 1:
         raise ValueError(f"got {readings} readings; needed 1 or more")
     return 1 / math.sqrt(readings)
 
 
 def correlated_factor(time: float, correlation_time: float) -> float:
-    r"""What a mean over T leaves of noise with the correlation :math:`\mathrm e^{-u/\tau}`, standard deviation.
+    r"""Return the fraction of noise with the correlation :math:`\mathrm e^{-u/\tau}` that a mean over T leaves.
 
     .. math:: \sqrt{2(h - 1 + \mathrm e^{-h})}\,/\,h, \qquad h = T/\tau
 
-    For small h a series is summed, since the closed form loses its digits.
+    The fraction refers to the standard deviation. For small h the function sums a series, because the closed
+    form cancels.
 
     Parameters
     ----------
-    time, correlation_time : T and τ, in one unit; T at least 0, τ above 0.
+    time, correlation_time : T and τ, in the same unit; T at least 0, τ above 0.
     """
     if not (time >= 0 and correlation_time > 0):
         raise ValueError(f"got T = {time} and tau = {correlation_time}; needed T >= 0 and tau > 0")
@@ -250,7 +257,7 @@ _E = TypeVar("_E", bound=Enum)
 
 @dataclass(frozen=True)
 class Refused:
-    """A row that cannot be read: its line, why, and its cells as they came."""
+    """A rejected row: its line, the reason, and its cells as read."""
 
     line: int
     reason: str
@@ -259,7 +266,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class Reading:
-    """What a file holds: the budget of its good rows, and the others."""
+    """Contents of a file: the budget from its valid rows, and the rejected rows."""
 
     budget: Budget
     refused: tuple[Refused, ...]
@@ -268,14 +275,14 @@ class Reading:
 def read(path: str | Path) -> Reading:
     """Read a budget from a CSV file, which is not changed.
 
-    The first line names the columns: ``name, kind, form, error_mas`` and as many of ``roll, orbit, filter, group,
-    note`` as there are, in any order. An empty factor means that the method is not used. A bad row is refused, with
-    its line; the others are read all the same.
+    The first line names the columns: ``name, kind, form, error_mas`` and any of ``roll, orbit, filter, group, note``,
+    in any order. An empty factor means that the method is not used. An invalid row is rejected with its line number;
+    the other rows are still read.
 
     Raises
     ------
     OSError : the file cannot be read.
-    ValueError : it is not UTF-8, or its first line lacks a column, repeats one, or has one that is not known.
+    ValueError : the file is not UTF-8, or its first line lacks a column, repeats one, or names an unknown one.
     """
     path = Path(path)
     try:
@@ -286,7 +293,7 @@ def read(path: str | Path) -> Reading:
 
 
 def parse(text: str, name: str = "the text") -> Reading:
-    """Read a budget from the text of a CSV file, as :func:`read`; `name` is what errors call it."""
+    """Read a budget from the text of a CSV file, as :func:`read` does; error messages call it `name`."""
     reader = csv.reader(io.StringIO(text, newline=""))
     header = tuple(cell.strip() for cell in next(reader, []))
     missing = [column for column in _NEEDED if column not in header]
@@ -317,7 +324,7 @@ def parse(text: str, name: str = "the text") -> Reading:
         try:
             source = _source(header, cells)
             if source.name in sources:
-                raise ValueError(f"name {source.name!r} is that of line {lines[source.name]} already; rename one")
+                raise ValueError(f"name {source.name!r} is already used in line {lines[source.name]}; rename one")
         except ValueError as error:
             refused.append(Refused(line, str(error), tuple(cells)))
         else:
@@ -326,20 +333,20 @@ def parse(text: str, name: str = "the text") -> Reading:
 
 
 def write(budget: Budget, path: str | Path) -> None:
-    """Write a budget as a new CSV file, which :func:`read` turns into the same budget.
+    """Write a budget to a new CSV file, from which :func:`read` recovers the same budget.
 
     Raises
     ------
-    FileExistsError : the file is there; rows that were refused from it would be lost.
+    FileExistsError : the file exists; overwriting it would lose its rejected rows.
     """
     with Path(path).open("x", encoding="utf-8", newline="") as file:
         file.write(to_csv(budget.sources))
 
 
 def to_csv(sources: Sequence[Source]) -> str:
-    """Sources as CSV with the columns `HEADER`; a factor of 1 is left empty.
+    """Format sources as CSV with the columns `HEADER`; a factor of 1 is left empty.
 
-    Text that a spreadsheet would take for a formula gets an apostrophe in front, which :func:`read` removes.
+    Text that a spreadsheet would read as a formula gets a leading apostrophe, which :func:`read` removes.
     """
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
@@ -374,7 +381,7 @@ def _unguarded(text: str) -> str:
 
 def _source(header: tuple[str, ...], cells: list[str]) -> Source:
     if len(cells) != len(header):
-        raise ValueError(f"{len(cells)} cells; {len(header)} are needed: quote a cell that holds a comma")
+        raise ValueError(f"{len(cells)} cells instead of {len(header)}; put quotes around a cell that contains a comma")
     row = {field.name: "" for field in fields(Source)} | dict(
         zip(header, (cell.strip() for cell in cells), strict=True)
     )
@@ -394,7 +401,7 @@ def _number(column: str, text: str) -> float:
     try:
         return plain_number(text)
     except ValueError:
-        raise ValueError(f"{column} is {text!r}; a number is needed, or leave the row out until it is known") from None
+        raise ValueError(f"{column} is {text!r}; enter a number, or leave the row out until it is known") from None
 
 
 def _member(enum: type[_E], column: str, text: str) -> _E:

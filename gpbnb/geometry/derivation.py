@@ -82,7 +82,7 @@ def turns() -> Derivation:
         (0, 0): "first column, first row: 1",
         (1, 0): "second row: $-\\alpha_3$",
         (2, 0): "third row: $\\alpha_2$",
-        (1, 2): "and in the third column $\\alpha_1$",
+        (1, 2): "third column, second row: $\\alpha_1$",
     }
     steps = []
     for (i, j), name in names.items():
@@ -180,9 +180,11 @@ def printed_deroll() -> Derivation:
             RollStep("mean of the first row over a roll", mean(sp.expand(third)), sp.S.Zero),
             RollStep("mean of the second row over a roll", mean(sp.expand(second)), sp.S.Zero),
             RollStep(
-                "right at a quarter roll, and at three quarters: first row", sp.Limit(third, P, sp.pi / 2), ALPHA[2]
+                "correct only after a quarter and three quarters of a roll: first row",
+                sp.Limit(third, P, sp.pi / 2),
+                ALPHA[2],
             ),
-            RollStep("and second row", sp.Limit(second, P, sp.pi / 2), ALPHA[1]),
+            RollStep("the same for the second row", sp.Limit(second, P, sp.pi / 2), ALPHA[1]),
         )
     )
 
@@ -251,12 +253,12 @@ def first_order_effects() -> Derivation:
     return Derivation(
         (
             RollStep(
-                "telescope, first row: β stands still in the spacecraft, so that the deroll turns it",
+                "telescope, first row: β is fixed in the spacecraft, so the deroll rotates it",
                 unevaluated(C) * unevaluated(t[1]) - unevaluated(S) * unevaluated(t[2]),
                 -ALPHA[2] + sp.expand(derolled(-BETA[2], BETA[1])[0]),
             ),
             RollStep(
-                "gyro, first row: β and γ",
+                "gyro, first row: β and γ appear",
                 unevaluated(C) * unevaluated(r[1]) - unevaluated(S) * unevaluated(r[2]),
                 -THETA[2] + both,
             ),
@@ -270,8 +272,8 @@ def first_order_effects() -> Derivation:
                 unevaluated(S) * unevaluated(y) + unevaluated(C) * unevaluated(z),
                 PHI[1] + turned[1],
             ),
-            RollStep("mean over a roll of what γ leaves, first row", mean(turned[0]), sp.S.Zero),
-            RollStep("and second row", mean(turned[1]), sp.S.Zero),
+            RollStep("mean over a roll of the remaining γ, first row", mean(turned[0]), sp.S.Zero),
+            RollStep("the same for the second row", mean(turned[1]), sp.S.Zero),
         )
     )
 
@@ -283,7 +285,7 @@ def second_order_effects() -> Derivation:
     return Derivation(
         tuple(
             RollStep(
-                f"{name} row of the difference, mean of its error",
+                f"mean error of the difference, {name} row",
                 mean(sp.collect(error, (C, S, phi))),
                 unevaluated(twist) * phi + GAMMA[0] * alpha,
             )
@@ -327,18 +329,18 @@ def precessions() -> Derivation:
     geodetic, motional = normal.cross(star), (earth / 2).cross(star)
     return Derivation(
         (
-            Step("mean field along the Earth's axis", average[2], w / 2),
-            Step("and across it, in the orbit's plane", average[0], sp.S.Zero),
+            Step("mean field along the axis of the Earth", average[2], w / 2),
+            Step("mean field across it, in the plane of the orbit", average[0], sp.S.Zero),
             Step(
-                "inner product of both drifts, which vanishes for a star in the orbit's plane, $\\epsilon=0$",
+                "inner product of the two drifts; it vanishes for a star in the plane of the orbit, $\\epsilon=0$",
                 geodetic.dot(motional),
                 -w * sp.sin(2 * e) * sp.sin(d) / 4,
             ),
             Step(
-                "for such a star: motional drift along the orbit's normal",
+                "for such a star: frame dragging along the normal of the orbit",
                 sp.Limit(motional.dot(normal), e, 0),
                 w * sp.cos(d) / 2,
             ),
-            Step("and in the orbit's plane", sp.Limit(motional[0], e, 0), sp.S.Zero),
+            Step("for such a star: frame dragging in the plane of the orbit", sp.Limit(motional[0], e, 0), sp.S.Zero),
         )
     )

@@ -1,4 +1,4 @@
-"""What telescope and gyro of a simulated year read, with exact rotations, and what the deroll makes of it."""
+"""Simulated readings of telescope and gyro over a year, with exact rotations, and the drift derived from them."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ class Year:
     Parameters
     ----------
     case : its angles; radians.
-    roll_period : seconds; None where the spacecraft does not roll.
+    roll_period : seconds; None if the spacecraft does not roll.
     step : seconds between samples.
-    block : samples that are averaged into one mean: the fewest that fill whole rolls.
-    time : (k,), the middle of each mean; years.
+    block : number of samples in one mean: the fewest that fill whole rolls.
+    time : (k,), time of the middle of each mean; years.
     phi : (k, 2), means of the derolled difference, as φ2 and φ3; radians.
     first : (j, 2), derolled samples of the first rolls before averaging.
-    offset, drift : (2,), of the straight line fitted to the means; radians, and radians a year.
+    offset, drift : (2,), of the straight line fitted to the means; radians, and radians per year.
     sample_drift : (2,), of the straight line fitted to all samples.
-    line : what turns at the roll frequency, the mean over the year; radians.
+    line : amplitude at the roll frequency, averaged over the year; radians.
     """
 
     case: Case
@@ -50,13 +50,13 @@ class Year:
 
     @property
     def error(self) -> Effect:
-        """Errors of angle and drift of the fitted line, as in :func:`gpbnb.geometry.theory.effect`."""
+        """Errors of angle and drift in the fitted line, as in :func:`gpbnb.geometry.theory.effect`."""
         angle, drift = self.offset, self.drift - np.asarray(self.case.drift)
         return Effect((float(angle[0]), float(angle[1])), (float(drift[0]), float(drift[1])), self.line)
 
 
 def difference(case: Case, years: ArrayLike, phase: ArrayLike) -> Floats:
-    """Gyro less telescope, derolled, as φ2 and φ3 (..., 2) in radians; exact rotations throughout.
+    """Return the derolled difference of gyro and telescope as φ2 and φ3 (..., 2) in radians, with exact rotations.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def difference(case: Case, years: ArrayLike, phase: ArrayLike) -> Floats:
 
 
 def spin_axis(case: Case, years: ArrayLike) -> Floats:
-    """Direction (..., 3) of the spin axis in the absolute frame: the first column of the matrix of φ."""
+    """Return the direction (..., 3) of the spin axis in the absolute frame: the first column of the rotation by φ."""
     since = np.asarray(years, dtype=float)
     phi2, phi3 = case.drift[0] * since, case.drift[1] * since
     return np.stack([np.cos(phi2) * np.cos(phi3), -np.sin(phi3), np.sin(phi2) * np.cos(phi3)], axis=-1)
@@ -85,13 +85,13 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
     Parameters
     ----------
     case : the angles.
-    roll_period : seconds, a whole number of tenths; None for no roll, at phase 0.
-    step : seconds between samples, a whole number of tenths; at least three samples in a roll.
-    progress : show a bar.
+    roll_period : seconds, a multiple of 0.1; None for a spacecraft that stays at phase 0.
+    step : seconds between samples, a multiple of 0.1; at least three samples per roll.
+    progress : show a progress bar.
 
     Raises
     ------
-    ValueError : a period or step is not above 0, or the samples never fill whole rolls, or do so with fewer than three.
+    ValueError : a period or step is not positive, or fewer than three samples fill whole rolls.
     """
     block = _block(roll_period, step)
     count = int(YEAR / step) // block * block
@@ -135,7 +135,7 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
 def years(
     cases: Mapping[str, Case], step: float = 60.0, roll_period: float = 600.0, *, progress: bool = False
 ) -> dict[str, tuple[Year, Year]]:
-    """Each case without and with roll; see :func:`year`."""
+    """Simulate each case without and with roll; see :func:`year`."""
     return {
         name: (year(case, None, step), year(case, roll_period, step))
         for name, case in tqdm(cases.items(), desc="years", ncols=80, disable=not progress)
@@ -144,28 +144,27 @@ def years(
 
 @dataclass(frozen=True)
 class Part:
-    """Error of one reading over a roll, in radians: length of its mean, and of what turns at the roll frequency."""
+    """Error of one reading over a roll, in radians: size of its mean, and amplitude at the roll frequency."""
 
     mean: float
     turning: float
 
 
 def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
-    """Errors of the derolled readings over one roll: of ``telescope``, ``gyro`` and their ``difference``.
+    """Return the errors of the derolled readings over one roll: ``telescope``, ``gyro`` and their ``difference``.
 
-    The telescope is compared with the star, and the gyro with the spin axis, as they stand in the intermediate frame;
-    the difference with the drift in the absolute frame. Angles and drift are those after some `years`, and rotations
-    are exact.
+    The telescope is compared with the star, and the gyro with the spin axis, both in the intermediate frame. The
+    difference is compared with the drift in the absolute frame. Rotations are exact.
 
     Parameters
     ----------
     case : the angles.
-    years : since the start.
-    samples : in the roll, at least 3.
+    years : time since the start, at which angles and drift are taken.
+    samples : number per roll, at least 3.
 
     Raises
     ------
-    ValueError : fewer than 3 samples.
+    ValueError : `samples` is below 3.
     """
     if samples < 3:
         raise ValueError(f"got {samples} samples in a roll; needed 3 or more")
@@ -189,7 +188,7 @@ def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
 
 
 def misalignment_cases(size: float) -> dict[str, Case]:
-    """One angle of `size` radians at a time, then pairs that matter, then angles that change by it in the year."""
+    """Return cases with one angle of `size` radians, with pairs of angles, and with angles growing by `size` a year."""
     none = Case()
     single = {name: none.with_angle(name, size) for which in ("alpha", "beta", "gamma") for name in _three(which)}
     pairs = {
@@ -205,9 +204,9 @@ def misalignment_cases(size: float) -> dict[str, Case]:
 
 
 def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float], phases: int = 32) -> Floats:
-    """Error of the measured φ, length of (Δφ2, Δφ3), over a mean of one roll: one angle at each of `sizes`, radians.
+    """Simulate the error of φ in a mean over one roll, the length of (Δφ2, Δφ3), for one angle of several `sizes`.
 
-    The drift has happened: `drift` are true φ2 and φ3 in radians.
+    All angles are in radians; `drift` holds the true φ2 and φ3.
     """
     turns = 2 * math.pi * np.arange(phases) / phases
     errors = []
@@ -234,15 +233,15 @@ def _slope(time: Floats, values: Floats) -> Floats:
 
 def _block(roll_period: float | None, step: float) -> int:
     if not step > 0 or (roll_period is not None and not roll_period > 0):
-        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed both above 0")
+        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; both must be positive")
     if step > YEAR / 100:
-        raise ValueError(f"got a step of {step} s; needed a hundred samples in a year, or more")
+        raise ValueError(f"got a step of {step} s; take at least a hundred samples per year")
     if roll_period is None:
         return 10
     period, between = round(10 * roll_period), round(10 * step)
     if period != 10 * roll_period or between != 10 * step:
         raise ValueError(
-            f"got a roll period of {roll_period} s and a step of {step} s; needed whole tenths of a second"
+            f"got a roll period of {roll_period} s and a step of {step} s; both must be multiples of 0.1 s"
         )
     block = math.lcm(period, between) // between
     if block < 3:

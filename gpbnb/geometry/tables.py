@@ -15,7 +15,7 @@ from gpbnb.measurement import ARCSEC, MAS
 
 
 def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
-    """What each misalignment does, in milliarcseconds; predicted, and the drift also as simulated.
+    """Tabulate the effect of each misalignment in milliarcseconds: from the theory, and the drift also from simulation.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
 
 
 def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
-    """What becomes of each misalignment on its way from both readings to the drift; milliarcseconds.
+    """Tabulate the error due to each misalignment in both readings and in their difference; milliarcseconds.
 
     Parameters
     ----------
@@ -63,12 +63,12 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
         for name, parts in results.items()
     )
     readings = next(iter(results.values()), {})
-    header = ("angle", *readings, "so it")
+    header = ("angle", *readings, "fate")
     return Table(f"{len(body)} angles, errors in milliarcseconds: mean; turning with the roll", header, body)
 
 
 def fate(parts: Mapping[str, Part]) -> str:
-    """Whether an error stays, turns with the roll, cancels, or was none; to 0.001 milliarcseconds."""
+    """Say whether an error stays, averages out, cancels, or is measured; errors below 0.001 mas count as 0."""
 
     def seen(radians: float) -> bool:
         return number(radians) != "0"
@@ -84,13 +84,13 @@ def fate(parts: Mapping[str, Part]) -> str:
 
 
 def reach(rows: Iterable[tuple[str, float]], allowed: float) -> Table:
-    """How large each angle may be before its small-angle form costs `allowed` radians."""
+    """Tabulate how large each angle may be before its small-angle form causes an error of `allowed` radians."""
     body = tuple((_symbols(name), _two(size / ARCSEC), f"{math.degrees(size):.2g}") for name, size in rows)
     return Table(f"angles that cost {allowed / MAS:g} milliarcsecond", ("angle", "in arcseconds", "in degrees"), body)
 
 
 def number(radians: float) -> str:
-    """An angle in milliarcseconds, to 0.001 or four digits, whichever is coarser."""
+    """Format an angle in milliarcseconds, to 0.001 or four digits, whichever is coarser."""
     value = radians / MAS
     places = 3 if abs(value) < 10 else max(0, 3 - math.floor(math.log10(abs(value))))
     text = f"{value:,.{places}f}"
@@ -98,17 +98,17 @@ def number(radians: float) -> str:
 
 
 def pair(angles: Sequence[float]) -> str:
-    """Two angles in milliarcseconds; one zero where both are."""
+    """Format two angles in milliarcseconds, or a single 0 if both are zero."""
     both = [number(float(angle)) for angle in np.asarray(angles)]
     return "0" if both == ["0", "0"] else "; ".join(both)
 
 
 def _two(value: float) -> str:
-    """Two digits: the expansion holds to no more of them at the largest angles."""
+    """Format with two digits; the expansion has no more correct digits at the largest angles."""
     return f"{float(f'{value:.2g}'):,.0f}"
 
 
 def _symbols(name: str) -> str:
-    """``gamma_rate2`` as a formula, and so for every angle in `name`."""
+    """Turn every angle in `name`, such as ``gamma_rate2``, into a formula."""
     moving = re.sub(r"(alpha|beta|gamma)_rate(\d)", r"$\\dot\\\1_\2$", name)
     return re.sub(r"(?<!\\)\b(alpha|beta|gamma)(\d)", r"$\\\1_\2$", moving)

@@ -1,4 +1,4 @@
-"""What misalignments and small-angle forms do to the measured drift: closed forms. Angles in radians, time in years."""
+"""Closed forms for the effect of misalignments and small angles on the measured drift; radians and years."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 GEODETIC = 6.6 * ARCSEC
-"""Drift in the plane of the orbit, of the size that was predicted for Gravity Probe B; radians a year."""
+"""Drift in the plane of the orbit, close to the prediction for Gravity Probe B; radians per year."""
 MOTIONAL = 0.04 * ARCSEC
-"""Drift across the plane of the orbit; radians a year."""
+"""Drift out of the plane of the orbit; radians per year."""
 ZERO: Triple = (0.0, 0.0, 0.0)
 
 GM = 3.986004e14
@@ -30,19 +30,19 @@ SUN_DISTANCE = 1.495978707e11
 RADIUS = 6.378137e6
 """Equatorial radius of the Earth, m."""
 INERTIA = 0.3307
-"""Moment of inertia of the Earth about its axis, over its mass times the square of `RADIUS`."""
+"""Moment of inertia of the Earth about its axis, divided by its mass and the square of `RADIUS`."""
 SPIN = 7.292115e-5
-"""Rate at which the Earth turns, rad/s."""
+"""Rotation rate of the Earth, rad/s."""
 
 
 def precession_rates(altitude: float) -> tuple[float, float]:
-    r"""Geodetic and motional drift in a circular polar orbit, for a star on the equator; radians a year.
+    r"""Return the geodetic and frame-dragging drift in a circular polar orbit, for a star on the equator; rad/yr.
 
     .. math:: \Omega_G = \frac32\,\frac{(GM)^{3/2}}{c^2 r^{5/2}}, \qquad \Omega_M = \frac{G I \omega}{2 c^2 r^3}
 
     Parameters
     ----------
-    altitude : above the equatorial radius, m; 0 or above.
+    altitude : height above the equatorial radius, m; 0 or above.
 
     References
     ----------
@@ -57,15 +57,15 @@ def precession_rates(altitude: float) -> tuple[float, float]:
 
 
 def aberration(altitude: float) -> tuple[float, float]:
-    r"""Largest displacement of a star by the speed of the Earth, and of a spacecraft on a circular orbit; radians.
+    r"""Return the largest aberration due to the speed of the Earth and of a spacecraft on a circular orbit; radians.
 
     .. math:: v/c, \qquad v = \sqrt{GM/r}
 
-    for the orbit around the Sun, taken as a circle, and for that around the Earth.
+    The orbit of the Earth around the Sun is taken as a circle.
 
     Parameters
     ----------
-    altitude : above the equatorial radius, m; 0 or above.
+    altitude : height above the equatorial radius, m; 0 or above.
     """
     if not altitude >= 0:
         raise ValueError(f"got an altitude of {altitude} m; needed 0 or above")
@@ -74,17 +74,17 @@ def aberration(altitude: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Case:
-    """Angles of an experiment of one year.
+    """Angles of an experiment that lasts one year.
 
     Parameters
     ----------
-    alpha, beta, gamma : pointing and both misalignments at the start; radians.
-    alpha_rate, beta_rate, gamma_rate : their change; radians a year.
-    drift : rates of φ2 and φ3; radians a year. The z axis lies in the orbit's plane here, so that φ2 is geodetic.
+    alpha, beta, gamma : pointing, and misalignments of telescope and readout, at the start; radians.
+    alpha_rate, beta_rate, gamma_rate : rates of change of these angles; radians per year.
+    drift : rates of φ2 and φ3; radians per year. The z axis lies in the plane of the orbit, so φ2 is geodetic.
 
     Raises
     ------
-    ValueError : a number is missing, or is not finite.
+    ValueError : a number is missing or not finite.
     """
 
     alpha: Triple = ZERO
@@ -102,7 +102,7 @@ class Case:
                 raise ValueError(f"got {name} = {value}; needed {needed} finite numbers, in radians")
 
     def with_angle(self, name: str, size: float) -> Case:
-        """Set one angle, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
+        """Return a copy with one angle changed, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
         which, axis = name[:-1], name[-1:]
         if which == "drift" or which not in vars(self) or axis not in ("1", "2", "3"):
             raise ValueError(f"got angle {name!r}; needed alpha, beta, gamma or their _rate and 1, 2 or 3: 'gamma1'")
@@ -111,16 +111,16 @@ class Case:
         return replace(self, **{which: tuple(values)})
 
     def at(self, name: str, years: ArrayLike) -> Floats:
-        """Angles of `name` after some `years` (...): (..., 3), or (3,) where they do not change."""
+        """Return the angles `name` after `years` (...): (..., 3), or (3,) if they do not change."""
         start, rate = np.asarray(getattr(self, name)), np.asarray(getattr(self, f"{name}_rate"))
         return start + np.asarray(years, dtype=float)[..., None] * rate if rate.any() else start
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Errors of the measured drift φ2, φ3 in radians: of the angle at the start, of the drift of a year.
+    """Errors of φ2 and φ3 in radians: in the angle at the start, and in the drift over a year.
 
-    `line` is the size of what appears at roll frequency in the derolled difference, in the middle of the year.
+    `line` is the amplitude at the roll frequency in the derolled difference, in the middle of the year.
     """
 
     angle: tuple[float, float]
@@ -129,7 +129,7 @@ class Effect:
 
 
 def printed_deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
-    r"""What (8) and (9) print, as (-α3, α2) or (-θ3, θ2), to be compared with :func:`gpbnb.measurement.deroll`.
+    r"""Evaluate (8) and (9) as printed; returns (-α3, α2) or (-θ3, θ2), like :func:`gpbnb.measurement.deroll`.
 
     .. math:: \begin{bmatrix} \hat\alpha_3 \\ -\hat\alpha_2 \end{bmatrix} = \begin{bmatrix} C & S \\ -S & C
         \end{bmatrix} \begin{bmatrix} y_t \\ z_t \end{bmatrix}
@@ -138,20 +138,20 @@ def printed_deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
 
 
 def measured(case: Case, rolling: bool, years: ArrayLike = 0.0, phase: float = 0.0) -> Floats:
-    r"""Errors of the measured φ2, φ3 after some `years`, to second order; rolling: the mean over a roll.
+    r"""Return the errors of the measured φ2, φ3 to second order; if rolling, those of the mean over a roll.
 
     .. math:: \Delta\varphi_2 &= (\alpha_1 + \beta_1 + \gamma_1)\varphi_3 + \gamma_1\alpha_3 + m_2 \\
         \Delta\varphi_3 &= -(\alpha_1 + \beta_1 + \gamma_1)\varphi_2 - \gamma_1\alpha_2 + m_3
 
-    Without rolling, m is what the transverse misalignments leave, turned by the constant roll `phase`: γ2 and γ3 to
-    first order. With rolling its mean is zero.
+    Without rolling, m is the effect of the transverse misalignments, to first order γ2 and γ3, rotated by the constant
+    roll `phase`. With rolling, its mean is zero.
 
     Parameters
     ----------
     case : the angles.
     rolling : whether the spacecraft rolls.
-    years : (...), since the start.
-    phase : of the spacecraft that does not roll.
+    years : (...), time since the start.
+    phase : roll phase of a spacecraft that does not roll; radians.
 
     Returns
     -------
@@ -170,16 +170,16 @@ def measured(case: Case, rolling: bool, years: ArrayLike = 0.0, phase: float = 0
 
 
 def standing(beta: ArrayLike, gamma: ArrayLike) -> Floats:
-    """What stands in the spacecraft: readings y, z of gyro less telescope for a vector along the roll axis, exactly."""
+    """Return the part fixed in the spacecraft: exact readings y, z of gyro minus telescope along the roll axis."""
     boresight = rotation(beta)[..., 0]
     return np.asarray((apply(rotation(gamma), boresight) - boresight)[..., 1:])
 
 
 def effect(case: Case, rolling: bool, phase: float = 0.0) -> Effect:
-    """Errors of angle and drift, to second order, from the values at the start and after a year.
+    """Return the errors of angle and drift to second order, from the values at the start and after a year.
 
-    The drift is that of a straight line through both ends: the error of a product of two changing angles is not
-    straight in between.
+    The drift is the slope of a straight line through both ends. In between, the error of a product of two changing
+    angles is not linear.
     """
     start, end = measured(case, rolling, np.array([0.0, 1.0]), phase)
     line = float(np.hypot(*standing(case.at("beta", 0.5), case.at("gamma", 0.5)))) if rolling else 0.0
@@ -188,22 +188,22 @@ def effect(case: Case, rolling: bool, phase: float = 0.0) -> Effect:
 
 
 def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) -> float:
-    r"""Error of the drift of a straight line fitted to all samples, from what stands in the spacecraft.
+    r"""Return the drift error of a line fitted to all samples, due to an offset fixed in the spacecraft.
 
     .. math:: |\Delta\text{drift}| = \frac{6}{\pi N}\,\text{amplitude}, \qquad
         \text{or } \frac{6}{nN\sin(\pi/n)}\,\text{amplitude for n samples a roll}
 
-    for N whole rolls, to first order in 1/N. It vanishes where means of whole rolls are fitted.
+    for N whole rolls, to first order in 1/N. It vanishes if the line is fitted to means of whole rolls.
 
     Parameters
     ----------
-    amplitude : size of the line at roll frequency, in any unit.
+    amplitude : amplitude at the roll frequency, in any unit.
     rolls : N, above 0.
-    samples : n in a roll, at least 2; many by default.
+    samples : n, samples per roll, at least 2; infinitely many by default.
 
     Returns
     -------
-    leak : length of the error of both drifts, in the unit of `amplitude`, over the length of the record.
+    leak : length of the vector of both drift errors, in the unit of `amplitude` per length of the record.
     """
     if not rolls > 0 or (samples is not None and samples < 2):
         raise ValueError(f"got {rolls} rolls with {samples} samples each; needed above 0, and 2 or more")
@@ -212,16 +212,16 @@ def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) 
 
 
 def ramp_leak(rate: float, roll_period: float, samples: int | None = None) -> float:
-    r"""Constant error of the mean over a roll from what stands in the spacecraft and grows at a steady `rate`.
+    r"""Return the constant error of the mean over a roll due to an offset in the spacecraft that grows at `rate`.
 
     .. math:: |\Delta\varphi| = \frac{\text{rate}\;T}{2\pi}, \qquad
         \text{or } \frac{\text{rate}\;T}{2n\sin(\pi/n)} \text{ for the mean of n samples}
 
     Parameters
     ----------
-    rate : in any unit a second.
+    rate : in any unit per second.
     roll_period : T, seconds.
-    samples : n in a roll, at least 2; many by default.
+    samples : n, samples per roll, at least 2; infinitely many by default.
     """
     if not roll_period > 0 or (samples is not None and samples < 2):
         raise ValueError(f"got a roll period of {roll_period} s with {samples} samples; needed above 0, and 2 or more")
@@ -230,28 +230,29 @@ def ramp_leak(rate: float, roll_period: float, samples: int | None = None) -> fl
 
 
 SINGLE = ("alpha1", "alpha2", "alpha3", "beta1", "beta2", "beta3", "gamma1", "gamma2", "gamma3")
-"""The angles whose small-angle form is looked at."""
+"""Angles whose small-angle form is examined."""
 
 
 def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> Floats:
-    r"""Error of φ, over a mean of whole rolls, that dropping products of small angles makes: one angle x alone.
+    r"""Return the error of φ in a mean over whole rolls if products of small angles are dropped; one angle x alone.
 
-    To third order, with the worse sign of x, for turns about the roll axis, for the others of β and γ, and for α2:
+    To third order, with the worse sign of x, the error for rotations about the roll axis, for the other angles β and γ,
+    and for α2 is
 
     .. math:: |x|\,|\varphi| + \dots, \qquad \tfrac14 x^2|\varphi|, \qquad
         \tfrac12 x^2|\varphi_2| + \tfrac12|x|\,|\varphi|^2
 
-    each together with what the drift alone makes, :math:`\varphi^3/6`.
+    each plus the error due to the drift alone, :math:`\varphi^3/6`.
 
     Parameters
     ----------
     name : one of `SINGLE`.
-    size : (...), of that angle; radians.
+    size : (...), size of that angle; radians.
     drift : true φ2, φ3; radians.
 
     Returns
     -------
-    loss : (...), length of the error (Δφ2, Δφ3); radians.
+    loss : (...), length of the vector (Δφ2, Δφ3); radians.
     """
     if name not in SINGLE:
         raise ValueError(f"got angle {name!r}; needed one of {', '.join(SINGLE)}")
@@ -273,7 +274,7 @@ def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (G
 
 
 def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
-    """Size of an angle whose :func:`small_angle_loss` is `allowed`; radians, at most half a turn."""
+    """Return the size of an angle whose :func:`small_angle_loss` is `allowed`; radians, at most half a turn."""
     if not 0 < allowed < small_angle_loss(name, math.pi, drift):
         raise ValueError(f"got allowed = {allowed}; needed an angle above 0 that half a turn of {name} exceeds")
     low, high = 0.0, math.pi
@@ -284,7 +285,7 @@ def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOT
 
 
 def twist_limit(allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
-    """Largest turn about the roll axis that moves no more than `allowed` from one drift into the other; radians."""
+    """Return the rotation about the roll axis that moves `allowed` from one drift to the other; both in radians."""
     if not allowed > 0:
         raise ValueError(f"got allowed = {allowed}; needed an angle above 0, in radians")
     return allowed / max(map(abs, drift))

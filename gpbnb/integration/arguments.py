@@ -1,4 +1,4 @@
-"""Arguments of the closed forms of digital integration, checked."""
+"""Checks of arguments for the closed forms of digital integration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Floats = NDArray[np.float64]
 
 
 def positive_array(name: str, values: ArrayLike) -> Floats:
-    """Positive, finite numbers as an array; ValueError otherwise."""
+    """Return positive, finite numbers as an array; raise ValueError otherwise."""
     array = np.asarray(values, dtype=np.float64)
     if not np.all((array > 0) & (array < np.inf)):
         bad = array[~((array > 0) & (array < np.inf))].flat[0]
@@ -20,7 +20,7 @@ def positive_array(name: str, values: ArrayLike) -> Floats:
 
 
 def positive_number(name: str, value: float) -> float:
-    """One positive, finite number; ValueError otherwise."""
+    """Return one positive, finite number; raise ValueError otherwise."""
     array = positive_array(name, value)
     if array.ndim:
         raise ValueError(f"got {name} of shape {array.shape}; needed one number; call it once for each")
@@ -28,15 +28,15 @@ def positive_number(name: str, value: float) -> float:
 
 
 def bandwidth_ratio(omega_bw: float, f_c: float) -> float:
-    """The ratio μ of bandwidth in rad/s and iteration rate in Hz; ValueError where it leaves the range of float64."""
+    """Return μ, bandwidth in rad/s over iteration rate in Hz; raise ValueError if it leaves the range of float64."""
     mu = positive_number("omega_bw", omega_bw) / positive_number("f_c", f_c)
     if not 0 < mu < math.inf:
-        raise ValueError(f"got omega_bw / f_c = {mu}; needed it within the range of float64; check the units")
+        raise ValueError(f"got omega_bw / f_c = {mu}; the ratio must lie within the range of float64; check the units")
     return mu
 
 
 def cycle_counts(n: ArrayLike) -> Floats:
-    """Numbers of cycles, at least 0 and finite; ValueError otherwise."""
+    """Return numbers of cycles, at least 0 and finite; raise ValueError otherwise."""
     array = np.asarray(n, dtype=np.float64)
     if not np.all((array >= 0) & (array < np.inf)):
         raise ValueError(f"got n = {n!r}; needed cycles, at least 0 and finite")

@@ -53,7 +53,7 @@ def transition() -> Derivation:
     return Derivation(
         (
             Step(
-                "(6) with $I$ added, first row: $\\phi_{11}$ solves it",
+                "equation (6) with $I$ added, first row: $\\phi_{11}$",
                 together(1, -OMEGA * integral),
                 ours[0, 0],
             ),
@@ -98,7 +98,7 @@ def discretization() -> Derivation:
                 P * (2 * OMEGA * T - 3 + 4 * DECAY - DECAY**2) / OMEGA**2,
             ),
             Step(
-                "$q_{22}$ from positive terms: what $q_1$ does not explain, and what it does",
+                "$q_{22}$ from positive terms: the parts uncorrelated and correlated with $q_1$",
                 q[1, 1],
                 together(bridge, over(q[0, 1] ** 2, q[0, 0])),
             ),
@@ -192,9 +192,9 @@ def continuous() -> Derivation:
             Step("(21), $\\dot P_{22}$", rate[1, 1], 2 * P12),
             Step("(22) is solved by $P_{12}$ of (23)", sp.Derivative(p12(TIME), TIME) + OMEGA * p12(TIME), P),
             Step("(22) is solved by $P_{22}$ of (23)", sp.Derivative(p22(TIME), TIME), 2 * p12(TIME)),
-            Step("both begin at zero", together(p12(sp.Integer(0)), p22(sp.Integer(0))), sp.Integer(0)),
+            Step("both start at zero", together(p12(sp.Integer(0)), p22(sp.Integer(0))), sp.Integer(0)),
             Step(
-                "(25) with the $1/\\omega$ that it lacks",
+                "(25) with the missing $1/\\omega$",
                 together(p22(TIME + T), -p22(TIME)),
                 p22_change(printed=False),
             ),
@@ -239,7 +239,7 @@ def steady_state() -> Derivation:
                 over(together(d33, d22, -2 * d32), T),
                 P * over((1 + DECAY) * T - 2 * phi21, 1 - DECAY),
             ),
-            Step("(34) with the $T$ that its second member lacks", over((1 + DECAY) * T - 2 * phi21, 1 - DECAY), last),
+            Step("(34) with the missing $T$ in its second member", over((1 + DECAY) * T - 2 * phi21, 1 - DECAY), last),
             Step("(35), squared, in units of $P\\,T$", (last / T).subs(OMEGA, MU / T), walk()),
             Step("a Langevin function", walk(), sp.coth(MU / 2).rewrite(sp.exp) - 2 / MU),
         )
@@ -268,12 +268,12 @@ def independent() -> Derivation:
                 r0,
             ),
             Step(
-                "what a sample $x$ lets one expect of the next error is $gTx$",
+                "$gT$: expected error of the next cycle for a sample of size 1",
                 drawn / T,
                 (1 - DECAY) / 2 * grow,
             ),
             Step(
-                "the sum $r_0 + 2r_1/(1-e^{-\\omega T})$ is (35)",
+                "the sum $r_0 + 2r_1/(1-e^{-\\omega T})$ equals (35)",
                 together(r0, over(2 * r1, 1 - DECAY)),
                 P * T**2 * grow,
             ),
@@ -295,7 +295,7 @@ def transient() -> Derivation:
         (
             Step("$c_n = E(e_nx_{1n})$ in units of $\\sigma_x^2T$: its recursion", PHI * c + g, c.subs(N, N + 1)),
             Step("$P_{n+1}$ from $P_n$, in units of $\\sigma_x^2T^2$", together(pee, 2 * g * c, r), pee.subs(N, N + 1)),
-            Step("it begins at zero", pee.subs(N, 0), sp.Integer(0)),
+            Step("the variance starts at zero", pee.subs(N, 0), sp.Integer(0)),
             Step(
                 "the same from $n\\,r_0 + 2\\sum_{k<n}(n-k)\\,r_1\\varphi^{k-1}$, summed",
                 total.subs(grown),
@@ -340,12 +340,12 @@ def small_mu() -> Derivation:
     return Derivation(
         (
             Step(
-                "(36): what it leaves out is of a higher order",
+                "(36): the omitted terms are of higher order",
                 sp.Limit((sp.exp(-MU) - cubic) / MU**3, MU, 0),
                 sp.Integer(0),
             ),
             Step(
-                "(37), numerator: its cubic term is $\\frac1{12}\\mu^3$, printed $\\frac16\\mu^3$",
+                "(37), numerator: the cubic term is $\\frac1{12}\\mu^3$, not $\\frac16\\mu^3$ as printed",
                 together(1, cubic),
                 sp.Mul(2, unevaluated(1 - MU / 2 + MU**2 / 4 - MU**3 / 12), evaluate=False),
             ),

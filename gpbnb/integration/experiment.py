@@ -1,4 +1,4 @@
-"""What does happen: integrals simulated exactly at the sampling times, and run in t-digit arithmetic."""
+"""Simulations: integrals that are exact at the sampling times, and integrators run in t-digit arithmetic."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # of progre
 
 
 class Accuracy(NamedTuple):
-    """Errors of an evaluation in float64 against one of many digits, in units of the last place of the result."""
+    """Errors of a float64 evaluation relative to a high-precision reference, in units in the last place."""
 
     mu: NDArray[np.float64]
     ulp: NDArray[np.float64]
 
 
 def _exact(name: str, mu: float) -> Any:
-    """A value of (35), or of the discretization, in as many digits as it cancels."""
+    """Evaluate (35), or a coefficient of the discretization, with enough digits to survive cancellation."""
     with mpmath.workdps(60 + 3 * max(0, math.ceil(-math.log10(mu)))):
         m = mpmath.mpf(mu)
         phi = mpmath.exp(-m)
@@ -60,7 +60,7 @@ def accuracy(name: str, mu: ArrayLike, printed: bool = False) -> Accuracy:
     ----------
     name : "walk" for (35), or a field of ``Discretization``.
     mu : (k,), positive.
-    printed : the form that cancels instead of the stable one; for "walk" and "q22".
+    printed : evaluate the form that cancels instead of the stable one; for "walk" and "q22".
     """
     if name != "walk" and name not in theory.Discretization._fields:
         raise ValueError(f"got name {name!r}; needed 'walk' or one of {', '.join(theory.Discretization._fields)}")
@@ -106,7 +106,7 @@ def _advance(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
 
 @compiled
 def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> None:
-    """The same for an input of first order, digit for digit."""
+    """Do the same for a first-order input, with identical digits."""
     phi, h, b00, b10, b11 = a[0, 0], a[1, 0], b[0, 0], b[1, 0], b[1, 1]
     cycles, paths, _ = normal.shape
     for k in range(cycles):
@@ -119,7 +119,7 @@ def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> Non
 
 
 def advance(step: Step, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
-    """Samples and errors of the trapezoids, cycle by cycle, from standard normal numbers.
+    """Compute samples and trapezoid errors, cycle by cycle, from standard normal numbers.
 
     Parameters
     ----------
@@ -153,9 +153,9 @@ def chunks(
 ) -> Iterator[Chunk]:
     """Simulate a process and the error of the trapezoidal rule, exact in distribution at the sampling times.
 
-    No step is subdivided: the sample and the integral over a cycle are drawn from their joint distribution, given what
-    was before. It begins in the steady state. Memory is bounded, whatever the number of cycles, and the numbers do
-    not depend on how they are cut into chunks.
+    No step is subdivided: the sample and the integral over a cycle are drawn from their joint distribution, given the
+    previous sample. The simulation starts in the steady state. Its memory is bounded for any number of cycles, and its
+    numbers do not depend on the size of the chunks.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def chunks(
 
 
 def rule_errors(rule: Rule, f_c: float, chunk: Chunk) -> Floats:
-    """Error that each cycle of a chunk adds when integrated by a rule; (cycles, paths)."""
+    """Return the error (cycles, paths) that each cycle of a chunk adds if a rule integrates it."""
     memory, cycles = len(chunk.x) - len(chunk.d), len(chunk.d)
     if memory < rule.memory:
         raise ValueError(f"got a memory of {memory} samples; needed {rule.memory} for the rule {rule.name!r}")
@@ -221,11 +221,11 @@ class Simulation:
 
     @property
     def relative_standard_error(self) -> float:
-        r"""Of :attr:`variance`: :math:`\\sqrt{2/\\mathrm{paths}}`, since the errors are normal."""
+        r"""Relative standard error of :attr:`variance`, :math:`\sqrt{2/\mathrm{paths}}` for normal errors."""
         return math.sqrt(2 / self.errors.shape[1])
 
     def deviations(self, variance: ArrayLike) -> Floats:
-        """How far the observed variance is from a theoretical one, in standard errors."""
+        """Return the deviation of the observed variance from a theoretical one, in standard errors."""
         expected = np.asarray(variance, dtype=np.float64)
         return np.asarray((self.variance / expected - 1) / self.relative_standard_error)
 
@@ -238,15 +238,16 @@ def simulate(
     paths: int = 1,
     rule: Rule = theory.RULES["trapezoidal"],
 ) -> Simulation:
-    """Simulate the error of an integrator, and keep it after each of some numbers of cycles.
+    """Simulate the error of an integrator, and record it after the given numbers of cycles.
 
     Parameters
     ----------
-    n : cycles, rising, at least 1; multiples of the period of the rule, or its unfinished period counts as error.
+    n : increasing numbers of cycles, at least 1. Use multiples of the period of the rule; samples of an unfinished
+        period count as error.
     """
     wanted = tuple(int(k) for k in n)
     if not wanted or wanted[0] < 1 or list(wanted) != sorted(set(wanted)):
-        raise ValueError(f"got n = {tuple(n)}; needed rising numbers of cycles, at least 1")
+        raise ValueError(f"got n = {tuple(n)}; needed increasing numbers of cycles, at least 1")
     total, kept = np.zeros(paths), []
     bar = tqdm(total=wanted[-1], desc="cycles", unit_scale=True, **BAR)
     for chunk in chunks(process, f_c, wanted[-1], rng, paths, rule.memory):
@@ -267,7 +268,7 @@ def simulate(
 
 @dataclass(frozen=True)
 class Sweep:
-    r"""Random walks observed at many :math:`\mu`, as variance per cycle over :math:`\sigma_x^2T^2`."""
+    r"""Simulated random walks at many :math:`\mu`: variance per cycle, divided by :math:`\sigma_x^2T^2`."""
 
     mu: Floats
     cycles: int
@@ -276,16 +277,16 @@ class Sweep:
 
     @property
     def standard_error(self) -> float:
-        """Relative, of `walk`."""
+        """Relative standard error of `walk`."""
         return math.sqrt(2 / self.paths)
 
     def deviations(self) -> Floats:
-        """From the exact variance after as many cycles, in standard errors."""
+        """Return deviations from the exact variance after the same number of cycles, in standard errors."""
         exact = np.array([float(theory.error_variance(self.cycles, mu)) for mu in self.mu.tolist()]) / self.cycles
         return np.asarray((self.walk / exact - 1) / self.standard_error)
 
     def deviations_from(self, factor: Floats) -> Floats:
-        """From another theory of the variance per cycle, in standard errors."""
+        """Return deviations from another formula for the variance per cycle, in standard errors."""
         return np.asarray((self.walk / factor - 1) / self.standard_error)
 
 
@@ -294,8 +295,8 @@ def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> S
 
     Parameters
     ----------
-    cycles : in each run; the variance per cycle is short of the steady one by at most 1/(2 cycles) of itself.
-    paths : independent runs; the relative standard error of a variance is √(2/paths).
+    cycles : number in each run; the variance per cycle is below its steady value by a fraction of at most 1/(2 cycles).
+    paths : number of independent runs; the relative standard error of a variance is √(2/paths).
     """
     values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
     bar = tqdm(values.tolist(), desc="sweep", **BAR)
@@ -308,7 +309,7 @@ def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> S
 
 @compiled
 def _integrate(fmt: Any, half: Any, x: Any, total: Any) -> None:
-    """(2) for each path: add half T times the sum of two samples to the accumulator, every operation rounded.
+    """Apply (2) to each path: add T/2 times the sum of two samples to the accumulator, with every operation rounded.
 
     x is (samples, paths) in the format, its first row the sample before; `half` and `total` are (1,) and (paths,).
     """
@@ -325,7 +326,7 @@ def _integrate(fmt: Any, half: Any, x: Any, total: Any) -> None:
 
 @compiled
 def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
-    """The same for samples in float64, each of which is rounded as it comes in."""
+    """Do the same for float64 samples, each of which is rounded first."""
     factor = load(fmt, half, 0)
     for path in range(x.shape[1]):
         s = load(fmt, total, path)
@@ -338,17 +339,17 @@ def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
 
 
 class Accumulator:
-    """The trapezoidal rule (2) in a format, fed chunk by chunk.
+    """Run the trapezoidal rule (2) in a format, chunk by chunk.
 
     Parameters
     ----------
-    fmt : one with compiled loops: base 2, 10 or 16.
+    fmt : format with compiled loops: base 2, 10 or 16.
     period : T, s; T/2 is rounded to the format.
-    paths : integrals that run side by side.
+    paths : number of integrals that run in parallel.
 
     Raises
     ------
-    ValueError : a format without compiled loops.
+    ValueError : the format has no compiled loops.
     """
 
     def __init__(self, fmt: FloatFormat, period: float, paths: int) -> None:
@@ -360,7 +361,7 @@ class Accumulator:
         self._total = backend.pack(fmt.array(np.zeros(paths)).components)
 
     def feed(self, x: Floats) -> None:
-        """Go on with the samples x, (samples, paths); the first row is the last one of the chunk before."""
+        """Continue with the samples x, (samples, paths); the first row repeats the last row of the previous chunk."""
         if self.fmt.base == 10:
             packed = self.backend.pack(self.fmt.array(x).components)
             _integrate(self.backend.tag, self._half, packed, self._total)
@@ -369,13 +370,13 @@ class Accumulator:
 
     @property
     def value(self) -> Floats:
-        """The integrals so far, (paths,), nearest float64."""
+        """Current integrals (paths,), rounded to float64."""
         return self.backend.to_float(self.backend.unpack(self._total))
 
 
 @dataclass(frozen=True)
 class Emulation:
-    """Integrals in a format beside the true ones; errors are (paths,), in the unit of the input times seconds."""
+    """Errors (paths,) of integrals computed in a format, in the unit of the input times seconds."""
 
     fmt: FloatFormat
     omega_bw: float
@@ -386,12 +387,12 @@ class Emulation:
 
     @property
     def rms(self) -> theory.Errors:
-        """Root mean squares of the two errors."""
+        """Root mean square of each of the two errors."""
         return theory.Errors(*(math.sqrt(float(np.mean(e**2))) for e in (self.discretization, self.rounding)))
 
     @property
     def rms_total(self) -> float:
-        """Root mean square of the error of the integral."""
+        """Root mean square of the total error."""
         return math.sqrt(float(np.mean((self.discretization + self.rounding) ** 2)))
 
 
@@ -404,10 +405,10 @@ def emulate(
     paths: int = 64,
     sigma_x: float = 1.0,
 ) -> tuple[Emulation, ...]:
-    """Run the integrator in some formats on the same samples, beside float64 and the true integral.
+    """Run the integrator in several formats on the same samples, and compare with float64 and the exact integral.
 
-    The rounding error is the difference from the same rule in float64 on unrounded samples, whose own rounding is
-    left out: formats of up to 40 bits, or 12 decimal digits.
+    The rounding error is the difference from the same rule in float64 with unrounded samples. The rounding error of
+    float64 itself is neglected, so formats may have at most 40 bits or 12 decimal digits.
 
     Parameters
     ----------

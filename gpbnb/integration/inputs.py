@@ -1,8 +1,9 @@
-r"""Other inputs and other integrators: spectra, exact steps and the random walk of each.
+r"""Other inputs and other integrators: spectra, exact steps and random walks.
 
 The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input in rad/s, T cycle time in s,
-:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. What
-is called a factor has the units of the input and of T divided out. Arrays of :math:`\mu` are taken entry by entry.
+:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. A
+"factor" is dimensionless: it is divided by the units of the input and of T. Functions apply to arrays of
+:math:`\mu` entry by entry.
 """
 
 from __future__ import annotations
@@ -39,26 +40,26 @@ class Process:
     drift: tuple[tuple[float, ...], ...]
 
     def autocovariance(self, tau: ArrayLike) -> Floats:
-        """R at the lags `tau`, s."""
+        """Return the autocovariance R at the lags `tau` in s."""
         lag = np.abs(np.asarray(tau, dtype=np.float64))
         total: Any = sum(c * np.exp(-p * lag) for c, p in zip(self.weights, self.poles, strict=True))
         return np.asarray(self.sigma**2 * np.real(total))
 
     def psd(self, omega: ArrayLike) -> Floats:
-        """Two-sided spectral density at `omega`, rad/s; its integral over frequencies in Hz is the variance."""
+        """Return the two-sided spectral density at `omega` in rad/s; integrated over frequency in Hz, it gives σ²."""
         s = np.asarray(omega, dtype=np.float64)
         total: Any = sum(2 * c * p / (p * p + s * s) for c, p in zip(self.weights, self.poles, strict=True))
         return np.asarray(self.sigma**2 * np.real(total))
 
 
 def first_order(sigma_x: float, omega_bw: float) -> Process:
-    r"""The input of savage2016, (1): :math:`R = \sigma_x^2e^{-\omega_{bw}|\tau|}`; `omega_bw` in rad/s."""
+    r"""Return the input of savage2016, (1): :math:`R = \sigma_x^2e^{-\omega_{bw}|\tau|}`; `omega_bw` in rad/s."""
     sigma_x, omega_bw = positive_number("sigma_x", sigma_x), positive_number("omega_bw", omega_bw)
     return Process("first order", sigma_x, (complex(omega_bw),), (1 + 0j,), ((-omega_bw,),))
 
 
 def resonant(sigma_x: float, omega_0: float, zeta: float) -> Process:
-    r"""White noise through :math:`\ddot x + 2\zeta\omega_0\dot x + \omega_0^2x`, a second-order input with a resonance.
+    r"""Return a resonant input: white noise through :math:`\ddot x + 2\zeta\omega_0\dot x + \omega_0^2x`.
 
     Parameters
     ----------
@@ -90,9 +91,9 @@ class Step(NamedTuple):
 def exact_step(process: Process, f_c: float) -> Step:
     r"""Discretize a process together with the error of the trapezoidal rule, exact at the sampling times.
 
-    For the first order in closed form. With h the part of :math:`L\tanh(\mu/2)`,
-    :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b`, where b has the variance ``bridge`` of ``discretize``. For others
-    from the matrix exponential, with as many digits as the cancellation takes.
+    First-order inputs have a closed form. With :math:`h = L\tanh(\mu/2)`,
+    :math:`d_n = \tfrac12Th(x_{n-1}+x_n) + b`, where b has the variance ``bridge`` of ``discretize``. Other
+    inputs use the matrix exponential, with enough digits to survive the cancellation.
     """
     period = 1 / positive_number("f_c", f_c)
     sigma = process.sigma
@@ -142,15 +143,16 @@ def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Rule:
-    r"""A rule of integration: at step r of a period it adds :math:`T\sum_j w_{rj}\,x_{n-j}`.
+    r"""An integration rule: at step r of a period it adds :math:`T\sum_j w_{rj}\,x_{n-j}`.
 
     Parameters
     ----------
-    weights : a tuple of w for each step of a period; empty where the rule waits.
+    weights : a tuple of w for each step of a period; empty if the rule adds nothing at that step.
 
     Raises
     ------
-    ValueError : no step; or weights whose sum is not the number of steps, so that a constant is not integrated.
+    ValueError : the rule has no step, or its weights do not sum to the number of steps, so that a constant would be
+        integrated incorrectly.
     """
 
     name: str
@@ -162,22 +164,22 @@ class Rule:
         total = sum((w for step in self.weights for w in step), start=Fraction(0))
         if total != len(self.weights):
             raise ValueError(
-                f"got weights that sum to {total} over {len(self.weights)} steps; needed {len(self.weights)}, or a "
-                "constant is integrated wrongly; scale the weights"
+                f"got weights that sum to {total} over {len(self.weights)} steps; needed {len(self.weights)}, so "
+                "that a constant is integrated correctly; scale the weights"
             )
 
     @property
     def period(self) -> int:
-        """Steps after which the rule repeats."""
+        """Number of steps after which the rule repeats."""
         return len(self.weights)
 
     @property
     def memory(self) -> int:
-        """Cycles that the rule looks back."""
+        """Number of past cycles whose samples the rule uses."""
         return max(1, *(len(step) - 1 for step in self.weights))
 
     def sample_weights(self) -> tuple[Fraction, ...]:
-        """Weights that the samples of a period have in the end; their mean is 1."""
+        """Return the total weight of each sample in a period; their mean is 1."""
         total = [Fraction(0)] * self.period
         for r, step in enumerate(self.weights):
             for j, w in enumerate(step):
@@ -185,7 +187,7 @@ class Rule:
         return tuple(total)
 
     def harmonics(self) -> tuple[complex, ...]:
-        r"""Fourier coefficients :math:`W_0 \dots W_{p-1}` of :meth:`sample_weights`; W_0 is 1."""
+        r"""Return the Fourier coefficients :math:`W_0 \dots W_{p-1}` of :meth:`sample_weights`; W_0 is 1."""
         p, total = self.period, self.sample_weights()
         turn = [complex(math.cos(2 * math.pi * k / p), -math.sin(2 * math.pi * k / p)) for k in range(p)]
         return tuple(sum(float(a) * turn[m * i % p] for i, a in enumerate(total)) / p for m in range(p))
@@ -195,7 +197,7 @@ def _rule(name: str, *steps: Sequence[str]) -> Rule:
     return Rule(name, tuple(tuple(map(Fraction, step)) for step in steps))
 
 
-#: Integrators by name. All but the closed Newton-Cotes rules give every sample the weight 1 in the end.
+#: Integrators by name. All but the closed Newton-Cotes rules give every sample a total weight of 1.
 RULES = {
     rule.name: rule
     for rule in (
@@ -213,7 +215,7 @@ RULES = {
 
 
 def walk_rate(process: Process, f_c: float, rule: Rule = RULES["trapezoidal"]) -> float:
-    r"""Random walk of any rule and process: growth of the error variance per second.
+    r"""Return the random walk for any rule and input: growth of the error variance per second.
 
     .. math:: \dot P_{ee} = \sum_{k\ne0} S(2\pi kf_c) +
         \sum_{m=1}^{p-1} |W_m|^2 \sum_k S\bigl(2\pi f_c(k+\tfrac mp)\bigr)
@@ -237,7 +239,7 @@ def walk_rate(process: Process, f_c: float, rule: Rule = RULES["trapezoidal"]) -
 
 
 def folded(process: Process, period: float, theta: Fraction = Fraction(0)) -> float:
-    r"""Spectral density at :math:`2\pi f_c(k+\theta)` summed over all k, without k = 0 where :math:`\theta = 0`."""
+    r"""Sum the spectral density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`."""
     mu = max(abs(p) for p in process.poles) * period
     total = mpmath.mpf(0)
     with mpmath.workdps(30 + 8 * max(1, math.ceil(abs(math.log10(mu)) + 1))):
@@ -253,7 +255,7 @@ def folded(process: Process, period: float, theta: Fraction = Fraction(0)) -> fl
 
 
 def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
-    """Weights and poles in the precision at work."""
+    """Return weights and poles in the current working precision."""
     if len(process.drift) == 1:
         return [(mpmath.mpf(1), mpmath.mpf(-process.drift[0][0]))]
     (_, omega_0), (_, minus) = process.drift
@@ -264,20 +266,20 @@ def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
 
 
 def best_possible_rate(process: Process, f_c: float) -> float:
-    r"""Least random walk of any weighing of the samples, right for constants or not, :math:`S(0)A/(S(0)+A)`.
+    r"""Return the smallest random walk for any weights of the samples, :math:`S(0)A/(S(0)+A)`.
 
-    A is :func:`walk_rate` of the trapezoidal rule, which is the least for rules that are right for constants. The
-    bound belongs to samples scaled by :math:`S(0)/(S(0)+A)`, the best estimate of the integral from all samples.
+    A is :func:`walk_rate` for the trapezoidal rule, the smallest for rules that integrate a constant correctly. Samples
+    scaled by :math:`S(0)/(S(0)+A)` reach this bound, but do not integrate a constant correctly.
     """
     walk, low = walk_rate(process, f_c), float(process.psd(0.0))
     return low * walk / (low + walk)
 
 
 def rule_variance(process: Process, f_c: float, rule: Rule, n: int) -> Floats:
-    """Variance of the error of a rule after 0 … n cycles, from the covariance recursion of its state; exact.
+    """Return the error variance of a rule after 0 … n cycles, from the exact covariance recursion of its state.
 
-    The state holds z, as many past samples as the rule looks back, and the error. Within a period the error of a rule
-    that waits includes what it has not yet added.
+    The state consists of z, the past samples that the rule uses, and the error. Within a period, the error includes
+    samples that the rule has not added yet.
 
     Returns
     -------
@@ -301,7 +303,7 @@ def rule_variance(process: Process, f_c: float, rule: Rule, n: int) -> Floats:
 
 
 def _past(process: Process, period: float, h: int) -> Floats:
-    """Covariance of z_0, x_{-1} … x_{-h} in the steady state: from the oldest on, forwards."""
+    """Return the steady-state covariance of z_0, x_{-1} … x_{-h}, computed forwards from the oldest sample."""
     m = len(process.drift)
     a, b = exact_step(process, 1 / period)
     move, drive = np.zeros((m + h, m + h)), np.zeros((m + h, m + 1))
@@ -317,7 +319,7 @@ def _past(process: Process, period: float, h: int) -> Floats:
 
 
 def _moves(step: Step, weights: Sequence[float], m: int, h: int, period: float) -> tuple[Floats, Floats]:
-    """One cycle of the state of :func:`rule_variance`: its matrix, and what multiplies the normal numbers."""
+    """Return one cycle of the state of :func:`rule_variance`: the transition matrix, and the factor of the noise."""
     size = m + h + 1
     move, drive = np.zeros((size, size)), np.zeros((size, m + 1))
     move[:m, :m], drive[:m] = step.a[:m], step.b[:m]

@@ -1,8 +1,9 @@
-r"""Integration errors in t-digit arithmetic: the integration error and the rounding error together.
+r"""Errors of digital integration in t-digit arithmetic: discretization and rounding together.
 
 The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input in rad/s, T cycle time in s,
-:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. What
-is called a factor has the units of the input and of T divided out. Arrays of :math:`\mu` are taken entry by entry.
+:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. A
+"factor" is dimensionless: it is divided by the units of the input and of T. Functions apply to arrays of
+:math:`\mu` entry by entry.
 """
 
 from __future__ import annotations
@@ -24,16 +25,17 @@ from gpbnb.integration.walk import discretize, error_variance
 
 
 def mean_square_rounding(fmt: FloatFormat) -> float:
-    r"""Mean square of the relative error of one rounding to nearest, :math:`\kappa = b^{-2t}(b^2-1)/(24\ln b)`.
+    r"""Return the mean square relative error of one rounding to nearest, :math:`\kappa = b^{-2t}(b^2-1)/(24\ln b)`.
 
-    For a number whose logarithm is spread evenly: an error spread evenly over a spacing :math:`b^{e-t}`.
+    It assumes a number whose logarithm is uniformly distributed, and an error uniformly distributed over a spacing
+    :math:`b^{e-t}`.
     """
     b = fmt.base
     return float(b) ** (-2 * fmt.precision) * (b * b - 1) / (24 * math.log(b))
 
 
 def mean_chopping(fmt: FloatFormat) -> float:
-    r"""Mean relative error of chopping, :math:`\kappa_1 = b^{-t}(b-1)/(2\ln b)`, for the same numbers."""
+    r"""Return the mean relative error of chopping, :math:`\kappa_1 = b^{-t}(b-1)/(2\ln b)`, for the same numbers."""
     return float(fmt.base) ** -fmt.precision * (fmt.base - 1) / (2 * math.log(fmt.base))
 
 
@@ -45,22 +47,22 @@ class Errors(NamedTuple):
 
     @property
     def total(self) -> float:
-        """Both, as independent errors add up."""
+        """Root-sum-square of both errors."""
         return math.hypot(*self)
 
 
 def correlation_factor(change: ArrayLike) -> Floats:
-    r"""How much roundings that follow each other add up beyond independent ones.
+    r"""Return how much more successive rounding errors add up than independent ones.
 
     .. math:: F = 1 + \sum_{k\ge1} \frac{6}{\pi^2k^2\,\sinh(2\pi^2k^2s^2)}
 
-    The accumulator is a multiple of its spacing u, so that the error of adding p depends on the fraction of p/u alone.
-    While p changes little from cycle to cycle, so does the error. s is the rms change of p from one cycle to the
-    next, in spacings; F is 1.05 at s = 0.5 and near :math:`1/(30s^2)` below.
+    The accumulator is a multiple of its spacing u, so the error of adding p depends only on the fractional part of p/u.
+    If p changes little from cycle to cycle, so does the error. s is the rms change of p from one cycle to the
+    next, in spacings; F is 1.05 at s = 0.5, and close to :math:`1/(30s^2)` for smaller s.
 
     Parameters
     ----------
-    change : s, positive. The formula is right while p itself is spread over more than a spacing.
+    change : s, positive. The formula holds if p itself varies by more than a spacing.
     """
     s = positive_array("change", change)[..., np.newaxis]
     k = np.arange(1, 65)
@@ -69,21 +71,22 @@ def correlation_factor(change: ArrayLike) -> Floats:
 
 
 def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt: FloatFormat) -> Errors:
-    r"""Errors of the trapezoidal rule run in a format, at the end of a `duration` t of many correlation times.
+    r"""Return both errors of the trapezoidal rule in a format, after a `duration` t of many correlation times.
 
-    Discretization: ``error_variance``. Rounding to nearest: the sum of
+    The discretization error follows from ``error_variance``. With rounding to nearest, the rounding error has three
+    parts:
 
     - the errors of the additions to the accumulator, whose variance grows as (23); their mean square is that of a
       spacing u of the accumulator, :math:`u^2F/12`;
-    - what ties add in an even base: one addition in u over the spacing of the increment is a tie, and half away from
-      zero moves it outwards, by :math:`\kappa_1E|p|` in the mean. The sum has the rms
-      :math:`\kappa_1\sigma_xt\sqrt{(1+\varphi)/2\pi}`, where 1/2 is the mean square of the share of time that a random
-      walk is more often on one side than on the other;
-    - the roundings of sample, sum and product, each of the mean square :math:`\kappa` of its number.
+    - the effect of ties in an even base: one addition in u over the spacing of the increment is a tie, and rounding
+      half away from zero moves it outwards, by :math:`\kappa_1E|p|` on average. The sum has the rms
+      :math:`\kappa_1\sigma_xt\sqrt{(1+\varphi)/2\pi}`, where 1/2 is the mean square of the difference between the
+      fractions of time that a random walk spends on either side of zero;
+    - the roundings of sample, sum and product, each with the mean square :math:`\kappa` relative to its result.
 
-    T/2 counts as exact: its one rounding changes the integral by a share that no rate changes.
+    T/2 is treated as exact: its rounding changes the integral by a fraction that does not depend on the rate.
 
-    Chopping: each addition takes the share :math:`\kappa_1` off the accumulator, which leaks. With
+    With chopping, each addition takes the fraction :math:`\kappa_1` off the accumulator, so the accumulator leaks. With
     :math:`a = \kappa_1f_ct` the error has the variance
     :math:`(2\sigma_x^2t/\omega_{bw})\,(2a-3+4e^{-a}-e^{-2a})/2a`, or :math:`2\sigma_x^2ta^2/3\omega_{bw}` for small a.
 
@@ -93,7 +96,7 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
 
     Raises
     ------
-    ValueError : an argument is not positive and finite, or `duration` shorter than two cycles.
+    ValueError : an argument is not positive and finite, or `duration` is shorter than two cycles.
     """
     sigma_x, mu = positive_number("sigma_x", sigma_x), bandwidth_ratio(omega_bw, f_c)
     period, n = 1 / f_c, positive_number("duration", duration) * f_c
@@ -130,13 +133,14 @@ def _addition(spread: Floats, change: float, fmt: FloatFormat) -> Floats:
 
 
 def independent_best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
-    r"""The best rate in Hz in closed form, for :math:`\mu\ll1` and independent roundings to nearest.
+    r"""Return the best rate in Hz in closed form, for :math:`\mu\ll1` and independent roundings to nearest.
 
     .. math:: f_c = \left(\frac{\omega_{bw}^2}{3\kappa t}\right)^{1/3}
 
-    There, the variance of the rounding error, :math:`\kappa\sigma_x^2t^2f_c/\omega_{bw}`, is twice that of the
-    discretization error, :math:`\sigma_x^2\omega_{bw}t/6f_c^2`. With chopping both grow and fall alike, in
-    :math:`f_c = (\omega_{bw}^2/4\kappa_1^2t^2)^{1/4}`. The rms of the input does not matter.
+    At this rate, the variance of the rounding error, :math:`\kappa\sigma_x^2t^2f_c/\omega_{bw}`, is twice that of the
+    discretization error, :math:`\sigma_x^2\omega_{bw}t/6f_c^2`. With chopping the two
+    variances are equal at the best rate, :math:`f_c = (\omega_{bw}^2/4\kappa_1^2t^2)^{1/4}`. The rms of the input does
+    not matter.
     """
     omega_bw, duration = positive_number("omega_bw", omega_bw), positive_number("duration", duration)
     if fmt.rounding is Rounding.CHOP:
@@ -145,7 +149,7 @@ def independent_best_rate(omega_bw: float, duration: float, fmt: FloatFormat) ->
 
 
 def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
-    """Iteration rate in Hz at which the total of :func:`two_errors` is least; below :func:`stall_rate`.
+    """Return the iteration rate in Hz that minimizes the total of :func:`two_errors`; it is below :func:`stall_rate`.
 
     Parameters
     ----------
@@ -153,7 +157,7 @@ def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
 
     Raises
     ------
-    ValueError : at no rate is the total error below half of the integral's own rms: use more digits.
+    ValueError : at every rate the total error exceeds half of the rms of the integral; use more digits.
     """
     guess = independent_best_rate(omega_bw, duration, fmt)
 
@@ -180,14 +184,14 @@ def needed_precision(
     rounding: Rounding = Rounding.NEAREST,
     share: float = 0.1,
 ) -> int:
-    """Least digits with which the rounding error stays below `share` of the discretization error.
+    """Return the fewest digits for which the rounding error is at most `share` of the discretization error.
 
     Raises
     ------
-    ValueError : `share` not above 0, or an argument of :func:`two_errors` is refused.
+    ValueError : `share` is not positive, or :func:`two_errors` rejects an argument.
     """
     if not 0 < share < math.inf:
-        raise ValueError(f"got share = {share}; needed a positive number, as 0.1 for a tenth")
+        raise ValueError(f"got share = {share}; needed a positive number, such as 0.1 for a tenth")
 
     def enough(fmt: FloatFormat) -> bool:
         errors = two_errors(1.0, omega_bw, f_c, duration, fmt)
@@ -203,9 +207,9 @@ def needed_precision(
 
 
 def stall_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
-    r"""Rate in Hz at which the rms increment is half a spacing of the accumulator at the end.
+    r"""Return the rate in Hz at which the rms increment is half a spacing of the accumulator at the end.
 
-    Near it and beyond, additions are lost, :func:`two_errors` is no longer right, and the integral stands still.
+    At this rate and above, additions are lost, the integral stops changing, and :func:`two_errors` no longer holds.
     """
     omega_bw, duration = positive_number("omega_bw", omega_bw), positive_number("duration", duration)
     spacing = math.sqrt(12 * mean_square_rounding(fmt) * 2 * duration / omega_bw)

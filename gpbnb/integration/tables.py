@@ -12,14 +12,14 @@ from gpbnb.integration.theory import Process
 
 
 def sensor(sigma_x: float, bandwidth_hz: float, unit: str, rates: Sequence[float]) -> Table:
-    """Random walk of an integrated sensor at some iteration rates.
+    """Tabulate the random walk of an integrated sensor at some iteration rates.
 
     Parameters
     ----------
-    sigma_x : rms of what the sensor sees, in `unit` per second.
-    bandwidth_hz : of it, Hz; times 2π for rad/s.
-    unit : of the integral, as "°".
-    rates : Hz.
+    sigma_x : rms of the signal, in `unit` per second.
+    bandwidth_hz : bandwidth of the signal, Hz.
+    unit : unit of the integral, such as "°".
+    rates : iteration rates, Hz.
     """
     omega = 2 * math.pi * bandwidth_hz
     body: list[tuple[str, ...]] = []
@@ -37,17 +37,17 @@ def sensor(sigma_x: float, bandwidth_hz: float, unit: str, rates: Sequence[float
         )
     header = (
         "$f_c$, Hz",
-        "ratio $\\mu$",
+        "$\\mu$, rad",
         f"(35), {unit}/√s",
         f"(39), {unit}/√s",
         "(39)/(35) − 1",
-        f"(35), {unit}/√h, and {unit} after an hour",
+        f"(35), {unit}/√h",
     )
     return Table(f"random walk at {len(body)} rates", header, tuple(body))
 
 
 def rules(processes: Sequence[tuple[Process, float]]) -> Table:
-    """Random walk of every rule over that of the trapezoidal one, for pairs of a process and a rate in Hz."""
+    """Tabulate the random walk of rules relative to the trapezoidal one, for pairs of an input and a rate in Hz."""
     body: list[tuple[str, ...]] = []
     for rule in theory.RULES.values():
         weights = rule.sample_weights()
@@ -58,23 +58,23 @@ def rules(processes: Sequence[tuple[Process, float]]) -> Table:
             cells.append(f"{math.sqrt(ratio):.4g}")
         body.append(tuple(cells))
     names = (f"{process.name}, $|p|T = {max(abs(p) for p in process.poles) / f_c:.3g}$" for process, f_c in processes)
-    return Table(f"{len(body)} rules", ("rule", "cycles a period", "weights of the samples", *names), tuple(body))
+    return Table(f"{len(body)} rules", ("rule", "period (cycles)", "weights of the samples", *names), tuple(body))
 
 
 def misprints(mu: float = 0.1, period: float = 0.01) -> Table:
-    """What each slip of the print would have made of the rate, at one μ and a cycle time in s."""
+    """Tabulate the random walk that each misprint would have caused, for one μ and a cycle time in s."""
     right = float(derivation.walk().subs(derivation.MU, mu))
     body: list[tuple[str, ...]] = []
     for place, rate in derivation.misprints().items():
         value = float(rate.subs({derivation.MU: mu, derivation.T: period}))
         spoiled = "no" if math.isclose(value, right, rel_tol=1e-9) else "yes"
         body.append((place, f"{value:.5g}", f"{right:.5g}", spoiled))
-    header = ("slip in", f"rate over $\\sigma_x^2T$ if used, $\\mu = {mu:g}$", "right", "spoils (35)")
+    header = ("misprint in", f"result if used, over $\\sigma_x^2T$, $\\mu = {mu:g}$", "correct", "changes (35)")
     return Table(f"{len(body)} misprints", header, tuple(body))
 
 
 def design(omega_bw: float, duration: float, precisions: Sequence[int], base: int = 2) -> Table:
-    """The best rate of formats and the two errors there, over the input's rms; "none" where no rate will do."""
+    """Tabulate the best rate for formats and both errors, relative to the rms of the input; "none" if no rate works."""
     body: list[tuple[str, ...]] = []
     for t in precisions:
         for rounding in Rounding.documented():

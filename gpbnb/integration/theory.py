@@ -1,11 +1,12 @@
-r"""What may happen: the error of digital integration, in closed form.
+r"""Closed forms for the error of digital integration.
 
 This module gathers the public names of :mod:`~gpbnb.integration.walk`, :mod:`~gpbnb.integration.inputs` and
 :mod:`~gpbnb.integration.precision`.
 
 The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input in rad/s, T cycle time in s,
-:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. What
-is called a factor has the units of the input and of T divided out. Arrays of :math:`\mu` are taken entry by entry.
+:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. A
+"factor" is dimensionless: it is divided by the units of the input and of T. Functions apply to arrays of
+:math:`\mu` entry by entry.
 """
 
 from gpbnb.integration.inputs import (

@@ -1,8 +1,9 @@
-r"""The random walk of the integration error in closed form, and the error before its steady state.
+r"""The random walk of the integration error in closed form, and the error in the first cycles.
 
 The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input in rad/s, T cycle time in s,
-:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. What
-is called a factor has the units of the input and of T divided out. Arrays of :math:`\mu` are taken entry by entry.
+:math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. A
+"factor" is dimensionless: it is divided by the units of the input and of T. Functions apply to arrays of
+:math:`\mu` entry by entry.
 """
 
 from __future__ import annotations
@@ -22,13 +23,13 @@ from gpbnb.integration.arguments import Floats, bandwidth_ratio, cycle_counts, p
 
 
 def langevin(x: ArrayLike) -> Floats:
-    r"""Langevin's function, :math:`L(x) = \coth x - 1/x`, for x > 0; to a few units in the last place.
+    r"""Evaluate Langevin's function, :math:`L(x) = \coth x - 1/x`, for x > 0, to a few units in the last place.
 
-    Up to x = 2 from Lambert's continued fraction, whose terms are all positive,
+    Up to x = 2, the function uses Lambert's continued fraction, whose terms are all positive,
 
     .. math:: L(x) = \cfrac{x}{3 + \cfrac{x^2}{5 + \cfrac{x^2}{7 + \dots}}}
 
-    cut where the rest is below :math:`10^{-18}` of the whole; beyond as
+    truncated where the remainder is below :math:`10^{-18}` of the result. Beyond x = 2 it uses
     :math:`(1 - 1/x) + 2e^{-2x}/(1 - e^{-2x})`.
 
     Parameters
@@ -54,7 +55,7 @@ def langevin(x: ArrayLike) -> Floats:
 
 
 def walk_factor(mu: ArrayLike) -> Floats:
-    r"""Growth of the error variance in one cycle, :math:`\dot P_{ee}/(\sigma_x^2 T)`; savage2016, (35).
+    r"""Return the growth of the error variance in one cycle, :math:`\dot P_{ee}/(\sigma_x^2 T)`; savage2016, (35).
 
     .. math:: \frac{1+e^{-\mu}}{1-e^{-\mu}} - \frac2\mu = L(\mu/2)
     """
@@ -62,14 +63,14 @@ def walk_factor(mu: ArrayLike) -> Floats:
 
 
 def printed_walk_factor(mu: ArrayLike) -> Floats:
-    """The same, evaluated in float64 just as (35) is printed; infinite where that divides by zero."""
+    """Evaluate (35) in float64 exactly as printed; infinite where this divides by zero."""
     mu = positive_array("mu", mu)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.asarray((1 + np.exp(-mu)) / (1 - np.exp(-mu)) - 2 / mu)
 
 
 def series(terms: int) -> tuple[Fraction, ...]:
-    r"""Coefficients of :math:`\mu, \mu^3, \mu^5, \dots` in :func:`walk_factor`, :math:`2B_{2k}/(2k)!`; exact.
+    r"""Return the exact coefficients of :math:`\mu, \mu^3, \mu^5, \dots` in :func:`walk_factor`, :math:`2B_{2k}/(2k)!`.
 
     The series converges for :math:`\mu < 2\pi`. Its first coefficient, 1/6, is (37) of savage2016.
     """
@@ -83,12 +84,12 @@ def series(terms: int) -> tuple[Fraction, ...]:
 
 
 def random_walk(sigma_x: float, omega_bw: float, f_c: float) -> float:
-    r"""Random walk of the integration error, :math:`\sigma_{e_{rw}} = \sigma_x\sqrt{L(\mu/2)/f_c}`.
+    r"""Return the random walk of the integration error, :math:`\sigma_{e_{rw}} = \sigma_x\sqrt{L(\mu/2)/f_c}`.
 
     Parameters
     ----------
     sigma_x : rms of the input, in a unit u.
-    omega_bw : its bandwidth, rad/s.
+    omega_bw : bandwidth of the input, rad/s.
     f_c : iteration rate, Hz.
 
     Returns
@@ -107,36 +108,36 @@ def random_walk(sigma_x: float, omega_bw: float, f_c: float) -> float:
 
 
 def printed_random_walk(sigma_x: float, omega_bw: float, f_c: float) -> float:
-    r"""Approximation for small :math:`\mu`, :math:`\sigma_x\sqrt{\omega_{bw}/6}/f_c`; savage2016, (39)."""
+    r"""Approximate the walk for small :math:`\mu`: :math:`\sigma_x\sqrt{\omega_{bw}/6}/f_c`; savage2016, (39)."""
     bandwidth_ratio(omega_bw, f_c)
     return math.sqrt(omega_bw / 6) / f_c * positive_number("sigma_x", sigma_x)
 
 
 def approximation_ratio(mu: ArrayLike) -> Floats:
-    r"""(39) over (35), :math:`\sqrt{(\mu/6)/L(\mu/2)} = 1 + \mu^2/120 + \dots`; at least 1."""
+    r"""Return (39) divided by (35), :math:`\sqrt{(\mu/6)/L(\mu/2)} = 1 + \mu^2/120 + \dots`; at least 1."""
     mu = positive_array("mu", mu)
     return np.sqrt(mu / 6 / walk_factor(mu))
 
 
 def validity(excess: float) -> float:
-    r"""Largest :math:`\mu` for which (39) is too large by no more than `excess`, as 0.01 for one percent.
+    r"""Return the largest :math:`\mu` for which (39) is too large by at most `excess`, such as 0.01 for one percent.
 
     Raises
     ------
-    ValueError : `excess` outside [1e-9, 1e3].
+    ValueError : `excess` is outside [1e-9, 1e3].
     """
     if not 1e-9 <= excess <= 1e3:
-        raise ValueError(f"got excess = {excess}; needed 1e-9 to 1e3, as 0.01 for one percent")
+        raise ValueError(f"got excess = {excess}; needed 1e-9 to 1e3, such as 0.01 for one percent")
     return float(brentq(lambda mu: float(approximation_ratio(mu)) - 1 - excess, 1e-5, 1e8, xtol=1e-12, rtol=1e-12))
 
 
 def exponents(mu: ArrayLike) -> tuple[Floats, Floats]:
-    r"""Local powers of bandwidth and of iteration rate in (35), as the abstract of savage2016 has 1/2 and -1.
+    r"""Return the local powers of bandwidth and iteration rate in (35); the abstract of savage2016 claims 1/2 and -1.
 
     .. math:: \frac{\partial\ln\sigma}{\partial\ln\omega_{bw}} = \frac{x L'(x)}{2L(x)}, \qquad
         \frac{\partial\ln\sigma}{\partial\ln f_c} = -\frac12 - \frac{x L'(x)}{2L(x)}, \qquad x = \mu/2
 
-    by differences of logarithms.
+    The derivatives are computed as differences of logarithms.
     """
     mu = positive_array("mu", mu)
     step = 1e-4  # in ln μ: an error of about step², and of 1e-16 / step
@@ -146,7 +147,7 @@ def exponents(mu: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
-    r"""Iteration rate in Hz at which :func:`random_walk` falls to `limit`.
+    r"""Return the iteration rate in Hz at which :func:`random_walk` falls to `limit`.
 
     Parameters
     ----------
@@ -174,13 +175,13 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
 
 
 class Discretization(NamedTuple):
-    r"""One cycle of (10) in units of :math:`\sigma_x` and T, exact at the sampling times.
+    r"""Coefficients of one cycle of (10) in units of :math:`\sigma_x` and T, exact at the sampling times.
 
     Parameters
     ----------
-    phi11, phi21 : of (9), phi21 over T.
-    q11, q12, q22 : covariances of q, over :math:`\sigma_x^2`, :math:`\sigma_x^2T`, :math:`\sigma_x^2T^2`.
-    bridge : variance of the integral over a cycle when the input at both its ends is known,
+    phi11, phi21 : entries of (9); phi21 is divided by T.
+    q11, q12, q22 : covariances of q, divided by :math:`\sigma_x^2`, :math:`\sigma_x^2T`, :math:`\sigma_x^2T^2`.
+    bridge : variance of the integral over a cycle if the input at both ends is known,
         :math:`L(\mu/2)\tanh(\mu/2)/(\mu/2)`, over :math:`\sigma_x^2T^2`.
     """
 
@@ -199,7 +200,7 @@ def discretize(mu: ArrayLike) -> Discretization:
         q_{22} = \frac{2\mu - 3 + 4\varphi - \varphi^2}{\mu^2}
         = L(\tfrac\mu2)\frac{\tanh(\mu/2)}{\mu/2} + \frac{q_{12}^2}{q_{11}}, \qquad \varphi = e^{-\mu}
 
-    The last form has positive terms alone.
+    The last form has only positive terms.
     """
     mu = positive_array("mu", mu)
     phi = np.exp(-mu)
@@ -212,7 +213,7 @@ def discretize(mu: ArrayLike) -> Discretization:
 
 
 def printed_discretization_q22(mu: ArrayLike) -> Floats:
-    """q22 of :func:`discretize` in float64 from the form that cancels."""
+    """Evaluate q22 of :func:`discretize` in float64 by the form that cancels."""
     mu = positive_array("mu", mu)
     phi = np.exp(-mu)
     return np.asarray((2 * mu - 3 + 4 * phi - phi * phi) / (mu * mu))
@@ -222,7 +223,7 @@ def printed_discretization_q22(mu: ArrayLike) -> Floats:
 
 
 def error_variance(n: ArrayLike, mu: float, start: float = 1.0) -> Floats:
-    r"""Variance of the error of the trapezoidal rule after n cycles, over :math:`\sigma_x^2T^2`.
+    r"""Return the error variance of the trapezoidal rule after n cycles, divided by :math:`\sigma_x^2T^2`.
 
     .. math:: \frac{P_{ee_n}}{\sigma_x^2T^2} = nL - \tfrac12L^2(1-\varphi^n)
         - (1-s)\,\tfrac14L^2(1-\varphi^n)^2, \qquad L = L(\mu/2),\ \varphi = e^{-\mu}
@@ -230,7 +231,7 @@ def error_variance(n: ArrayLike, mu: float, start: float = 1.0) -> Floats:
     Parameters
     ----------
     n : cycles, at least 0.
-    start : s, variance of the input at the start, over :math:`\sigma_x^2`; savage2016 assumes 1.
+    start : s, variance of the input at the start, divided by :math:`\sigma_x^2`; savage2016 assumes 1.
     """
     cycles, mu = cycle_counts(n), float(positive_array("mu", mu))
     if not 0 <= start < math.inf:
@@ -241,7 +242,7 @@ def error_variance(n: ArrayLike, mu: float, start: float = 1.0) -> Floats:
 
 
 def error_variance_recursion(n: int, mu: float) -> Floats:
-    r"""The same for 0 … n cycles from a recursion, for an input in its steady state.
+    r"""Compute :func:`error_variance` after 0 … n cycles by a recursion, for an input in its steady state.
 
     .. math:: P_{k+1} = P_k + 2gc_k + r, \qquad c_{k+1} = \varphi c_k + g, \qquad
         g = \tfrac12(1-\varphi)L,\ r = L - \tfrac12(1-\varphi)L^2
@@ -260,25 +261,25 @@ def error_variance_recursion(n: int, mu: float) -> Floats:
 
 
 def rectangle_error_variance(n: ArrayLike, mu: float) -> Floats:
-    r"""As :func:`error_variance` for the rectangular rules, :math:`nL + \tfrac12(1-L^2)(1-\varphi^n)`."""
+    r"""Return :func:`error_variance` for the rectangular rules, :math:`nL + \tfrac12(1-L^2)(1-\varphi^n)`."""
     cycles, mu = cycle_counts(n), float(positive_array("mu", mu))
     rate = float(walk_factor(mu))
     return np.asarray(cycles * rate - (1 - rate**2) / 2 * np.expm1(-cycles * mu))
 
 
 def settling_cycles(mu: float, share: float, rectangle: bool = False) -> float:
-    r"""Cycles after which the random walk is the error variance to within the relative `share`.
+    r"""Return the number of cycles after which the error variance equals the random walk up to a relative `share`.
 
     For the trapezoidal rule :math:`L(1-\varphi^n)/2n \le` share, for the rectangular ones
     :math:`(1/L-L)(1-\varphi^n)/2n \le` share.
 
     Raises
     ------
-    ValueError : `share` not above 0.
+    ValueError : `share` is not positive.
     """
     rate = float(walk_factor(float(positive_array("mu", mu))))
     if not 0 < share < math.inf:
-        raise ValueError(f"got share = {share}; needed a positive number, as 0.01 for one percent")
+        raise ValueError(f"got share = {share}; needed a positive number, such as 0.01 for one percent")
     offset = (1 / rate - rate if rectangle else rate) / 2
 
     def excess(n: float) -> float:
@@ -299,17 +300,17 @@ class SavageRecursion(NamedTuple):
 
     @property
     def pee(self) -> Floats:
-        """(13)."""
+        """Error variance by (13)."""
         return np.asarray(self.p33 + self.p22 - 2 * self.p32)
 
 
 def savage_recursion(n: int, mu: float, p32_weight: float = 0.5, p22_slip: bool = False) -> SavageRecursion:
-    r"""(18) with (25), (27) and (28) of savage2016 from zero initial conditions.
+    r"""Run the recursion (18) of savage2016 with (25), (27) and (28), from zero initial conditions.
 
     Parameters
     ----------
-    p32_weight : of :math:`\varphi_{21}P_{11}T` in the second line of (18): 1/2, printed 1.
-    p22_slip : leave out the second :math:`1/\omega_{bw}` of (25), as printed; T in seconds is then taken as 1.
+    p32_weight : weight of :math:`\varphi_{21}P_{11}T` in the second line of (18): 1/2; the note prints 1.
+    p22_slip : omit the second :math:`1/\omega_{bw}` in (25), as printed; T is then 1 second.
     """
     n, mu = int(cycle_counts(n)), float(positive_array("mu", mu))
     phi, lost = math.exp(-mu), -math.expm1(-mu)

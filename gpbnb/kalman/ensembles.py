@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb import sweeps
+from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import report_bounds
 from gpbnb.kalman.bounded_run import BoundedHistory, emulate_with_bound
@@ -179,7 +180,7 @@ def _printed_state(
         phi, h = given["Phi"][k % len(given["Phi"])], given["H"][k % len(given["H"])]
         before = phi @ (x[k - 1] if k else given["x0"])
         loop = phi - K[k] @ (h @ phi)
-        F = max(F, float(np.abs(loop).sum(axis=0).max()))
+        F = max(F, float(column_sum(loop)))
         # u = K z = x - F x of the step before, (111)
         u = max(u, float(np.abs(x[k] - before + K[k] @ (h @ before)).max()))
         first, second = report_bounds.coefficients(k + 1, model.n, model.m)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,81 +20,16 @@ from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
 from gpbnb.kalman.simulation import Simulation, fine_resolution
-
-Basis = Literal["emulation", "bound", "guarantee", "probable"]
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """The smallest precision that meets a tolerance, and what the answer rests on.
-
-    Parameters
-    ----------
-    fmt : None if no format with compiled loops meets the tolerance, or if the largest precision tried misses it.
-    basis : "emulation", what happened with these measurements; or "bound", what could at most have happened.
-    steps : of the filter.
-    tried : precision, and largest error over tolerance of all states and checkpoints; infinite where the run stopped, a
-        variance was lost, or no bound exists.
-    why : of the largest precision below the answer that has no number for an error, why not; empty if all have one.
-        Shown where it kept the answer from being a smaller one.
-    form : of the filter.
-    irregular : precisions that meet the tolerance although a higher one was run and misses it; empty if all is regular.
-    advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
-    repairs : changes of the model's covariances, each as text.
-    """
-
-    fmt: FloatFormat | None
-    basis: Basis
-    steps: int
-    tried: tuple[tuple[int, float], ...]
-    why: str = ""
-    form: Form | None = None
-    irregular: tuple[int, ...] = ()
-    advice: str = ""
-    repairs: tuple[str, ...] = ()
-
-    @property
-    def precision(self) -> int | None:
-        """Digits of the answer, or None."""
-        return None if self.fmt is None else self.fmt.precision
-
-    def __str__(self) -> str:
-        notes = [*self.repairs]
-        if self.irregular:
-            missed = [digits for digits, ratio in self.tried if not ratio <= 1 and digits > self.irregular[0]]
-            notes.insert(0, f"{_listed(self.irregular)} digits meet it, but {_listed(missed)} do not")
-        if self.advice:
-            notes.append(self.advice)
-        end = "".join(f"; {note}" for note in notes)
-        if self.fmt is None:
-            most, why = self.tried[-1][0], f"; {self.why}" if self.why else ""
-            met = "meets the tolerance reliably" if self.irregular else "meets the tolerance"
-            return f"no precision up to {most} digits {met} ({self.basis}, {self.steps} steps){why}{end}"
-        tried = dict(self.tried)
-        why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
-        return (
-            f"{self.fmt.precision} digits of base {self.fmt.base}, {self.fmt.rounding.value}: "
-            f"{tried[self.fmt.precision]:.2g} of the tolerance ({self.basis}, {self.steps} steps){why}{end}"
-        )
-
-
-def _listed(numbers: Sequence[int]) -> str:
-    """Whole numbers in rising order as text, runs of three and more as ranges: "2, 5–8"."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    texts = [f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
-    return ", ".join(texts)
+from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 
 def required_precision(
-    model: LinearModel,
+    model: LinearModel | LinearSystem,
     steps: int,
     tolerance: float | Sequence[float],
     base: int = 2,
@@ -116,9 +50,10 @@ def required_precision(
 
     Parameters
     ----------
-    model : with repaired covariances, the answer lists the repairs.
+    model : a Kalman filter; with repaired covariances, the answer lists the repairs. Or a linear system, whose inputs
+        are `z`; see :func:`gpbnb.kalman.system.required_system_precision`.
     tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
-        accuracy does not matter an infinite tolerance.
+        accuracy does not matter an infinite tolerance. For a linear system, of each output.
     base : 2, 10 or 16.
     rounding, form : or their names, such as "nearest" and "UD".
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
@@ -129,8 +64,8 @@ def required_precision(
         roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
-    z : (steps, m), measurements; by default simulated by the model, from its first estimate, and rounded to
-        :func:`gpbnb.kalman.simulation.fine_resolution`.
+    z : (steps, m), measurements, NaN or masked where one is missing; by default simulated by the model, from its first
+        estimate, and rounded to :func:`gpbnb.kalman.simulation.fine_resolution`.
     seed : of the simulation.
     progress : show a bar, a tick a precision.
 
@@ -140,6 +75,8 @@ def required_precision(
         or fewer measurements than steps.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    if isinstance(model, LinearSystem):
+        return required_system_precision(model, steps, tolerance, z, base, rounding, basis, within, progress)
     tolerances = _checked(model, tolerance, base, basis)
     steps = whole_number("steps", steps)
     for_ever = basis in ("guarantee", "probable")
@@ -149,6 +86,8 @@ def required_precision(
         z = Simulation(
             model, tuple(model.x0.astype(np.float64)), whole_number("seed", seed, 0), fine_resolution(model)
         ).measurements(steps)
+    repairs = tuple(str(each) for each in model.repairs)
+    model, z = without_missing(model, z)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
 
@@ -160,10 +99,9 @@ def required_precision(
     checks = () if for_ever else CHECKED[base]
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
         found = Search(errors_of(form), base, rounding, checks, bar.update, bounds=basis == "bound")
-        advice = f"no bound exists in {_listed(found.undecided)} digits" if found.undecided else ""
+        advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
         if not for_ever and (found.irregular or found.fmt is None):
             advice = _better_form(errors_of, form, base, rounding, checks, bar.update, basis == "bound")
-    repairs = tuple(str(each) for each in model.repairs)
     return Requirement(found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs)
 
 
@@ -204,7 +142,9 @@ def survey(
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
     form, rounding = form_named(form), rounding_named(rounding)
-    tolerances, measured = _checked(model, tolerance, base, basis), _measured(model, z)
+    tolerances = _checked(model, tolerance, base, basis)
+    model, z = without_missing(model, z)
+    measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
@@ -220,22 +160,9 @@ def survey(
 
 def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
     """The tolerance of each state, if all that was asked makes sense."""
-    needed = f"needed an error above 0 for each of the {model.n} states, one finite"
-    try:
-        tolerances = np.asarray(tolerance, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
-    if tolerances.shape not in ((), (model.n,)):
-        raise ValueError(
-            f"got tolerance {tolerance} of shape {tolerances.shape}; {needed}: one number, or {model.n} in a row"
-        )
-    if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
-        raise ValueError(f"got tolerance {tolerance}; {needed}")
-    if basis not in get_args(Basis):
-        raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
-    if base not in LARGEST_PRECISION:
-        raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
-    return np.broadcast_to(tolerances, (model.n,))
+    if not isinstance(model, LinearModel):
+        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel or a LinearSystem")
+    return checked_tolerance(tolerance, model.n, "states", base, basis)
 
 
 def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[Any]:
@@ -249,8 +176,8 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
         raise ValueError(
-            f"got {measured[k, i]} for measurement {i} of step {k + 1}; needed finite numbers; where a sensor is "
-            "silent, give H a cycle with a row of zeros there, and any number as its measurement"
+            f"got {measured[k, i]} for measurement {i} of step {k + 1}; needed finite numbers, or NaN where "
+            "one is missing"
         )
     return measured
 

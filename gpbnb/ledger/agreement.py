@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterable
 from typing import Any
 
 import sympy as sp
 
-from gpbnb.ledger.formula import OPERATORS, Link
+from gpbnb.arithmetic.formats import Rounding, prints_as
+from gpbnb.ledger.formula import OPERATORS, Link, Relation
 
 DIGITS = 50
 """Digits to which two sides are evaluated when they hold exponentials or roots."""
@@ -39,7 +41,7 @@ def holds(link: Link) -> bool:
     if link.symbol in ("==", "!="):
         equal = shapes[0] == shapes[1] and vanishes(left - right)
         return equal == (link.symbol == "==")
-    compare = next(function for name, _, function in OPERATORS.values() if name == link.symbol)
+    compare = next(function for name, function in OPERATORS.values() if name == link.symbol)
     return bool(compare(sp.N(left, DIGITS), sp.N(right, DIGITS)))
 
 
@@ -47,6 +49,17 @@ def hold(links: Iterable[Link]) -> bool:
     """Whether there are comparisons, and all of them hold."""
     results = [holds(link) for link in links]
     return bool(results) and all(results)
+
+
+def prints_side(value: Any, relation: Relation, *roundings: Rounding) -> bool:
+    """Whether the last side of a relation is a number, and a value has its digits when rounded to as many.
+
+    Parameters
+    ----------
+    value, roundings : as for :func:`gpbnb.arithmetic.formats.prints_as`.
+    """
+    side = relation.sides[-1].tree
+    return isinstance(side, ast.Constant) and prints_as(value, relation.sides[-1].text, *roundings)
 
 
 def matrix_of(value: Any) -> Any:

@@ -9,13 +9,14 @@ A form is one or more parts, separated by semicolons. Each part is one of:
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
-``diff`` and ``approx(a, b)`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
+``diff`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
 printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that
 a printed series leaves out; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
-``Largest`` prints the same as a subscript. ``group(x)`` and ``bracket(x)`` keep printed parentheses and brackets, and
+``Largest`` prints the same as a subscript; ``Sum(term)`` and ``Max(term)`` have no printed range. ``pm(x)`` is ±x, and
+``digits(d, e)`` is .de. ``group(x)`` and ``bracket(x)`` keep printed parentheses and brackets, and
 ``op(x, y)`` stands for any operation x * y.
 """
 
@@ -31,16 +32,17 @@ from typing import Any
 
 import numpy as np
 import sympy as sp
-from sympy.core.alphabets import greeks
 
-OPERATORS: dict[type[ast.cmpop], tuple[str, str, Callable[[Any, Any], Any]]] = {
-    ast.Eq: ("==", "=", operator.eq),
-    ast.NotEq: ("!=", r"\ne ", operator.ne),
-    ast.LtE: ("<=", r"\le ", operator.le),
-    ast.Lt: ("<", "<", operator.lt),
-    ast.GtE: (">=", r"\ge ", operator.ge),
-    ast.Gt: (">", ">", operator.gt),
-    ast.Is: ("≈", r"\approx ", operator.eq),
+from gpbnb.ledger.typesetting import number_latex, typeset
+
+OPERATORS: dict[type[ast.cmpop], tuple[str, Callable[[Any, Any], Any]]] = {
+    ast.Eq: ("==", operator.eq),
+    ast.NotEq: ("!=", operator.ne),
+    ast.LtE: ("<=", operator.le),
+    ast.Lt: ("<", operator.lt),
+    ast.GtE: (">=", operator.ge),
+    ast.Gt: (">", operator.gt),
+    ast.Is: ("≈", operator.eq),
 }
 _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -50,6 +52,10 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Pow: operator.pow,
     ast.MatMult: operator.matmul,
 }
+
+
+class Undefined(ValueError):
+    """A printed expression has no value: an index without a quantity, or an operation on quantities that do not fit."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +81,7 @@ class Link:
             difference = left - right
             zero = sp.simplify(difference)
             return bool(zero.is_zero_matrix if isinstance(zero, sp.MatrixBase) else zero == 0)
-        compare = next(function for symbol, _, function in OPERATORS.values() if symbol == self.symbol)
+        compare = next(function for symbol, function in OPERATORS.values() if symbol == self.symbol)
         return bool(np.all(compare(left, right)))
 
 
@@ -129,6 +135,10 @@ class Relation:
         Returns
         -------
         links : one a comparison; a part without a comparison has none.
+
+        Raises
+        ------
+        Undefined : an expression has no value with these names.
         """
         tree = self.tree
         if not isinstance(tree, ast.Compare):
@@ -144,7 +154,7 @@ class Relation:
         return _Evaluation(names or {}, number)(tree.comparators[-1] if isinstance(tree, ast.Compare) else tree)
 
     def latex(self) -> str:
-        return _typeset(self.tree, 0)
+        return typeset(self.tree, 0)
 
     def markdown(self) -> str:
         return f"${self.latex()}$"
@@ -232,7 +242,7 @@ def _part(text: str) -> Part:
         return Number(labelled[1], number[1], number[2] or "")
     try:
         relation = Relation(text)
-        _typeset(relation.tree, 0)
+        typeset(relation.tree, 0)
     except (SyntaxError, KeyError, TypeError) as error:
         raise ValueError(f"{text!r} is not a relation ({error})") from error
     return relation
@@ -251,17 +261,17 @@ class _Evaluation:
         match node:
             case ast.Compare(left=left, ops=ops, comparators=rights):
                 sides = [self(side) for side in (left, *rights)]
-                return all(OPERATORS[type(op)][2](a, b) for a, op, b in zip(sides[:-1], ops, sides[1:], strict=True))
+                return all(OPERATORS[type(op)][1](a, b) for a, op, b in zip(sides[:-1], ops, sides[1:], strict=True))
             case ast.Constant(value=int() | float()):
                 return self.number(Fraction(getattr(node, "literal", None) or ast.unparse(node)))
             case ast.Name(id=name):
                 return self.names[name] if name in self.names else sp.Symbol(name)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                return -self(operand)
+                return _apply(node, operator.neg, self(operand))
             case ast.BinOp(left=left, op=op, right=right):
-                return _BINARY[type(op)](self(left), self(right))
+                return _apply(node, _BINARY[type(op)], self(left), self(right))
             case ast.Subscript(value=ast.Name(id=name), slice=index):
-                return self._indexed(name, index)
+                return self._indexed(node, name, index)
             case ast.Attribute(value=value, attr=attribute):
                 inner = self(value)
                 if attribute in self.names:
@@ -274,9 +284,12 @@ class _Evaluation:
                 if name == "cases":
                     return self._cases(arguments)
                 function = self.names.get(name) or _FUNCTIONS.get(name) or sp.Function(name)
-                return function(*map(self, arguments))
+                return _apply(node, function, *map(self, arguments))
             case ast.Call(func=ast.Subscript(value=ast.Name(id=name), slice=index), args=arguments):
-                return self.names[name](*self._indices(index), *map(self, arguments))
+                indices = self._indices(index)
+                if name not in self.names:
+                    return sp.Function(f"{name}[{','.join(map(str, indices))}]")(*map(self, arguments))
+                return _apply(node, self.names[name], *indices, *map(self, arguments))
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
                 found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
                 return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
@@ -285,12 +298,14 @@ class _Evaluation:
     def _indices(self, index: ast.expr) -> list[Any]:
         return [self(i) for i in (index.elts if isinstance(index, ast.Tuple) else [index])]
 
-    def _indexed(self, name: str, index: ast.expr) -> Any:
+    def _indexed(self, node: ast.expr, name: str, index: ast.expr) -> Any:
         indices = self._indices(index)
         found = self.names.get(name)
         if found is None:
             return sp.Symbol(f"{name}[{','.join(map(str, indices))}]")
-        return found(*indices) if callable(found) else found[tuple(indices) if len(indices) > 1 else indices[0]]
+        if callable(found):
+            return _apply(node, found, *indices)
+        return _apply(node, found.__getitem__, tuple(indices) if len(indices) > 1 else indices[0])
 
     def _repeated(self, name: str, arguments: list[ast.expr]) -> Any:
         term, bounds = arguments
@@ -322,159 +337,18 @@ class _Evaluation:
             if isinstance(argument, ast.Tuple) and self(argument.elts[1])
         ]
         if len(values) != 1:
-            raise ValueError(f"{len(values)} cases hold; exactly one is needed")
+            raise Undefined(f"{len(values)} cases hold; exactly one is needed")
         return values[0]
+
+
+def _apply(node: ast.expr, operation: Callable[..., Any], *operands: Any) -> Any:
+    try:
+        return operation(*operands)
+    except (ArithmeticError, LookupError, TypeError, ValueError) as error:
+        raise Undefined(f"{ast.unparse(node)} has no value here: {error}") from error
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": abs, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log, "sin": sp.sin, "cos": sp.cos, "tan": sp.tan,
     "max": sp.Max, "min": sp.Min, "diff": sp.diff, "group": lambda inside: inside,
 }  # fmt: skip
-
-
-# -- typesetting ----------------------------------------------------------------------------------
-
-_GREEK = {name: name for small in greeks for name in (small, small.capitalize())} | {"lamda": "lambda"}
-_ACCENTS = ("hat", "tilde", "bar", "dot", "ddot", "underline", "overline")
-_NAMED = ("sin", "cos", "tan", "exp", "log", "ln", "max", "min", "dim")
-
-
-def name_latex(name: str) -> str:
-    r"""Typeset a name: ``x_hat_k`` as ``\hat x_{k}``, ``Deltaphi_2`` as ``\Delta \phi_{2}``."""
-    base, *rest = name.rstrip("_").split("_")
-    text = _base(base)
-    subscripts = []
-    for word in rest:
-        if word in _ACCENTS:
-            text = rf"\{word} {{{text}}}" if len(text) > 1 else rf"\{word} {text}"
-        elif word == "prime":
-            text += "'"
-        elif word == "star":
-            text += "^*"
-        else:
-            subscripts.append(_base(word))
-    if subscripts:
-        text += f"_{{{','.join(subscripts) if len(subscripts) > 1 else subscripts[0]}}}"
-    return text
-
-
-def number_latex(literal: str) -> str:
-    r"""Typeset a number with its printed digits: ``.7654e3`` as ``.7654\times10^{3}``."""
-    digits, _, exponent = literal.lower().partition("e")
-    return digits + (rf"\times10^{{{int(exponent)}}}" if exponent else "")
-
-
-def _base(word: str) -> str:
-    if word in _GREEK:
-        return rf"\{_GREEK[word]}"
-    if word.lower().startswith("delta") and len(word) > len("delta"):
-        return rf"\{word[: len('delta')]} {_base(word[len('delta') :])}"
-    if word == "dots":
-        return r"\cdots"
-    if word == "degree":
-        return r"^{\circ}"
-    if word == "inf":
-        return r"\infty"
-    return rf"\text{{{word}}}" if len(word) > 2 and word.isalpha() else word
-
-
-def _wrap(text: str, needed: bool) -> str:
-    return rf"\left({text}\right)" if needed else text
-
-
-def _typeset(node: ast.expr, level: int) -> str:
-    """Typeset an expression; parentheses where its operator binds less tightly than `level`."""
-    match node:
-        case ast.Constant(value=value):
-            return r"\cdots" if value is Ellipsis else number_latex(getattr(node, "literal", None) or ast.unparse(node))
-        case ast.Name(id=name):
-            return name_latex(name)
-        case ast.Compare(left=left, ops=ops, comparators=rights):
-            text = _typeset(left, 0)
-            for op, right in zip(ops, rights, strict=True):
-                text += OPERATORS[type(op)][1] + _typeset(right, 0)
-            return text
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            return _wrap("-" + _typeset(operand, 2), level > 1)
-        case ast.BinOp(left=left, op=ast.Add(), right=right):
-            b = _typeset(right, 1)
-            return _wrap(f"{_typeset(left, 1)}+{_wrap(b, b.startswith('-'))}", level > 1)
-        case ast.BinOp(left=left, op=ast.Sub(), right=right):
-            return _wrap(f"{_typeset(left, 1)}-{_typeset(right, 2)}", level > 1)
-        case ast.BinOp(left=left, op=ast.Mult() | ast.MatMult(), right=right):
-            a, b = _typeset(left, 2), _typeset(right, 2)
-            return _wrap(a + _times(a, b) + b, level > 3)
-        case ast.BinOp(left=left, op=ast.Div(), right=right):
-            return rf"\frac{{{_typeset(left, 0)}}}{{{_typeset(right, 0)}}}"
-        case ast.BinOp(left=left, op=ast.Pow(), right=right):
-            return f"{_typeset(left, 4)}^{{{_typeset(right, 0)}}}"
-        case ast.Subscript(value=value, slice=index):
-            return _with_index(_typeset(value, 4), index)
-        case ast.Attribute(value=value, attr=attribute):
-            return f"{_typeset(value, 4)}^{{{ {'T': 'T', 'inv': '-1'}[attribute] }}}"
-        case ast.Call(func=function, args=arguments):
-            return _call(function, arguments)
-        case ast.List(elts=rows) if rows and all(isinstance(row, ast.List) for row in rows):
-            lines = (" & ".join(_typeset(cell, 0) for cell in row.elts) for row in rows if isinstance(row, ast.List))
-            return r"\begin{bmatrix}" + r" \\ ".join(lines) + r"\end{bmatrix}"
-        case ast.List(elts=cells) | ast.Tuple(elts=cells):
-            return rf"\left[{', '.join(_typeset(cell, 0) for cell in cells)}\right]"
-    raise TypeError(f"{ast.unparse(node)} cannot be typeset")
-
-
-def _times(a: str, b: str) -> str:
-    """What stands between two factors."""
-    if b[:1].isdigit() or b[:1] == ".":
-        return r"\times "
-    return r"\," if a[-1:].isalpha() and b[:1].isalpha() else ""
-
-
-def _with_index(base: str, index: ast.expr) -> str:
-    indices = index.elts if isinstance(index, ast.Tuple) else [index]
-    texts = [_typeset(i, 0) for i in indices]
-    joined = "".join(texts) if all(len(t) == 1 for t in texts) else ",".join(texts)
-    stem = re.fullmatch(r"(.*)_\{([^{}]*)\}", base)
-    return f"{stem[1]}_{{{stem[2]},{joined}}}" if stem else f"{base}_{{{joined}}}"
-
-
-def _call(function: ast.expr, arguments: list[ast.expr]) -> str:
-    name = function.id if isinstance(function, ast.Name) else ""
-    if name == "cases":
-        lines = [[_typeset(e, 0) for e in a.elts] for a in arguments if isinstance(a, ast.Tuple)]
-        return (
-            r"\begin{cases}"
-            + r" \\ ".join(rf"{value} & \text{{if }} {where}" for value, where in lines)
-            + r"\end{cases}"
-        )
-    if name in ("Sum", "Prod", "Int", "Max", "Largest") and len(arguments) == 2 and isinstance(arguments[1], ast.Tuple):
-        term, bounds = _typeset(arguments[0], 2), [_typeset(b, 0) for b in arguments[1].elts]
-        if name == "Max":
-            return rf"\max_{{{bounds[0]}}}{term}"
-        if name == "Largest":
-            return rf"{term}_{{\max}}"
-        if name == "Int":
-            return rf"\int_{{{bounds[1]}}}^{{{bounds[2]}}}{term}\,d{bounds[0]}"
-        return rf"\{'sum' if name == 'Sum' else 'prod'}_{{{bounds[0]}={bounds[1]}}}^{{{bounds[2]}}}{term}"
-    inside = [_typeset(argument, 0) for argument in arguments]
-    match name, inside:
-        case "norm", [x]:
-            return rf"\left\|{x}\right\|"
-        case "abs", [x]:
-            return rf"\left|{x}\right|"
-        case "group", [x]:
-            return rf"\left({x}\right)"
-        case "bracket", [x]:
-            return rf"\left[{x}\right]"
-        case "op", [x, y]:
-            return f"{x}*{y}"
-        case "sqrt", [x]:
-            return rf"\sqrt{{{x}}}"
-        case "approx", [a, b]:
-            return rf"{a}\approx {b}"
-        case "diff", [f, x]:
-            return rf"\frac{{d}}{{d{x}}}{f}"
-        case "exp", [x]:
-            return f"e^{{{x}}}"
-    if name in _NAMED:
-        return rf"\{name}\left({', '.join(inside)}\right)"
-    return rf"{_typeset(function, 4)}\left({', '.join(inside)}\right)"

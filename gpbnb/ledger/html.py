@@ -19,6 +19,12 @@ CHAPTERS = {
 }
 """Titles of the chapters by topic; the page of a topic has the topic's name."""
 
+
+def chapter(topic: str) -> str:
+    """Name the chapter of a topic in a note; :func:`typeset` makes it a link."""
+    return f"chapter *{CHAPTERS[topic]}*"
+
+
 EMPHASIS = re.compile(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])")
 """What stands between stars in a note."""
 

@@ -1,4 +1,4 @@
-"""Rounded rotations, emulated digit by digit: by recursion, and each angle on its own."""
+"""Rounded rotations, emulated digit by digit: recursively, and directly from each angle."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
+from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
 from gpbnb.rolling.theory import INTERVAL
 
 
 def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
-    """What the register of a format does to ω_r = 2π/T: the rounded less the true, rad/s."""
+    """Rounding error of ω_r = 2π/T in a register: the rounded less the true rate, rad/s."""
     rate = theory.roll_rate(period)
     return float(fmt.round(rate) - rate)
 
@@ -102,7 +103,7 @@ def recursion(
     steps: Sequence[int],
     interval: float = INTERVAL,
 ) -> Rotation:
-    """Rotate by one sample's angle again and again, with every operation rounded: the deroll of (7), recursively.
+    """Rotate by the angle of one sample repeatedly, with every operation rounded: the recursive deroll of (7).
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ def recursion(
 
 
 def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
-    """Cosine and sine of the product of a rounded roll rate and a rounded time, each rounded: in any format."""
+    """Compute cosine and sine of a rounded roll rate times a rounded time, each rounded to a format."""
     marks = np.asarray(steps, dtype=np.int64)
     rate = fmt.array(theory.roll_rate(period))
     values = []
@@ -148,15 +149,21 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
 def digits_needed_observed(
     method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
 ) -> int:
-    """Least precision from which on a year's deroll of a drift stays within `error` mas.
+    """Find the smallest precision with which a year's deroll of a drift stays within `error` mas.
 
-    Tried downwards from what the bound proves to be enough, and no further than to the first that is not: with fewer
-    digits still, it may stay within by luck.
+    Found by :func:`gpbnb.arithmetic.search.smallest_precision` up to what the bound proves to be enough.
+
+    Raises
+    ------
+    ValueError : the precision that is proved to be enough cannot be emulated, and none below it is enough.
     """
     bound = theory.rotation_bound(method, period, steps[-1])
     rotate = {"recursion": recursion, "direct": direct}[method]
     enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
-    for precision in range(min(LARGEST_PRECISION[base], enough), 1, -1):
-        if rotate(FloatFormat(base, precision), period, steps).drift_error(drift) > error:
-            return precision + 1
-    return 2
+    most = min(LARGEST_PRECISION[base], enough)
+    found = smallest_precision(
+        lambda fmt: rotate(fmt, period, steps).drift_error(drift) <= error, base, least=2, largest=most
+    )
+    if found is None:
+        raise ValueError(f"got an error of {error:g} mas; needed one that base {base} reaches within {most} digits")
+    return found.precision

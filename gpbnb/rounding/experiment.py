@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounded import BoundedError
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, integers
 from gpbnb.rounding import theory
@@ -25,7 +26,7 @@ Bounds = Mapping[str, Callable[[], Fraction]]
 
 
 @dataclass(frozen=True)
-class Trial:
+class Trial(BoundedError):
     """One computed result: its inputs, its error, and the bounds of that error.
 
     A bound that does not exist, because γ_n needs nβ < 1, is absent from `bounds`.
@@ -37,16 +38,6 @@ class Trial:
     true: Any
     error: Fraction
     bounds: Mapping[str, Fraction]
-
-    def ratio(self, bound: str) -> float:
-        """Error over bound; 0 for an exact result, infinity for an error with a bound of zero."""
-        if self.error == 0:
-            return 0.0
-        return float(self.error / self.bounds[bound]) if self.bounds[bound] else np.inf
-
-    def violates(self, bound: str) -> bool:
-        """Whether the error exceeds the bound, decided exactly."""
-        return self.error > self.bounds[bound]
 
 
 @dataclass(frozen=True)
@@ -399,7 +390,7 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
 
 
 def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: bool = False) -> Trial:
-    """Find the terms that bring the error of a sum nearest to its first-order bound, or beyond.
+    """Find the terms for which the error of a sum comes nearest to its first-order bound, or exceeds it most.
 
     Looks at every sequence of zeros and of terms ``±m * base**e`` with e in `exponents`, by
     dynamic programming over partial sums; the ratio of the error to the bound, "weights" or (26),

@@ -36,7 +36,8 @@ from gpbnb.kalman.guarantee.published import (
     px4_landing_target,
 )
 from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import Basis, required_precision
+from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.requirement import Basis
 from gpbnb.wordlength.examples import altimeter, tilt, tracker
 
 FILE = Path(__file__).with_name("guarantees.csv")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.tables import Table, arithmetic, digits, short
 from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
-from gpbnb.kalman.precision import Requirement
+from gpbnb.kalman.requirement import Requirement
 from gpbnb.wordlength.examples import ACCELERATORS, NORMAL_RANGE, STANDARD
 from gpbnb.wordlength.study import BinaryRange, InversePrecision, UpdateStagnation
 

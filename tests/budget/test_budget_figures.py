@@ -6,42 +6,46 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from drawn import legend_of
+from matplotlib.collections import LineCollection
 
 from gpbnb.budget import experiment, figures, tables, theory
+from gpbnb.display import style
 
 READING = theory.read(files("gpbnb.budget") / "example.csv")
 BUDGET = READING.budget
 
 
 def test_budget_curve(ax):
-    one, other, signs, printed = figures.budget_curve((44, 0.15), (1.0, 1.253), ax, most=50)
+    one, other, signs, printed, *names = figures.budget_curve((44, 0.15), (1.0, 1.253), ax, most=50)
     n = np.arange(1, 51)
     assert list(one.get_xdata()) == list(n)
     assert np.allclose(one.get_ydata(), n**-0.5, rtol=1e-15)
     assert np.allclose(other.get_ydata(), 1.253 * n**-0.5, rtol=1e-15)
     assert np.array_equal(signs.get_ydata(), 1 / n)
     assert (list(printed.get_xdata()), list(printed.get_ydata())) == ([44], [0.15])
-    assert printed.get_markerfacecolor() == "white"
-    assert "printed example" in legend_of(ax)
-    assert ax.get_ylabel() == "error of each (mas)"
+    assert printed.get_markerfacecolor() == "none"
+    assert one.get_color() == other.get_color() == style.VALID
+    assert "printed example" in [each.get_text() for each in names]
+    assert ax.get_ylabel() == "error of each (mas/yr)"
 
 
 def test_shares(ax):
-    bars = figures.shares(BUDGET, ax)
+    artists = figures.shares(BUDGET, ax)
+    bars, names = artists[: len(BUDGET.sources)], artists[len(BUDGET.sources) :]
     ordered = sorted(BUDGET.sources, key=BUDGET.share)
     assert [bar.get_width() for bar in bars] == [100 * BUDGET.share(source) for source in ordered]
     assert [tick.get_text() for tick in ax.get_yticklabels()] == [source.name for source in ordered]
     colours = {source.form: bar.get_facecolor() for source, bar in zip(ordered, bars, strict=True)}
     assert len(set(colours.values())) == len(colours) == 4
-    assert legend_of(ax) == ["bias", "drift", "scale factor", "noise"]
+    for source, written in zip(ordered, names, strict=True):
+        assert written.get_text() == f"{100 * BUDGET.share(source):.0f} %, {source.form.value}"
     assert "%" in ax.get_xlabel()
 
 
 def test_distribution(ax):
     draws = experiment.draw(BUDGET, 2000, np.random.default_rng(1))
     artists = figures.distribution(draws, ax)
-    lines = {line.get_xdata()[0] for line in artists[60:]}
+    lines = {line[0, 0] for each in artists[60:] if isinstance(each, LineCollection) for line in each.get_segments()}
     expected = (BUDGET.total, theory.GOAL, BUDGET.worst_case)
     assert lines == {sign * value for value in expected for sign in (1, -1)}
     assert sum(bar.get_height() * bar.get_width() for bar in artists[:60]) == pytest.approx(1)

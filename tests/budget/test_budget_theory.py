@@ -213,20 +213,20 @@ def test_columns_in_any_order_and_only_those_that_are_needed():
 @pytest.mark.parametrize(
     ("row", "reason"),
     [
-        ("b,random constant,bias,TBD,,,,,", "error_mas is 'TBD'; a number is needed"),
+        ("b,random constant,bias,TBD,,,,,", "error_mas is 'TBD'; enter a number"),
         ("b,random constant,bias,,,,,,", "error_mas is ''"),
         ("b,random constant,bias,?,,,,,", "error_mas is '?'"),
         ("b,random constant,bias,nan,,,,,", "got error nan; needed a finite number"),
-        ("b,random constant,bias,1,x,,,,", "roll is 'x'; a number is needed"),
+        ("b,random constant,bias,1,x,,,,", "roll is 'x'; enter a number"),
         ("b,random constant,bias,1,,1.5,,,", "got orbit 1.5; needed a factor from 0"),
         ("b,random constant,bias,1,,,-0.1,,", "got filter -0.1; needed a factor from 0"),
         ("b,random constant,bias,1,nan,,,,", "got roll nan; needed a factor"),
         ("b,random,bias,1,,,,,", "kind is 'random'; needed one of deterministic, random constant, random process"),
         ("b,random constant,biased,1,,,,,", "form is 'biased'; needed one of bias, drift"),
-        (",random constant,bias,1,,,,,", "got name ''; needed text"),
-        ("b,random constant,bias,1", "4 cells; 9 are needed"),
-        ("b,random constant,bias,1,,,,,,more", "10 cells; 9 are needed"),
-        ("a,random constant,bias,1,,,,,", "name 'a' is that of line 2 already"),
+        (",random constant,bias,1,,,,,", "got name ''; remove blanks"),
+        ("b,random constant,bias,1", "4 cells instead of 9"),
+        ("b,random constant,bias,1,,,,,,more", "10 cells instead of 9"),
+        ("a,random constant,bias,1,,,,,", "name 'a' is already used in line 2"),
     ],
 )
 def test_a_bad_row_is_refused_by_line_and_the_rest_is_read(row, reason):
@@ -264,7 +264,7 @@ def test_a_bad_header_is_refused(header, message):
     ("call", "message"),
     [
         (lambda: Budget(made(1).sources * 2), "got 's0' more than once"),
-        (lambda: Source(" a", Kind.CONSTANT, ErrorForm.BIAS, 1), "got name ' a'; needed text without blanks"),
+        (lambda: Source(" a", Kind.CONSTANT, ErrorForm.BIAS, 1), "got name ' a'; remove blanks"),
         (lambda: Source("a", "random constant", ErrorForm.BIAS, 1), "needed a Kind and an ErrorForm"),
         (lambda: theory.equal_error(-1, 3), "got a total of -1 over 3 sources"),
         (lambda: theory.equal_error(1, 0), "over 0 sources"),

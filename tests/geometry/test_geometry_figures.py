@@ -62,9 +62,10 @@ def test_chain_names_every_frame_and_angle(axes):
 def test_deroll_of_a_roll(axes, printed):
     phase = np.linspace(0, 2 * np.pi, 9)
     readings = deroll(np.broadcast_to(np.array([-15.0, -8.0]) * ARCSEC, (9, 2)), -phase)
-    third, line3, second, line2 = figures.deroll_of_a_roll(readings, phase, axes[0], printed)
+    third, line3, _, second, line2, _ = figures.deroll_of_a_roll(readings, phase, axes[0], printed)
     assert line3.get_ydata()[0] == pytest.approx(15)
     assert line2.get_ydata()[0] == pytest.approx(-8)
+    assert third.get_color() == (style.REFUTED if printed else style.VALID)
     flat = np.allclose(third.get_ydata(), 15) and np.allclose(second.get_ydata(), -8)
     assert flat is not printed
     if printed:
@@ -75,7 +76,7 @@ def test_deroll_of_a_roll(axes, printed):
 def test_losses(axes):
     sizes = np.array([10, 100]) * ARCSEC
     curves = {"gamma1": (sizes, np.array([2.0, 3.0]) * MAS)}
-    points, line, goal = figures.losses(curves, axes[0])
+    points, line, _, goal, _ = figures.losses(curves, axes[0])
     assert np.allclose(points.get_xdata(), [10, 100])
     assert np.allclose(points.get_ydata(), [2, 3])
     assert np.allclose(line.get_ydata(), theory.small_angle_loss("gamma1", sizes) / MAS)
@@ -84,11 +85,11 @@ def test_losses(axes):
 
 def test_first_rolls_and_year(axes, both):
     still, rolled = both
-    samples, means, flat = figures.first_rolls(still, rolled, axes[0])
+    samples, means, flat, *_ = figures.first_rolls(still, rolled, axes[0])
     assert np.array_equal(samples.get_ydata(), rolled.first[:, 0] / ARCSEC)
     assert np.array_equal(means.get_ydata(), rolled.phi[: len(rolled.first) // rolled.block, 0] / ARCSEC)
     assert len(flat.get_ydata()) == len(samples.get_ydata())
-    points, line = figures.year_errors({"case": rolled}, axes[1], component=1)
+    points, line, _ = figures.year_errors({"case": rolled}, axes[1], component=1)
     assert np.allclose(points.get_ydata(), line.get_ydata(), atol=1e-3)
     assert line.get_ydata()[-1] == pytest.approx(-0.64, abs=0.01)
 
@@ -96,7 +97,7 @@ def test_first_rolls_and_year(axes, both):
 def test_precessions_are_perpendicular(axes):
     (solid, _) = figures.in_space(axes[0].figure, axes)
     names = [a.get_text() for a in figures.precessions(solid, -0.14) if hasattr(a, "get_text")]
-    assert {"geodetic", "motional", "Earth's axis"} <= set(names)
+    assert {"geodetic", "frame dragging", "Earth's axis"} <= set(names)
 
 
 def test_table_of_misalignments(both):
@@ -119,7 +120,7 @@ def test_table_of_fates():
     size = 20 * ARCSEC
     names = ("alpha1", "alpha2", "beta1", "beta3", "gamma1", "gamma2")
     table = tables.fates({name: experiment.parts(theory.Case().with_angle(name, size)) for name in names})
-    assert table.header == ("angle", "telescope", "gyro", "difference", "so it")
+    assert table.header == ("angle", "telescope", "gyro", "difference", "fate")
     assert [row[-1] for row in table.body] == [
         "stays",
         "is measured",

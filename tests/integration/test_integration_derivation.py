@@ -24,7 +24,7 @@ VALUES = {OMEGA: 3, T: sp.Rational(2, 5), P: sp.Rational(289, 100), MU: sp.Ratio
 
 
 #: Where what comes out is already written as it is printed.
-ALIKE = ("(18), $P_{31", "(18), $P_{32", "(21), ", "it begins at zero")
+ALIKE = ("(18), $P_{31", "(18), $P_{32", "(21), ", "the variance starts at zero")
 
 
 @steps.each(DERIVATIONS)

@@ -180,8 +180,8 @@ def test_ten_million_samples_in_bounded_memory():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: experiment.simulate(FIRST, 2.0, [], rng(0)), r"got n = \(\); needed rising numbers of cycles"),
-        (lambda: experiment.simulate(FIRST, 2.0, [2, 2], rng(0)), "needed rising numbers"),
+        (lambda: experiment.simulate(FIRST, 2.0, [], rng(0)), r"got n = \(\); needed increasing numbers of cycles"),
+        (lambda: experiment.simulate(FIRST, 2.0, [2, 2], rng(0)), "needed increasing numbers"),
         (lambda: experiment.simulate(FIRST, 2.0, [0], rng(0)), "at least 1"),
         (lambda: next(experiment.chunks(FIRST, 2.0, 0, rng(0))), "got 0 cycles, 1 paths, a memory of 1"),
         (

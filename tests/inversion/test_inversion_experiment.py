@@ -73,10 +73,10 @@ class TestTrial:
     def test_violations_and_ratios(self):
         bound_below = experiment.Trial("", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(1, 3), {"x": 1 / 3})
         assert bound_below.violates("x")  # 1/3 as a float64 is below 1/3
-        assert bound_below.ratio("x") == pytest.approx(1)
+        assert bound_below.overestimation("x") == pytest.approx(1)
         exact = experiment.Trial("", FMT.array([[1]]), FMT.array([[1]]), True, 1.0, Fraction(0), {"x": 0.1, "y": 0.0})
-        assert exact.ratio("x") == np.inf
-        assert exact.ratio("y") == 1
+        assert exact.overestimation("x") == np.inf
+        assert exact.overestimation("y") == 1
         assert not exact.violates("y")
 
     def test_singular(self):
@@ -164,7 +164,7 @@ class TestSweeps:
             assert row["smallest"] == f"{min(ratios):.4g}"
             assert row["median"] == f"{np.median(ratios):.4g}"
             assert row["largest"] == f"{max(ratios):.4g}"
-            of_regular = [one.ratio(name) for one in having if one.condition <= 20]
+            of_regular = [one.overestimation(name) for one in having if one.condition <= 20]
             assert row["smallest_regular"] == (f"{min(of_regular):.4g}" if of_regular else "")
             assert int(row["tight"]) == sum(ratio <= 1.1 for ratio in ratios)
         assert 0 < sum(regular) < len(trials)
@@ -196,7 +196,7 @@ class TestSweeps:
             ("all", "all"),
         ]
         assert int(rows[-1]["trials"]) == int(rows[0]["trials"]) + int(rows[1]["trials"]) == 8
-        ratios = [one.ratio("ball") for cell in cells for one in cell.trials(names)]
+        ratios = [one.overestimation("ball") for cell in cells for one in cell.trials(names)]
         assert rows[-1]["median"] == f"{np.median(ratios):.4g}"
 
 
@@ -256,7 +256,7 @@ class TestKept:
         least = min(
             float(row["smallest_regular"] or "inf") for row in experiment.frozen("variants").select(bound=bound)
         )
-        assert f"{one.ratio(bound):.4g}" == f"{least:.4g}"
+        assert f"{one.overestimation(bound):.4g}" == f"{least:.4g}"
         again = experiment.trial(one.matrix, one.pivot, (bound,))
         assert (again.error, again.bounds) == (one.error, one.bounds)
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
+from executors import Failing
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles
@@ -177,22 +178,6 @@ def test_threads_and_one_after_another_give_the_same():
     assert serial == tuple(trial(task) for task in todo)
     with ThreadPoolExecutor(2) as pool:
         assert sweep(todo, pool, batch=3) == serial
-
-
-class Failing(Executor):
-    """Fails with given exceptions first, then works."""
-
-    def __init__(self, *errors):
-        self.errors, self.sent = list(errors), 0
-
-    def submit(self, function, /, *arguments):
-        self.sent += 1
-        future = Future()
-        if self.errors:
-            future.set_exception(self.errors.pop(0))
-        else:
-            future.set_result(function(*arguments))
-        return future
 
 
 def killed():

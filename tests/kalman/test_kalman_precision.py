@@ -16,6 +16,7 @@ from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import limits
+from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.simulation import Simulation, fine_resolution
@@ -234,7 +235,7 @@ def test_its_own_measurements_are_seeded():
         ({"form": "square"}, "got form 'square'; needed one of Form.HUNG, .*Form.UD"),
         ({"steps": 0}, "got 0 steps; needed a whole number, at least 1"),
         ({"steps": 2.5}, "got 2.5 steps; needed a whole number"),
-        ({"z": np.where(np.arange(60) == 7, np.nan, 1.0)[:, None]}, "got nan for measurement 0 of step 8; .*H a cycle"),
+        ({"z": np.where(np.arange(60) == 7, np.inf, 1.0)[:, None]}, "got inf for measurement 0 of step 8; .*or NaN"),
         ({"z": 3.0}, "got 3.0; needed one for each of the 60 steps"),
         ({"z": Z[:5]}, r"got 5 measurements of shape \(1,\); needed one for each of the 60 steps, of shape \(1,\)"),
         ({"z": Z[:, 0], "basis": "bound"}, r"got 60 measurements of shape \(\); .*write z.reshape\(-1, 1\)"),
@@ -361,3 +362,23 @@ def test_guarantees_do_not_depend_on_units(basis):
     assert first.fmt is not None
     assert first.fmt == second.fmt
     assert [ratio <= 1 for _, ratio in first.tried] == [ratio <= 1 for _, ratio in second.tried]
+
+
+def test_a_missing_measurement_changes_nothing_but_the_prediction():
+    """NaN, a mask, and a row of zeros in H give the same run; two sensors with correlated noise, one of them silent."""
+    two = LinearModel(MODEL.Phi, [[1, "0.3"], [0, 1]], MODEL.Q, [["0.4", "0.1"], ["0.1", "0.5"]], MODEL.x0, MODEL.P0)
+    z = Simulation(two, (3.0, -1.0), 0, fine_resolution(two)).measurements(12)
+    silent = np.zeros((12, 2), dtype=bool)
+    silent[3, 0] = silent[7] = True
+    with_nan = np.where(silent, np.nan, z)
+    by_nan = required_precision(two, 12, 1e-4, z=with_nan)
+    assert by_nan == required_precision(two, 12, 1e-4, z=np.ma.MaskedArray(z, silent))
+    assert by_nan != required_precision(two, 12, 1e-4, z=z)
+    replaced, filled = without_missing(two, with_nan)
+    found = reference(replaced, filled, [3, 4, 8])
+    assert not found.K[1][:, 0].any()
+    assert not found.K[2].any()
+    alone = LinearModel(two.Phi, two.H[0][1:], two.Q, two.R[0][1:, 1:], found.x[0], (found.P[0] + found.P[0].T) / 2)
+    step = reference(alone, z[3:4, 1:], [1])
+    assert step.x[0].astype(float) == pytest.approx(found.x[1].astype(float), rel=1e-14)
+    assert step.P[0].astype(float) == pytest.approx(found.P[1].astype(float), rel=1e-14)

@@ -104,6 +104,7 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield f"coefficient, {name}", ast.parse(text, mode="eval").body
         case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Tuple):
             yield "index", ast.Subscript(value, ast.BinOp(index, ast.Add(), ast.Constant(1)), ast.Load())
+            yield "lower index", ast.Subscript(value, ast.BinOp(index, ast.Sub(), ast.Constant(1)), ast.Load())
         case ast.Subscript(value=value, slice=ast.Tuple(elts=indices)):
             for i, index in enumerate(indices):
                 moved = [*indices[:i], ast.BinOp(index, ast.Add(), ast.Constant(1)), *indices[i + 1 :]]

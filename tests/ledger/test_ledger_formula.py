@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from gpbnb.ledger.formula import Link, Number, Relation, Words, read
+from gpbnb.ledger.formula import Link, Number, Relation, Undefined, Words, read
 
 
 def exact(value):
@@ -149,6 +149,15 @@ def test_the_check_decides_what_is_approximately_equal():
         _ = link.holds
 
 
+@pytest.mark.parametrize("form", ["a[4]", "a[1]/0", "b[1]", "norm(a[1])", "-c", "cases((1, a[1] < 0), (2, a[1] < 1))"])
+def test_what_does_not_exist_or_fit_has_no_value(form):
+    names = {"a": {1: Fraction(3)}, "b": [].__getitem__, "c": sp.Matrix([1]), "norm": len}
+    if form == "-c":
+        names["c"] = None
+    with pytest.raises(Undefined):
+        Relation(form).value(names, exact)
+
+
 def test_dots_have_no_value():
     with pytest.raises(ValueError, match="cannot be evaluated"):
         Relation("a + ... + b").value()
@@ -175,6 +184,9 @@ def test_dots_have_no_value():
         ("a ≈ b", r"a\approx b"),
         ("s == group(a + b) + c", r"s=\left(a+b\right)+c"),
         ("bracket(C) <= D", r"\left[C\right]\le D"),
+        ("x == -2*w*P - (-a*b)", r"x=-2w\,P-\left(-a\,b\right)"),
+        ("norm(A) == Max(Sum(abs(a[i,j])))", r"\left\|A\right\|=\max\sum\left|a_{ij}\right|"),
+        ("x == pm(digits(d[1], d[2], ...))*b**e", r"x=\left(\pm.d_{1}d_{2}\cdots\right)b^{e}"),
         ("fl(op(x, y))", r"fl\left(x*y\right)"),
         ("x == cases((u, v < 1), (w, v >= 1))", r"x=\begin{cases}u & \text{if }v<1\\ w & \text{if }v\ge 1\end{cases}"),
         ("M[1]*...*M[n]", r"M_{1}\cdots\,M_{n}"),

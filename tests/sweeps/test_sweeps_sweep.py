@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import NamedTuple
@@ -11,8 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from distributed import Client, KilledWorker, LocalCluster
+from executors import Failing
 
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
+from gpbnb.sweeps.command import INTERRUPTED, run_command
 from gpbnb.sweeps.stored import run, verify
 from gpbnb.sweeps.sweep import ATTEMPTS
 
@@ -92,20 +94,24 @@ def test_finished_cells_are_not_computed_again(sweep, tmp_path):
     assert newer.finished(tmp_path / "some") == []
 
 
-class Failing(Executor):
-    """Fails with given exceptions first, then works."""
+def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(sweep, tmp_path, capsys):
+    def command(one, *arguments):
+        return run_command(one, "A test.", tmp_path / "saved", arguments)
 
-    def __init__(self, *errors):
-        self.errors, self.sent = list(errors), 0
+    def interrupted(cell, directory):
+        raise KeyboardInterrupt
 
-    def submit(self, function, /, *arguments):
-        self.sent += 1
-        future = Future()
-        if self.errors:
-            future.set_exception(self.errors.pop(0))
-        else:
-            future.set_result(function(*arguments))
-        return future
+    def stored(folder):
+        return sweep.load(tmp_path / folder / sweep.file.name).rows
+
+    assert command(sweep, "--cells", "3") == 0
+    assert len(stored("saved")) == 3 * 3
+    assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED
+    assert "goes on from what is saved" in capsys.readouterr().err
+    assert command(dataclasses.replace(sweep, compute=interrupted), "--store", "--output", str(tmp_path / "new")) == 0
+    assert stored("new") == stored("saved")
+    assert command(sweep) == 0
+    assert len(stored("saved")) == 3 * len(CELLS)
 
 
 def test_chunks_of_dead_workers_are_sent_again(sweep, tmp_path):

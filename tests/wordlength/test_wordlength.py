@@ -20,8 +20,9 @@ from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import Requirement, required_precision, survey
+from gpbnb.kalman.precision import required_precision, survey
 from gpbnb.kalman.report_bounds import coefficients
+from gpbnb.kalman.requirement import Requirement
 from gpbnb.wordlength import examples, figures, study, tables
 
 TILT = examples.tilt()

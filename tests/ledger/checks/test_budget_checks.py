@@ -21,18 +21,8 @@ from gpbnb.ledger.finding import Verdict
 INVENTORY = faults.INVENTORY
 # What ch. III of 1984 left open is decided by the checks of another topic.
 ENTRIES = [e for e in INVENTORY if e.id in checks.CHECKS and e.id != "hung1984.I.1-f-study"]
+CACHING = (general, sources)
 BY_ID = {entry.id: entry for entry in INVENTORY}
-
-
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
-
-
-@pytest.fixture
-def patch(monkeypatch):
-    with faults.forgetting(monkeypatch, general, sources):
-        yield monkeypatch
 
 
 def judged(key, form=None):

@@ -23,11 +23,6 @@ ENTRIES = [entry for entry in INVENTORY if entry.id in checks.CHECKS]
 CACHING = (angles, equations, frames, precessions)
 
 
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
-
-
 def test_every_entry_of_chapter_iv_has_a_check_here():
     fourth = {entry.id for entry in INVENTORY if entry.id.startswith("hung1982.IV.")}
     assert fourth <= set(checks.CHECKS)
@@ -83,12 +78,6 @@ def test_the_corrected_estimates_are_verified(number, angle, frame):
 # -- each check depends on the computation ---------------------------------------------------------
 
 
-@pytest.fixture
-def patch(monkeypatch):
-    with faults.forgetting(monkeypatch, *CACHING):
-        yield monkeypatch.setattr
-
-
 def run(key):
     return checks.CHECKS.run(statement(f"hung1982.{key}"))
 
@@ -121,7 +110,7 @@ DEPENDS = [
 @pytest.mark.parametrize(("key", "target", "attribute", "value"), DEPENDS)
 def test_what_agrees_could_disagree(patch, key, target, attribute, value):
     assert run(key).agrees is True
-    patch(target, attribute, value)
+    patch.setattr(target, attribute, value)
     faults.forget(*CACHING)
     assert run(key).agrees is False
 
@@ -142,22 +131,22 @@ AGREE = [
 @pytest.mark.parametrize(("key", "target", "attribute", "value"), AGREE)
 def test_what_disagrees_could_agree(patch, key, target, attribute, value):
     assert run(key).agrees is False
-    patch(target, attribute, value)
+    patch.setattr(target, attribute, value)
     assert run(key).agrees is True
 
 
 def test_both_parts_of_the_statement_on_phi_count(patch):
     assert run("IV.phi-frame").agrees is False
     true = angles.rotation
-    patch(angles, "theta_of", lambda phi, alpha: phi)
+    patch.setattr(angles, "theta_of", lambda phi, alpha: phi)
     assert run("IV.phi-frame").agrees is False
-    patch(angles, "rotation", lambda given: true(given).T)
+    patch.setattr(angles, "rotation", lambda given: true(given).T)
     assert run("IV.phi-frame").agrees is True
 
 
 def test_a_frame_that_moves_is_a_slip_only_while_the_drift_is_right(patch):
     assert run("IV.intermediate-frame").verdict is Verdict.MISPRINT
-    patch(frames, "theta_of", lambda phi, alpha: phi)
+    patch.setattr(frames, "theta_of", lambda phi, alpha: phi)
     assert run("IV.intermediate-frame").verdict is Verdict.WRONG
 
 

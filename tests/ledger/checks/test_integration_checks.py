@@ -22,11 +22,6 @@ MAIN = "savage2016.main."
 CACHING = (cases, covariance, model, open_items, result, derivation, theory)
 
 
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
-
-
 def finding(rows, key):
     return faults.finding(rows, MAIN + key)
 
@@ -148,17 +143,15 @@ DEPENDS = [
 
 
 @pytest.mark.parametrize(("key", "change"), DEPENDS)
-def test_a_check_depends_on_the_computation(rows, monkeypatch, key, change):
+def test_a_check_depends_on_the_computation(rows, patch, key, change):
     assert finding(rows, key).agrees is True
-    with faults.forgetting(monkeypatch, *CACHING) as patch:
-        change(patch)
-        assert checks.CHECKS.run(statement(MAIN + key)).agrees is False
+    change(patch)
+    assert checks.CHECKS.run(statement(MAIN + key)).agrees is False
 
 
-def test_the_verdict_of_a_misprint_depends_on_what_follows(monkeypatch):
-    with faults.forgetting(monkeypatch, *CACHING) as patch:
-        patch.setattr(result, "vanishes", lambda expression: False)
-        assert checks.CHECKS.run(statement(MAIN + "eq34")).verdict is Verdict.WRONG
+def test_the_verdict_of_a_misprint_depends_on_what_follows(patch):
+    patch.setattr(result, "vanishes", lambda expression: False)
+    assert checks.CHECKS.run(statement(MAIN + "eq34")).verdict is Verdict.WRONG
 
 
 def test_the_walk_is_that_of_the_derivation():

@@ -27,11 +27,6 @@ ENTRIES = (
 PRINTED = {entry.id: entry for entry in ENTRIES}
 
 
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
-
-
 # -- the present state ----------------------------------------------------------------------------
 
 
@@ -129,7 +124,7 @@ def test_the_counterexamples_are_not_due_to_bad_matrices():
         assert trial.condition < largest
         assert trial.violates(name)
         assert trial.error > trial.bounds[name]
-        assert trial.ratio(str(procedure.Reading(False, form))) > room
+        assert trial.overestimation(str(procedure.Reading(False, form))) > room
         assert not trial.violates("corrected")
 
 

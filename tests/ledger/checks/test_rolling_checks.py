@@ -21,11 +21,6 @@ from gpbnb.rolling import derivation, experiment, theory
 ENTRIES = ledger.select(faults.INVENTORY, "hung1984", "III")
 
 
-@pytest.fixture(scope="module")
-def rows():
-    return faults.examined(ENTRIES)
-
-
 def ids(*places):
     return {registry.entry(place) for place in places}
 

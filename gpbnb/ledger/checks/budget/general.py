@@ -15,6 +15,7 @@ from gpbnb.budget import theory
 from gpbnb.ledger.checks import rolling
 from gpbnb.ledger.checks.budget.registry import CHECKS
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.ledger.html import chapter
 from gpbnb.ledger.statements import Statement, load_statements, quote
 from gpbnb.measurement import ARCSEC, MAS
 
@@ -43,7 +44,7 @@ def two_tasks(printed: Statement) -> Finding:
         f"(18) of 1982, exceeded by the two-digit sum 5.6 + 5.9 − 11, is {'corrected' if fixed else 'not corrected'}; "
         f"(20), right in 1982, is {'spoiled' if spoiled else 'kept'}; (31), wrong in 1982, is "
         f"{'kept' if left else 'corrected'}",
-        otherwise_note="not all: (31) carries over to the main result; see the chapter *Rounding bounds*",
+        otherwise_note=f"not all: (31) carries over to the main result; see the {chapter('rounding')}",
         root="product-error-relative-to-product",
     )
 
@@ -100,20 +101,23 @@ def one_over_f_study(printed: Statement) -> Finding:
     )
 
 
-def period(printed: Statement) -> tuple[int, int]:
-    """Whole months and days of a printed period, the last day included; ValueError if it is no period."""
-    start, end = (
-        date(*(int(printed.number(f"{word} {part}").value) for part in ("year", "month", "day")))
-        for word in ("from", "to")
-    )
+def period(printed: Statement) -> tuple[int, int] | None:
+    """Whole months and days of a printed period, the last day included; None if a printed day does not exist."""
+    printed_days = ([printed.number(f"{word} {part}").value for part in ("year", "month", "day")]
+                    for word in ("from", "to"))  # fmt: skip
+    try:
+        start, end = (date(*map(int, numbers)) for numbers in printed_days)
+    except ValueError:
+        return None
     return span(start, end + timedelta(days=1))
 
 
 @CHECKS.add("hung1984.I.report-period")
 def period_1984(printed: Statement) -> Finding:
-    months, days = period(printed)
+    found = period(printed)
+    months, days = found or (0, 0)
     return compare(
-        months == printed.number("duration").value and days == 0,
+        found is not None and months == printed.number("duration").value and days == 0,
         f"{months} months and {days} days, the last day included",
     )
 
@@ -212,7 +216,7 @@ def chapter_reference(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.I.report-period")
 def period_1982(printed: Statement) -> Finding:
-    months, days = period(printed)
+    months, days = period(printed) or (0, 0)
     restored = span(date(1981, 6, 24), date(1982, 9, 1))
     return compare(
         months == printed.number("duration").value,

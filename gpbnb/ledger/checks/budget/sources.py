@@ -226,6 +226,8 @@ def abbreviations(printed: Statement) -> Finding:
 @CHECKS.add("hung1982.II.rss-total")
 def total(printed: Statement) -> Finding:
     value, (sources, single) = float(printed.number("total").value), equal_case()
+    if value < 0:
+        return compare(False, "the root of a sum of squares is not negative")
     return unverifiable(
         f"{value / theory.GOAL - 1:.1%} above the goal; {sources} equal sources of "
         f"{theory.equal_error(value, sources):.3f} make it up, or {theory.equal_sources(value, single):.0f} "

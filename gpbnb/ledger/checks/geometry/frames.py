@@ -30,7 +30,7 @@ def pictures() -> Finding:
     )
 
 
-_COUNTS = {"five": 5, "six": 6, "seven": 7}
+_COUNTS = {"four": 4, "five": 5, "six": 6, "seven": 7}
 
 
 @CHECKS.add("hung1982.IV.six-frames")

@@ -1,10 +1,11 @@
 """The checks of hung1982, ch. IV, and what they share."""
 
+from gpbnb.ledger.html import chapter
 from gpbnb.ledger.registry import Checks
 from gpbnb.measurement import ARCSEC
 
 CHECKS = Checks()
-CHAPTER = "chapter *Measurement geometry*"
+CHAPTER = chapter("geometry")
 MINUTE = 60 * ARCSEC
 """An arc minute in radians."""
 DEROLL = "estimates-roll-once-more"

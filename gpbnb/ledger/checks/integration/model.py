@@ -10,7 +10,7 @@ import sympy as sp
 
 from gpbnb.integration import derivation, theory
 from gpbnb.integration.derivation import OMEGA, TAU, TIME, P, T
-from gpbnb.ledger.agreement import hold, matrix_of, vanishes
+from gpbnb.ledger.agreement import hold, vanishes
 from gpbnb.ledger.checks.integration.cases import Case, cases, constants, states
 from gpbnb.ledger.checks.integration.registry import CHAPTER, CHECKS, MAIN, eq
 from gpbnb.ledger.finding import Finding, Verdict, compare, given, unverifiable
@@ -178,7 +178,7 @@ def state_form(printed: Statement) -> Finding:
 @CHECKS.add(*eq("4"))
 def matrices(printed: Statement) -> Finding:
     x1, x2, n1, w = sp.symbols("x_1 x_2 n_p1 omega_bw")
-    x, a, noise = (matrix_of(printed.relation(k).value()) for k in (1, 2, 3))
+    x, a, noise = (printed.relation(k).value({"matrix": sp.Matrix}) for k in (1, 2, 3))
     rates = sp.Matrix([-w * x1 + n1, x1])  # (1)
     agrees = x == sp.Matrix([x1, x2]) and vanishes(a - rates.jacobian(x)) and vanishes(rates - a * x - noise)
     return compare(

@@ -1,9 +1,10 @@
 """The checks of savage2016, and the ids of its equations."""
 
+from gpbnb.ledger.html import chapter
 from gpbnb.ledger.registry import Checks
 
 CHECKS = Checks()
-CHAPTER = "chapter *Digital integration error*"
+CHAPTER = chapter("integration")
 MAIN = "savage2016.main."
 
 

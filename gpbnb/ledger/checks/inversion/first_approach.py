@@ -170,11 +170,11 @@ def _residual_bound() -> tuple[str, bool]:
     true = theory.residual(sample.matrix, sample.reduction.solution)
     apart = column_sum_norm(computed - true) / column_sum_norm(true)
     trial = experiment.trial(sample.matrix, False, experiment.BETTER)
-    tightest = min(trial.bounds, key=trial.ratio)
+    tightest = min(trial.bounds, key=trial.overestimation)
     text = (
         f"one product in {twice.precision} digits gives $R$ of the example of 11.4 "
-        f"{'exactly' if apart == 0 else f'to {float(apart):.0e}'}; the bound from it is {trial.ratio(tightest):.4g} "
-        f"times the error, the tightest of {len(trial.bounds)}"
+        f"{'exactly' if apart == 0 else f'to {float(apart):.0e}'}; the bound from it is "
+        f"{trial.overestimation(tightest):.4g} times the error, the tightest of {len(trial.bounds)}"
     )
     return text, apart < Fraction(1, 100) and tightest == "a posteriori" and not trial.violates(tightest)
 

@@ -55,7 +55,7 @@ def exceeded() -> str:
         texts.append(
             f"for rows {rows}, {trial.matrix.format.precision} digits, {'with' if trial.pivot else 'without'} "
             f"pivoting, condition {trial.condition:.3g}, the error is "
-            f"{1 / trial.ratio(name):.2g} times {'the last box of the chart' if form == 'chart' else '(96)'}"
+            f"{trial.ratio(name):.2g} times {'the last box of the chart' if form == 'chart' else '(96)'}"
         )
     return "; ".join(texts)
 

@@ -13,6 +13,7 @@ from gpbnb.ledger.checks.inversion.environments import (
     entries,
     runs,
 )
+from gpbnb.ledger.checks.inversion.first_order import FirstOrder, matrix
 from gpbnb.ledger.checks.inversion.judging import COMMON, corrected, holds, says, slip
 from gpbnb.ledger.checks.inversion.registry import CHECKS
 from gpbnb.ledger.finding import Finding, Verdict, compare, given, unverifiable
@@ -297,14 +298,14 @@ def norms(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("eq58"))
 def partial_matrix(printed: Statement) -> Finding:
-    def changed(j: int, k: int) -> tuple[Fraction, Fraction]:
+    def changed(j: int, k: int) -> FirstOrder:
         error = names["A_tilde"](j).slope != 0
-        return Fraction(int(error.any(axis=1).sum())), Fraction(int(error.any(axis=0).sum()))
+        return matrix([[Fraction(int(error.any(axis=axis).sum())) for axis in (1, 0)]])
 
     (names, *_) = eliminations(4)
     shapes = [
         {"n": Fraction(4), "j": Fraction(j), "i": Fraction(i), "k": Fraction(j), "A": changed,
-         "block": lambda *shape: shape}
+         "block": lambda *shape: matrix([list(shape)])}
         for j in (1, 2) for i in (1, 2)
     ]  # fmt: skip
     same = [each for each in shapes if each["i"] == each["j"]]

@@ -12,7 +12,7 @@ from gpbnb.ledger.checks.kalman import algebra
 from gpbnb.ledger.checks.kalman.excess import exceeded, excess
 from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.ledger.checks.kalman.steps import SIGNS
-from gpbnb.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.ledger.finding import Finding, Verdict, compare
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
 
@@ -170,8 +170,3 @@ def usefulness(printed: Statement) -> Finding:
         otherwise_note="the digits that a formula asks for are of use if the formula is a bound",
         root=SIGNS,
     )
-
-
-@CHECKS.add("hung1982.III.s12.all-other-numbered-eqs-23-25-29-33-41-43-45-49-5")
-def others_of_1982(printed: Statement) -> Finding:
-    return given(f"no statement of its own ({printed.text}): each equation is judged under its own number")

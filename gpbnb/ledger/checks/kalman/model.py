@@ -8,6 +8,7 @@ from gpbnb.kalman import exact_step, report_bounds, smallest
 from gpbnb.ledger.checks.kalman.filter_run import MEASUREMENTS, STATES, holds_exactly
 from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.ledger.formula import Undefined
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 
@@ -20,7 +21,7 @@ def model_equations(printed: Statement) -> Finding:
     names = {"E": lambda product: product, "w": lambda k: w, "v": lambda j: v}
     try:
         printed.relation(4).links(names)
-    except ValueError:
+    except Undefined:
         return compare(
             False,
             f"with $n={STATES}$, $m={MEASUREMENTS}$ the product $w_kv_j$ does not exist; $w_kv_j^T$ does",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.ledger.html import chapter
 from gpbnb.ledger.registry import Checks
 
 CHECKS = Checks()
 
-CHAPTER = "chapter *Kalman bound*"
+CHAPTER = chapter("kalman")
 FOUR = FloatFormat(10, 4)

@@ -12,7 +12,7 @@ import sympy as sp
 
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.display.tables import scientific
-from gpbnb.ledger.agreement import hold
+from gpbnb.ledger.agreement import hold, prints_side
 from gpbnb.ledger.checks.rolling.process import fixed, low_frequency, signals
 from gpbnb.ledger.checks.rolling.registry import ALLOWED, CHECKS, ONE_DIMENSION, PRINTED, SIX, TEN, entry
 from gpbnb.ledger.finding import Finding, Verdict, compare, given, unverifiable
@@ -196,13 +196,15 @@ def delta_omega_2(printed: Statement) -> Finding:
     )
 
 
+_PLAIN = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹", "0123456789")
+
+
 @CHECKS.add(entry("s4.sample-2-period"))
 def period_2(printed: Statement) -> Finding:
     period = 2 * math.pi / float(half_unit(TEN))
-    significand = printed.says("period").split()[0]
-    as_decimal = float(significand.replace(",", "")) if "," in significand else float(significand)
+    significand, power = printed.says("period").translate(_PLAIN).split(" × 10")
     return compare(
-        math.isclose(period, as_decimal * 1e12, rel_tol=1e-4),
+        math.isclose(period, float(significand.replace(",", "")) * 10.0 ** int(power), rel_tol=1e-4),
         f"{scientific(period, 5)} s",
         Verdict.MISPRINT,
         otherwise_note="a comma for the decimal point, by the author or the scan",
@@ -220,9 +222,8 @@ def cosine_2(printed: Statement) -> Finding:
     (link,) = printed.links({"cos": math.cos, "pi": math.pi}, float)
     (bare,) = printed.links({"cos": float, "pi": math.pi}, float)
     years = round(2 * math.pi / float(half_unit(TEN)) / YEAR, -4)
-    literal = printed.relation().text.rsplit("==", 1)[1].strip()
     return compare(
-        math.isclose(2 * math.pi / bare.left, years) and prints_as(link.left, literal, *PRINTED),
+        math.isclose(2 * math.pi / bare.left, years) and prints_side(link.left, printed.relation(), *PRINTED),
         f"{math.cos(2 * math.pi / years):.11f}",
         note="chopped to nine digits",
     )

@@ -8,7 +8,7 @@ import numpy as np
 import sympy as sp
 
 from gpbnb.arithmetic.formats import prints_as
-from gpbnb.ledger.agreement import hold
+from gpbnb.ledger.agreement import hold, prints_side
 from gpbnb.ledger.checks.rolling.registry import ALLOWED, CHECKS, ONE_DIMENSION, PRINTED, entry
 from gpbnb.ledger.finding import Finding, Verdict, compare, unverifiable
 from gpbnb.ledger.statements import Statement
@@ -51,7 +51,7 @@ def signal_to_noise(printed: Statement) -> Finding:
     )
 
 
-_DEGREES = {"one degrees": 1, "two degrees": 2, "five degrees": 5}
+_DEGREES = {"one degrees": 1, "two degrees": 2, "five degrees": 5, "ten degrees": 10}
 
 
 @CHECKS.add(entry("s3.one-degree"))
@@ -83,10 +83,9 @@ def cos_5(printed: Statement) -> Finding:
 @CHECKS.add(entry("s3.9998"))
 def printed_cosine(printed: Statement) -> Finding:
     (link,) = printed.links()
-    literal = printed.relation().text.rsplit("==", 1)[1].strip()
     cosine = math.cos(math.radians(1))
     return compare(
-        prints_as(float(link.left), literal, *PRINTED) and prints_as(cosine, ".9998", *PRINTED),
+        prints_side(float(link.left), printed.relation(), *PRINTED) and prints_as(cosine, ".9998", *PRINTED),
         f"$1-.9998^2={1 - 0.9998**2:.8f}$; $\\cos1°={cosine:.6f}$",
         note=f"from the full cosine, {1 - cosine**2:.4f}",
     )

@@ -1,10 +1,11 @@
 """The checks of hung1984, ch. III, and what they share."""
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.ledger.html import chapter
 from gpbnb.ledger.registry import Checks
 
 CHECKS = Checks()
-CHAPTER = "chapter *Roll and deroll*"
+CHAPTER = chapter("rolling")
 SIX, TEN = FloatFormat(10, 6), FloatFormat(10, 10)
 PRINTED = Rounding.documented()
 """Ways in which the report may have cut a number."""

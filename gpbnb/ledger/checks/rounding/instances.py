@@ -116,7 +116,9 @@ def link_holds(link: Link, first_order: bool = False) -> bool:
 
 def _attains(link: Link) -> bool:
     smaller, larger = (link.left, link.right) if link.symbol in ("<=", "<") else (link.right, link.left)
-    a, b = np.broadcast_arrays(_entries(smaller), _entries(larger))
+    a, b = _entries(smaller), _entries(larger)
+    if a.shape != b.shape:
+        return False
     zero = link.symbol == ">="  # a bound of zero is attained by zero; a vanishing instance attains no other bound
     return any((y > 0 and x >= ATTAINED * y) or (zero and x == y) for x, y in zip(a.ravel(), b.ravel(), strict=True))
 

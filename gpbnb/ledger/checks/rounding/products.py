@@ -19,11 +19,11 @@ from gpbnb.ledger.checks.rounding.matrices import norm
 from gpbnb.ledger.checks.rounding.registry import CHECKS
 from gpbnb.ledger.checks.rounding.sums import worst_twenty
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.ledger.html import chapter
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 from gpbnb.rounding import derivation, experiment, theory
 
-CHAPTER = "chapter *Rounding bounds*"
 ROOT = "product-error-relative-to-product"
 
 
@@ -137,7 +137,7 @@ def relative_dot() -> Finding:
     return answer(
         bool(holds),
         "$|\\tilde I/I|\\le\\gamma_n\\,|a|^T|b|\\,/\\,|a^Tb|$, $\\gamma_n=n\\beta/(1-n\\beta)$",
-        f"{CHAPTER}, section on inner products",
+        f"{chapter('rounding')}, section on inner products",
     )
 
 

@@ -1,0 +1,49 @@
+"""``python -m gpbnb``: list the commands, or run one of them."""
+
+from __future__ import annotations
+
+import argparse
+import runpy
+import sys
+from collections.abc import Sequence
+
+COMMANDS = {
+    "wordlength": "how many digits your own filter needs, with a report",
+    "ledger": "every printed equation, number and claim, with its verdict",
+    "sweeps": "list the stored sweeps, or verify a sample of them",
+    "rolling": "compute the stored drift rates again",
+    "inversion": "compute the stored sweeps over inverses again",
+    "kalman.year": "compute the emulated years again",
+    "kalman.ensembles": "compute the random filters again",
+    "kalman.threshold": "compute the years of hundreds of records again",
+    "kalman.mission_runs": "compute the years of the mission model again",
+    "kalman.guarantee.survey": "compute the survey of guarantees again",
+    "wordlength.guarantees": "compute the table of guarantees again",
+}
+"""Each is also ``python -m gpbnb.<command>``."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    lines = "\n".join(f"  {name:<24} {help_}" for name, help_ in COMMANDS.items())
+    parser = argparse.ArgumentParser(
+        prog="python -m gpbnb",
+        description="Rounding errors in recursive filters, integrators and matrix computations.",
+        epilog=f"commands:\n{lines}\n\npython -m gpbnb COMMAND --help explains one of them.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("command", nargs="?", help="one of the commands below")
+    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="of that command")
+    given = parser.parse_args(arguments)
+    if given.command is None:
+        parser.print_help()
+        return 0
+    if given.command not in COMMANDS:
+        parser.error(f"got {given.command!r}; needed one of {', '.join(COMMANDS)}")
+    sys.argv = [given.command, *given.arguments]
+    runpy.run_module(f"gpbnb.{given.command}", run_name="__main__", alter_sys=False)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,37 @@
+"""An error beside the bounds of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any
+
+
+class BoundedError:
+    """The error of one computed result, and bounds of it by their names: what the trials of each topic share.
+
+    Attributes
+    ----------
+    error : exact.
+    bounds : name → bound, exact or float64.
+    """
+
+    error: Fraction
+    bounds: Mapping[str, Any]
+
+    def ratio(self, bound: str) -> float:
+        """Error over bound; 0 for an exact result, infinity for an error with a bound of zero."""
+        if not self.error:
+            return 0.0
+        return float(self.error / Fraction(self.bounds[bound])) if self.bounds[bound] else math.inf
+
+    def overestimation(self, bound: str) -> float:
+        """Bound over error; infinity for an exact result with a bound above zero, 1 if both are zero."""
+        if not self.error:
+            return math.inf if self.bounds[bound] else 1.0
+        return float(Fraction(self.bounds[bound]) / self.error)
+
+    def violates(self, bound: str) -> bool:
+        """Whether the error exceeds the bound, decided exactly."""
+        return self.error > Fraction(self.bounds[bound])

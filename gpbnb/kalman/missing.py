@@ -1,0 +1,46 @@
+"""Measurements that are missing in some steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from gpbnb.kalman.model import LinearModel
+
+
+def without_missing(model: LinearModel, z: Any) -> tuple[LinearModel, Any]:
+    """A model of each step's measurements, and the measurements with zeros where one is missing.
+
+    A missing measurement has a row of zeros in H, and its noise is correlated with no other. Its column of the gain is
+    then exactly zero in every form and format, so that estimate and covariance are those of a step without it.
+
+    Parameters
+    ----------
+    z : (steps, m), with NaN for what is missing; or a masked array.
+
+    Returns
+    -------
+    model, z : as they came if nothing is missing.
+    """
+    given = np.ma.getdata(z) if isinstance(z, np.ma.MaskedArray) else np.asarray(z)
+    missing = np.array(np.ma.getmaskarray(z)) if isinstance(z, np.ma.MaskedArray) else np.zeros(given.shape, dtype=bool)
+    if given.dtype.kind == "f":
+        missing |= np.isnan(given)
+    if given.ndim != 2 or given.shape[1] != model.m or not missing.any():
+        return model, given
+    H, R = [], []
+    for k, gone in enumerate(missing):
+        h, r = model.H[k % len(model.H)], model.R[k % len(model.R)]
+        if gone.any():
+            h, r = h.copy(), r.copy()
+            h[gone] = Fraction(0)
+            apart = (gone[:, None] | gone[None, :]) & ~np.eye(model.m, dtype=bool)
+            r[apart] = Fraction(0)
+        H.append(h)
+        R.append(r)
+    filled = given.copy()
+    filled[missing] = 0
+    return replace(model, H=np.array(H, dtype=object), R=np.array(R, dtype=object)), filled

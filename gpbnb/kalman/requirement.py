@@ -1,0 +1,113 @@
+"""The answer to how many digits are needed, and what it rests on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.kalman.forms import Form
+
+Basis = Literal["emulation", "bound", "guarantee", "probable"]
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """The smallest precision that meets a tolerance, and what the answer rests on.
+
+    Parameters
+    ----------
+    fmt : None if no format with compiled loops meets the tolerance, or if the largest precision tried misses it.
+    basis : "emulation", what happened with these measurements; or "bound", what could at most have happened.
+    steps : of the filter.
+    tried : precision, and largest error over tolerance of all states and checkpoints; infinite where the run stopped, a
+        variance was lost, or no bound exists.
+    why : of the largest precision below the answer that has no number for an error, why not; empty if all have one.
+        Shown where it kept the answer from being a smaller one.
+    form : of the filter.
+    irregular : precisions that meet the tolerance although a higher one was run and misses it; empty if all is regular.
+    advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
+    repairs : changes of the model's covariances, each as text.
+    """
+
+    fmt: FloatFormat | None
+    basis: Basis
+    steps: int
+    tried: tuple[tuple[int, float], ...]
+    why: str = ""
+    form: Form | None = None
+    irregular: tuple[int, ...] = ()
+    advice: str = ""
+    repairs: tuple[str, ...] = ()
+
+    @property
+    def precision(self) -> int | None:
+        """Digits of the answer, or None."""
+        return None if self.fmt is None else self.fmt.precision
+
+    def __str__(self) -> str:
+        notes = [*self.repairs]
+        if self.irregular:
+            missed = [digits for digits, ratio in self.tried if not ratio <= 1 and digits > self.irregular[0]]
+            notes.insert(0, f"{listed(self.irregular)} digits meet it, but {listed(missed)} do not")
+        if self.advice:
+            notes.append(self.advice)
+        end = "".join(f"; {note}" for note in notes)
+        if self.fmt is None:
+            most, why = self.tried[-1][0], f"; {self.why}" if self.why else ""
+            met = "meets the tolerance reliably" if self.irregular else "meets the tolerance"
+            return f"no precision up to {most} digits {met} ({self.basis}, {self.steps} steps){why}{end}"
+        tried = dict(self.tried)
+        why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
+        return (
+            f"{self.fmt.precision} digits of base {self.fmt.base}, {self.fmt.rounding.value}: "
+            f"{tried[self.fmt.precision]:.2g} of the tolerance ({self.basis}, {self.steps} steps){why}{end}"
+        )
+
+
+def listed(numbers: Sequence[int]) -> str:
+    """Whole numbers in rising order as text, runs of three and more as ranges: "2, 5–8"."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    texts = [f"{run[0]}–{run[-1]}" if len(run) > 2 else ", ".join(map(str, run)) for run in runs]
+    return ", ".join(texts)
+
+
+def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: str) -> NDArray[np.float64]:
+    """The tolerance of each of `count` states or outputs, if it, the base and the basis make sense.
+
+    Raises
+    ------
+    ValueError : they do not; the message has what is needed.
+    """
+    needed = f"needed an error above 0 for each of the {count} {what}, one finite"
+    try:
+        if isinstance(tolerance, (str, bool)):
+            raise ValueError("text and truth values are no numbers")
+        tolerances = np.asarray(tolerance)
+        if tolerances.dtype.kind not in "iufO":
+            raise ValueError("no real numbers")
+        tolerances = tolerances.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"got tolerance {tolerance!r}; {needed}") from None
+    if tolerances.shape not in ((), (count,)):
+        raise ValueError(
+            f"got tolerance {tolerance} of shape {tolerances.shape}; {needed}: one number, or {count} in a row"
+        )
+    if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
+        raise ValueError(f"got tolerance {tolerance}; {needed}")
+    if basis not in get_args(Basis):
+        raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
+    if isinstance(base, bool) or base not in LARGEST_PRECISION:
+        raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
+    return np.broadcast_to(tolerances, (count,))

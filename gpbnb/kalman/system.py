@@ -1,0 +1,242 @@
+r"""Linear systems without a covariance: digital filters, controllers and observers with fixed coefficients.
+
+.. math:: x_{k+1} = A x_k + B u_k, \qquad y_k = C x_k + D u_k
+
+Each row of A and B, and of C and D, is one sum from left to right. The error of an output is taken against the system
+with the coefficients as given, so that the errors of storing them are among those of the arithmetic.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.tags import DoubleDouble
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.search import CHECKED, Search
+from gpbnb.kalman.guarantee.bound import from_schedule, limits
+from gpbnb.kalman.guarantee.envelope import Limits
+from gpbnb.kalman.guarantee.gains import pack, widened_array
+from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
+from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.guarantee.program import advance
+from gpbnb.kalman.named import rounding_named, whole_number
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSystem:
+    r"""A linear system with known inputs: :math:`x_{k+1} = Ax_k + Bu_k`, :math:`y_k = Cx_k + Du_k`.
+
+    Entries are held exactly, as Fractions; numbers, strings and Decimals are read exactly too.
+
+    Parameters
+    ----------
+    A : (n, n), transition.
+    B : (n, m), inputs.
+    C : (p, n), outputs; by default the states.
+    D : (p, m), feedthrough; by default none.
+    x0 : (n,), the first state; by default zeros.
+    name : what tables and reports call it.
+
+    Raises
+    ------
+    ValueError : shapes that do not fit; NaN or infinity.
+
+    Examples
+    --------
+    A moving average that forgets a tenth in each step:
+
+    >>> system = LinearSystem([["0.9"]], [["0.1"]])
+    >>> system.n, system.m, system.p
+    (1, 1, 1)
+    """
+
+    A: NDArray[Any]
+    B: NDArray[Any]
+    C: Any = None
+    D: Any = None
+    x0: Any = None
+    name: str = "a linear system"
+
+    def __post_init__(self) -> None:
+        for letter in ("A", "B", "C", "D", "x0"):
+            given = getattr(self, letter)
+            if given is None and letter in ("C", "D", "x0"):
+                n, m = self.A.shape[0], self.B.shape[1]
+                given = {
+                    "C": np.eye(n, dtype=int),
+                    "D": np.zeros((len(self.C) if letter == "D" else n, m), dtype=int),
+                    "x0": np.zeros(n, dtype=int),
+                }[letter]
+            try:
+                entries = exact(given)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{letter}: {error}") from None
+            if letter != "x0" and (entries.ndim != 2 or not entries.size):
+                raise ValueError(f"got {letter} of shape {entries.shape}; needed a matrix")
+            entries.flags.writeable = False
+            object.__setattr__(self, letter, entries)
+        n, m, p = self.n, self.m, self.p
+        for letter, shape in (("A", (n, n)), ("B", (n, m)), ("C", (p, n)), ("D", (p, m)), ("x0", (n,))):
+            if getattr(self, letter).shape != shape:
+                raise ValueError(
+                    f"got {letter} of shape {getattr(self, letter).shape}; needed {shape}: A has {n} rows, B {m} "
+                    f"columns and C {p} rows"
+                )
+
+    @property
+    def n(self) -> int:
+        """How many states there are."""
+        return int(self.A.shape[0])
+
+    @property
+    def m(self) -> int:
+        """How many inputs there are."""
+        return int(self.B.shape[1])
+
+    @property
+    def p(self) -> int:
+        """How many outputs there are."""
+        return int(self.C.shape[0])
+
+    def as_filter(self) -> LinearFilter:
+        """The same system as the guarantee takes it: its outputs follow the states."""
+        return state_space(self.A, self.B, self.C, self.D, self.name)
+
+    def outputs(self, u: Any, fmt: FloatFormat | None = None) -> NDArray[np.float64]:
+        """Outputs in a format with every operation rounded, or in double-double, as pairs of float64.
+
+        Parameters
+        ----------
+        u : (steps, m), inputs; each is rounded into the format.
+
+        Returns
+        -------
+        y : (steps, p, 2), each output as a sum of two float64.
+
+        Raises
+        ------
+        OverflowError : a number is beyond the range of the format's compiled loops.
+        """
+        given, inputs = self.as_filter(), _inputs(self, u)
+        start = np.concatenate([self.x0, exact([0] * self.p)])
+        if fmt is None:
+            tag: Any = DoubleDouble()
+            coefficients, z, x = (double_doubles(exact(each)) for each in (given.coefficients, inputs, start))
+        else:
+            if not isinstance(fmt.backend, Compiled):
+                raise ValueError(f"got {fmt}; needed a format with compiled loops: base 2, 10 or 16")
+            tag = fmt.run_tag()
+            coefficients, z, x = (pack(fmt, each) for each in (given.coefficients, inputs, start))
+        program, out = given.program, np.zeros((len(inputs), *x.shape), x.dtype)
+        advance(tag, program.operations, program.outputs, coefficients[None], 0, z, x, out)
+        outputs = np.ascontiguousarray(out[:, self.n :])
+        return outputs if fmt is None else widened_array(outputs)
+
+
+def required_system_precision(
+    system: LinearSystem,
+    steps: int,
+    tolerance: Any,
+    u: Any = None,
+    base: int = 2,
+    rounding: Rounding | str = Rounding.NEAREST,
+    basis: Basis = "emulation",
+    within: Limits | None = None,
+    progress: bool = False,
+) -> Requirement:
+    """Find the smallest precision with which the outputs of a linear system stay within a tolerance.
+
+    Parameters
+    ----------
+    tolerance : largest error of each output, in its unit; one number, or (p,).
+    u : (steps, m), inputs.
+    basis : "emulation" compares with the system as given, for these inputs. "bound" holds for ever and for every input
+        that is nowhere larger than the largest of `u`, from rest; "guarantee" for inputs within the limits on the
+        measurement. Both bound rounding, and the errors of storing coefficients and inputs. "probable" takes three
+        standard deviations for rounding in place of its bound.
+    within : from :func:`gpbnb.kalman.guarantee.bound.limits`; only the limit on the measurement counts.
+
+    Raises
+    ------
+    ValueError : inputs that are missing or do not fit; a tolerance that is not positive; a bound of a system that does
+        not start from rest.
+    """
+    tolerances = checked_tolerance(tolerance, system.p, "outputs", base, basis)
+    steps, rounding = whole_number("steps", steps), rounding_named(rounding)
+    if u is None and (within is None or basis in ("emulation", "bound")):
+        raise ValueError(f'got no inputs for basis "{basis}"; needed z=, of shape ({steps}, {system.m})')
+    largest = np.array([np.inf])
+    if u is not None:
+        u = _inputs(system, u, steps)
+        largest = np.abs(u.astype(np.float64)).max(axis=0)
+    if basis in ("guarantee", "probable"):
+        if within is None:
+            raise ValueError(f'got basis "{basis}" without limits; needed within=limits(..., measurement=...)')
+        largest = np.asarray(within.measurement, dtype=np.float64)
+    if basis != "emulation" and any(system.x0):
+        raise ValueError(f'got a first state {system.x0.tolist()} and basis "{basis}"; needed x0 = 0 for a bound')
+    true = system.outputs(u) if basis == "emulation" else None
+
+    def error(fmt: FloatFormat) -> tuple[float, str]:
+        try:
+            errors = _observed(system, u, fmt, true) if true is not None else _bounded(system, fmt, largest, basis)
+        except (ValueError, OverflowError) as fault:
+            return math.inf, str(fault)
+        ratio = float((errors / tolerances).max())
+        return (ratio, "") if ratio < math.inf else (math.inf, "an output is not finite")
+
+    with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
+        found = Search(error, base, rounding, CHECKED[base], bar.update, bounds=basis != "emulation")
+    advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
+    return Requirement(found.fmt, basis, steps, found.tried, found.why, None, found.irregular, advice)
+
+
+def _inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
+    given = np.asarray(u)
+    if given.ndim != 2 or given.shape[1] != system.m or not len(given) or steps not in (None, len(given)):
+        column = "; write u.reshape(-1, 1)" if given.ndim == system.m == 1 else ""
+        raise ValueError(f"got inputs of shape {given.shape}; needed ({steps or 'steps'}, {system.m}){column}")
+    return given if given.dtype.kind == "f" and np.isfinite(given).all() else exact(given)
+
+
+def _observed(system: LinearSystem, u: Any, fmt: FloatFormat, true: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest error of each output, (p,)."""
+    found = system.outputs(u, fmt)
+    error = (found[..., 0] - true[..., 0]) + (found[..., 1] - true[..., 1])
+    largest = np.abs(error).max(axis=0)
+    return np.asarray(np.where(np.isnan(largest), np.inf, largest))
+
+
+def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64], basis: str) -> NDArray[np.float64]:
+    """Bound of the error of each output, (p,), by rounding and by storing coefficients and inputs.
+
+    With stored matrices marked by a hat, outputs differ by at most the peak gain of the difference of both systems
+    times the largest input, and the peak gain of the stored system times the errors of the stored inputs.
+    """
+    A, B, C, D = (
+        cast(NDArray[Any], fmt.array(each).to_fractions()) for each in (system.A, system.B, system.C, system.D)
+    )
+    zero = exact(np.zeros((system.n, system.n), dtype=int))
+    both = np.block([[system.A, zero], [zero, A]])
+    beta = float(fmt.unit_roundoff)
+    difference = peak_gain(both, np.vstack([system.B, B]), np.hstack([system.C, -C]), system.D - D).high
+    stored = peak_gain(A, B, C, D).high
+    sizes = largest * (1 + beta)
+    unit = exact(np.eye(system.n, dtype=int))
+    state = np.concatenate([peak_gain(A, B, unit).high, stored]) @ sizes * (1 + 2.0**-40)
+    within = limits(system.n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
+    found = from_schedule(system.as_filter().schedule(fmt), within, 1)
+    if not found.for_ever:
+        raise ValueError(found.why)
+    rounding = found.bound if basis != "probable" else 3 * probable_error(found)
+    # two sums of m products in float64, each off by less than 2**-40
+    return np.asarray((rounding[system.n :] + (difference + stored * beta) @ largest) * (1 + 2.0**-40))

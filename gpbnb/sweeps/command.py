@@ -1,0 +1,42 @@
+"""The command that computes a sweep cell by cell and stores the cells that are finished."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gpbnb.sweeps.sweep import Sweep
+
+INTERRUPTED = 130
+
+
+def run_command(sweep: Sweep[Any], description: str, directory: Path, arguments: Sequence[str] | None = None) -> int:
+    """Compute the cells of a sweep and write its table, or write the finished cells alone; return the exit status.
+
+    Parameters
+    ----------
+    sweep : what to compute.
+    description : of the command, for its help.
+    directory : where progress is saved by default.
+    arguments : of the command line; those of this process by default.
+    """
+    cells = sweep.cells()
+    parser = argparse.ArgumentParser(prog=sweep.command, description=description)
+    parser.add_argument("--directory", type=Path, default=directory, help="where progress is saved")
+    parser.add_argument("--cells", type=int, default=len(cells), help="only so many of the cells")
+    parser.add_argument("--store", action="store_true", help="write the finished cells, and compute nothing")
+    parser.add_argument("--output", type=Path, help="folder for the table; by default where progress is saved")
+    given = parser.parse_args(arguments)
+    if not given.store:
+        try:
+            sweep.run(given.directory, cells=cells[: given.cells])
+        except KeyboardInterrupt:
+            print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
+            return INTERRUPTED
+    folder = given.output or given.directory
+    folder.mkdir(parents=True, exist_ok=True)
+    sweep.store(sweep.finished(given.directory), sweep.seconds(given.directory), folder / sweep.file.name)
+    return 0

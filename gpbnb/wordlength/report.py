@@ -1,0 +1,293 @@
+"""A report on the wordlength of one filter: computed once, then written as JSON and as one HTML page."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.filter_run import log_spaced, reference
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.missing import without_missing
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import form_named
+from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.requirement import Basis, Requirement
+from gpbnb.kalman.simulation import Simulation, fine_resolution
+from gpbnb.kalman.system import LinearSystem
+from gpbnb.sweeps import machine
+from gpbnb.wordlength.study import binary_ranges
+
+SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
+"""Forms that a report compares; the one asked for comes first."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One search as plain numbers: `tried` has precision and error over tolerance, None where there is no number."""
+
+    label: str
+    basis: str
+    digits: int | None
+    text: str
+    tried: tuple[tuple[int, float | None], ...]
+
+
+@dataclass(frozen=True)
+class Report:
+    """What the command found, in plain numbers and texts.
+
+    Parameters
+    ----------
+    name, kind : of the model; "Kalman filter" or "linear system".
+    digits : the answer, None if there is none. text : the same, with what it rests on.
+    base, rounding, steps, tolerance : of the question.
+    source : where the measurements come from.
+    answers : one for each basis and form, the one asked for first.
+    errors : error over tolerance of each state at the answer; None where the tolerance is infinite.
+    ranges : name, least and largest power of two.
+    command : reproduces the report. versions : of the machine and packages.
+    """
+
+    name: str
+    kind: str
+    digits: int | None
+    text: str
+    base: int
+    rounding: str
+    steps: int
+    tolerance: tuple[float | None, ...]
+    source: str
+    answers: tuple[Answer, ...]
+    errors: tuple[float | None, ...]
+    ranges: tuple[tuple[str, int, int], ...]
+    command: str
+    versions: dict[str, str]
+
+    @property
+    def limiting(self) -> int | None:
+        """The state with the largest error over its tolerance, from 0."""
+        ratios = [(ratio, i) for i, ratio in enumerate(self.errors) if ratio is not None]
+        return max(ratios)[1] if ratios else None
+
+    def to_json(self) -> str:
+        """All of it as JSON, with the limiting state; without NaN or infinity."""
+        return json.dumps({**asdict(self), "limiting": self.limiting}, indent=1, ensure_ascii=False, allow_nan=False)
+
+    def to_html(self) -> str:
+        """One page that needs no other file."""
+        return page(self)
+
+
+def study(
+    model: LinearModel | LinearSystem,
+    tolerance: float | Sequence[float],
+    z: Any = None,
+    steps: int | None = None,
+    base: int = 2,
+    rounding: str = "nearest",
+    form: str = "innovation",
+    bases: Sequence[Basis] = ("emulation", "bound"),
+    source: str = "",
+    command: str = "",
+    tell: Callable[[str], Any] = lambda text: None,
+    progress: bool = False,
+) -> Report:
+    """Answer for each basis and form, and collect what explains the answers.
+
+    Parameters
+    ----------
+    z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
+    steps : how many to simulate; by default as many as there are measurements, or 1000.
+    tell : is given a line of text before each search.
+
+    Raises
+    ------
+    ValueError : as :func:`gpbnb.kalman.precision.required_precision`.
+    """
+    count = steps if steps is not None else 1000 if z is None else len(z)
+    if isinstance(model, LinearSystem):
+        questions: list[tuple[str, Basis, Form | None]] = [(basis, basis, None) for basis in bases]
+    else:
+        first = form_named(form)
+        forms = [first, *(each for each in SIDE_BY_SIDE if each is not first)]
+        questions = [(f"{each}, {basis}", basis, each) for each in forms for basis in bases]
+        if z is None:
+            z = Simulation(model, tuple(map(float, model.x0)), 0, fine_resolution(model)).measurements(count)
+    found: list[tuple[str, Requirement]] = []
+    for label, basis, chosen in questions:
+        tell(f"{label} …")
+        chosen = Form.INNOVATION if chosen is None else chosen
+        answer = required_precision(model, count, tolerance, base, rounding, chosen, basis, z, progress=progress)
+        found.append((label, answer))
+        tell(f"{label}: {answer}")
+    main = found[0][1]
+    width = model.p if isinstance(model, LinearSystem) else model.n
+    tolerances = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (width,))
+    errors: tuple[float | None, ...] = ()
+    ranges: tuple[tuple[str, int, int], ...] = ()
+    if isinstance(model, LinearModel):
+        errors = _errors(model, z, main, form_named(form), tolerances)
+        sound, filled = without_missing(model, z)
+        ranges = tuple((each.name, each.least, each.largest) for each in binary_ranges(sound, filled))
+    return Report(
+        model.name,
+        "Kalman filter" if isinstance(model, LinearModel) else "linear system",
+        main.precision,
+        str(main),
+        base,
+        str(rounding),
+        count,
+        tuple(_finite(float(each)) for each in tolerances),
+        source or ("given" if z is not None else "simulated by the model"),
+        tuple(_plain(label, answer) for label, answer in found),
+        errors,
+        ranges,
+        command,
+        machine(),
+    )
+
+
+def _errors(
+    model: LinearModel, z: Any, answer: Requirement, form: Form, tolerances: np.ndarray
+) -> tuple[float | None, ...]:
+    """Largest error over tolerance of each state at the answer."""
+    if answer.fmt is None:
+        return ()
+    sound, filled = without_missing(model, z)
+    checkpoint_steps = log_spaced(len(filled), 16)
+    true = reference(sound, filled, checkpoint_steps)
+    largest = np.abs(emulate(sound, filled, answer.fmt, form, checkpoint_steps, true).state).max(axis=0)
+    return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
+
+
+def _finite(number: float) -> float | None:
+    return number if math.isfinite(number) else None
+
+
+def _plain(label: str, answer: Requirement) -> Answer:
+    tried = tuple((digits, _finite(ratio)) for digits, ratio in answer.tried)
+    return Answer(label, answer.basis, answer.precision, str(answer), tried)
+
+
+# -- the page -------------------------------------------------------------------------------------------------
+
+_STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b;
+  background: #fff }
+h1 { font-size: 1.6rem } h2 { font-size: 1.2rem; margin-top: 2rem }
+table { border-collapse: collapse } th, td { text-align: left; padding: .25rem .8rem .25rem 0; vertical-align: top;
+  border-bottom: 1px solid #ccc }
+pre { background: #f3f3f3; padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere }
+.answer { font-size: 1.25rem; border-left: .3rem solid #0b5cad; padding-left: .8rem }
+"""
+
+
+def page(report: Report) -> str:
+    """A self-contained HTML page of a report."""
+    unit = "bits" if report.base == 2 else f"digits of base {report.base}"
+    answer = f"{report.digits} {unit}" if report.digits is not None else "no precision that can be run"
+    limiting = ""
+    if report.limiting is not None:
+        ratio = report.errors[report.limiting]
+        limiting = (
+            f"<p>State {report.limiting + 1} of {len(report.errors)} limits the answer: its error is {ratio:.2g} of "
+            "its tolerance.</p>"
+        )
+    rows = [(each.label, "none" if each.digits is None else str(each.digits), each.text) for each in report.answers]
+    parts = [
+        f"<h1>Wordlength for {html.escape(report.name)}</h1>",
+        f'<p class="answer">This {report.kind} needs <strong>{html.escape(answer)}</strong> to keep rounding errors '
+        "within the tolerance.</p>",
+        f"<p>{html.escape(report.text)}.</p>",
+        limiting,
+        "<h2>What the answer rests on</h2>",
+        _table(
+            ("question", "value"),
+            [
+                ("steps", f"{report.steps}"),
+                ("measurements", report.source),
+                ("tolerance", ", ".join("any" if t is None else f"{t:.6g}" for t in report.tolerance)),
+                ("rounding", report.rounding),
+            ],
+        ),
+        "<p>An emulation holds for these measurements. A bound holds for the arithmetic of this run, whatever its "
+        "roundings. Neither limits the exponent range: see the ranges below.</p>",
+        "<h2>Forms and bases side by side</h2>",
+        _table(("form and basis", unit, "answer"), rows),
+        "<h2>Error against precision</h2>",
+        _curves(report.answers, unit),
+    ]
+    if report.errors:
+        body = [(str(i + 1), "not limited" if e is None else f"{e:.3g}") for i, e in enumerate(report.errors)]
+        parts += ["<h2>Error of each state at the answer</h2>", _table(("state", "error / tolerance"), body)]
+    if report.ranges:
+        ranges = [(name, f"2^{low}", f"2^{high}") for name, low, high in report.ranges]
+        parts += ["<h2>Range of the numbers</h2>", _table(("numbers", "smallest", "largest"), ranges)]
+    about = "\n".join(f"{key}: {value}" for key, value in report.versions.items())
+    parts += [
+        "<h2>How to reproduce this report</h2>",
+        f"<pre>{html.escape(report.command or 'gpbnb.wordlength.report.study(...)')}\n\n{html.escape(about)}</pre>",
+    ]
+    title = html.escape(f"Wordlength for {report.name}")
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<meta name="viewport" '
+        f'content="width=device-width, initial-scale=1">\n<title>{title}</title>\n<style>{_STYLE}</style>\n</head>\n'
+        f"<body>\n<main>\n{chr(10).join(part for part in parts if part)}\n</main>\n</body>\n</html>\n"
+    )
+
+
+def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+    head = "".join(f'<th scope="col">{html.escape(cell)}</th>' for cell in header)
+    lines = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in body)
+    return (
+        f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n"
+        + "\n".join(f"<tr>{line}</tr>" for line in lines)
+        + "\n</tbody>\n</table>"
+    )
+
+
+_COLOURS = ("#0b5cad", "#a3341f", "#2e7d32", "#7b3fa0", "#8a6d00", "#555555")
+
+
+def _curves(answers: Sequence[Answer], unit: str) -> str:
+    """Error over tolerance against precision as inline SVG; the tolerance is the dashed line."""
+    points = [(t, r) for each in answers for t, r in each.tried if r is not None and r > 0]
+    if len(points) < 2:
+        return "<p>Too few precisions have a finite error for a figure.</p>"
+    left, right = min(t for t, _ in points), max(t for t, _ in points)
+    logs = [math.log10(r) for _, r in points]
+    low, high = math.floor(min(0.0, *logs)), math.ceil(max(0.0, *logs))
+
+    def place(t: float, log: float) -> tuple[float, float]:
+        return 60 + 560 * (t - left) / max(right - left, 1), 20 + 260 * (high - log) / max(high - low, 1)
+
+    drawn = []
+    for log in range(low, high + 1, max(1, (high - low) // 6)):
+        _, y = place(left, log)
+        drawn.append(f'<text x="52" y="{y + 4:.1f}" text-anchor="end">1e{log}</text>')
+        drawn.append(f'<line x1="60" x2="620" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
+    for t in range(left, right + 1, max(1, (right - left) // 8)):
+        x, _ = place(t, low)
+        drawn.append(f'<text x="{x:.1f}" y="298" text-anchor="middle">{t}</text>')
+    _, one = place(left, 0)
+    drawn.append(f'<line x1="60" x2="620" y1="{one:.1f}" y2="{one:.1f}" stroke="#1b1b1b" stroke-dasharray="6 4"/>')
+    for number, each in enumerate(answers):
+        colour = _COLOURS[number % len(_COLOURS)]
+        line = [place(t, math.log10(r)) for t, r in each.tried if r is not None and r > 0]
+        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
+        drawn.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
+        drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
+        drawn.append(f'<text x="400" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
+    return (
+        '<svg viewBox="0 0 640 330" role="img" aria-label="Error over tolerance against precision, one line for each '
+        f'form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
+        f'<text x="340" y="320" text-anchor="middle">{html.escape(unit)}</text></svg>'
+        "<p>Error or bound over the tolerance; the dashed line is the tolerance.</p>"
+    )

@@ -1,0 +1,138 @@
+"""gpbnb.kalman.system: linear filters against rounded Fractions, their bounds, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.guarantee.bound import limits
+from gpbnb.kalman.guarantee.linear import peak_gain
+from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.system import LinearSystem
+
+BUTTERWORTH = LinearSystem(*signal.tf2ss(*signal.butter(4, 0.05)), name="Butterworth")
+SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
+U = np.random.default_rng(3).uniform(-1, 1, (80, 1))
+
+
+def slowly(system, u, round_):
+    """Outputs by the recursion as it stands, each operation rounded by a function."""
+
+    def row(coefficients, values):
+        total = round_(coefficients[0] * values[0])
+        for c, v in zip(coefficients[1:], values[1:], strict=True):
+            product = round_(c * v)
+            total = product if total == 0 else total if product == 0 else round_(total + product)
+        return total
+
+    A, B, C, D = (np.vectorize(round_, otypes=[object])(each) for each in (system.A, system.B, system.C, system.D))
+    x, outputs = [round_(each) for each in system.x0], []
+    for inputs in exact(u):
+        given = [*x, *(round_(each) for each in inputs)]
+        outputs.append([row(line, given) for line in np.hstack([C, D])])
+        x = [row(line, given) for line in np.hstack([A, B])]
+    return np.array(outputs, dtype=object)
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 11), FloatFormat(10, 5)], ids=str)
+def test_outputs_are_those_of_the_recursion_with_every_operation_rounded(fmt):
+    system = LinearSystem(SMALL.A, SMALL.B, SMALL.C, SMALL.D, ["0.7", "-0.2"])
+    found = system.outputs(U, fmt)
+    expected = slowly(system, U, fmt.round)
+    assert (exact(found[..., 0]) + exact(found[..., 1]) - expected).astype(float) == pytest.approx(0, abs=1e-20)
+    exactly = slowly(system, U, Fraction)
+    true = system.outputs(U)
+    assert (exact(true[..., 0]) + exact(true[..., 1]) - exactly).astype(float) == pytest.approx(0, abs=1e-29)
+
+
+def test_an_answer_is_the_smallest_precision_of_the_recursion():
+    found = required_precision(SMALL, len(U), 1e-3, z=U)
+    exactly = slowly(SMALL, U, Fraction)
+    for digits, ratio in found.tried:
+        if digits < 30:
+            error = np.abs(slowly(SMALL, U, FloatFormat(2, digits).round) - exactly).max()
+            assert ratio == pytest.approx(float(error) / 1e-3, rel=1e-9)
+    assert (found.basis, found.form) == ("emulation", None)
+
+
+def test_bounds_hold_and_are_not_far_above():
+    """A bound proved for every input as large as these, against the errors of these."""
+    observed = dict(required_precision(SMALL, 80, 1e-3, z=U).tried)
+    found = required_precision(SMALL, 80, 1e-3, z=U, basis="bound")
+    bounded = dict(found.tried)
+    both = set(observed) & set(bounded)
+    assert len(both) >= 3
+    assert all(observed[t] <= bounded[t] <= 300 * observed[t] for t in both)
+    within = limits(3, 1, measurement=float(np.abs(U).max()))
+    assert required_precision(SMALL, 1, 1e-3, basis="guarantee", within=within).tried == found.tried
+
+
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
+    x, u, y = Fraction(2) ** -40, Fraction(2) ** 30, Fraction(2) ** -10
+    other = LinearSystem(SMALL.A, SMALL.B * x / u, SMALL.C * y / x, SMALL.D * y / u)
+    first = required_precision(SMALL, 80, 1e-3, z=U, basis=basis)
+    second = required_precision(other, 80, 1e-3 * 2.0**-10, z=U * 2.0**30, basis=basis)
+    assert first.fmt == second.fmt is not None
+    assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9)
+
+
+def test_a_peak_gain_of_a_filter_in_companion_form_is_found():
+    """Its entries are near 6: balls grow beyond all bounds at 256 bits, and their ends once compared as if narrow."""
+    gain = peak_gain(BUTTERWORTH.A, BUTTERWORTH.B, BUTTERWORTH.C, BUTTERWORTH.D)
+    response = signal.dimpulse((*(each.astype(float) for each in vars_of(BUTTERWORTH)), 1), n=2000)[1][0][:, 0]
+    assert gain.low[0, 0] <= np.abs(response).sum() * (1 + 1e-9)
+    assert gain.high[0, 0] == pytest.approx(np.abs(response).sum(), rel=1e-6)
+
+
+def vars_of(system):
+    return system.A, system.B, system.C, system.D
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"z": None}, "got no inputs"),
+        ({"z": U[:, 0]}, r"write u.reshape\(-1, 1\)"),
+        ({"z": U[:7]}, r"needed \(80, 1\)"),
+        ({"z": U * math.nan}, "needed a finite number"),
+        ({"tolerance": 0}, "needed an error above 0 for each of the 1 outputs"),
+        ({"tolerance": "0.1"}, "got tolerance '0.1'"),
+        ({"steps": True}, "got True steps"),
+        ({"basis": "guarantee"}, "without limits"),
+    ],
+)
+def test_what_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        required_precision(**({"model": SMALL, "steps": 80, "tolerance": 1e-3, "z": U} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"A": [[1, 2]]}, r"got A of shape \(1, 2\); needed \(1, 1\)"),
+        ({"B": [[1], [2]]}, "got B of shape"),
+        ({"C": [[1, 1]]}, "got C of shape"),
+        ({"D": [[1, 1]]}, "got D of shape"),
+        ({"x0": [1, 2]}, "got x0 of shape"),
+        ({"A": 3}, "got A of shape"),
+        ({"A": [["nan"]]}, "A: entry 0, 0"),
+    ],
+)
+def test_shapes_that_do_not_fit(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        LinearSystem(**({"A": [["0.5"]], "B": [[1]]} | arguments))
+
+
+def test_an_unstable_system_has_no_bound():
+    growing = LinearSystem([["1.01"]], [[1]])
+    found = required_precision(growing, 80, 1e-3, z=U, basis="bound")
+    assert found.fmt is None
+    assert "needed a stable one" in str(found)
+    assert required_precision(growing, 80, 1e-3, z=U).fmt is not None

@@ -1,0 +1,168 @@
+"""gpbnb.wordlength.__main__, models and report: a model file in, an answer, a page and JSON out."""
+
+from __future__ import annotations
+
+import html.parser
+import json
+import math
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from gpbnb import __main__ as top
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.system import LinearSystem
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.models import read_measurements, read_model
+
+MODEL = """
+name = "tracker <1>"
+Phi = [[1, 0.1], [0, 1]]
+H = [[1, 0]]
+Q = [[1e-4, 0], [0, 1e-2]]
+R = [[4]]
+x0 = [0, 0]
+P0 = [[100, 0], [0, 100]]
+"""
+MATRICES = {"A": [["0.5", 0], [0, "0.25"]], "B": [[1], [1]]}
+
+
+@pytest.fixture
+def files(tmp_path):
+    (tmp_path / "model.toml").write_text(MODEL, encoding="utf-8")
+    z = np.cumsum(np.random.default_rng(0).standard_normal(60)).round(3)
+    z[7] = np.nan
+    lines = ["range_m", *("" if math.isnan(each) else repr(float(each)) for each in z)]
+    (tmp_path / "z.csv").write_text("\n".join(line or '""' for line in lines) + "\n", encoding="utf-8")
+    return tmp_path, z.reshape(-1, 1)
+
+
+def test_decimals_of_a_model_file_are_exact(files):
+    model = read_model(files[0] / "model.toml")
+    assert isinstance(model, LinearModel)
+    assert model.Phi[0, 0, 1] == Fraction(1, 10)
+    assert model.name == "tracker <1>"
+
+
+def test_the_command_answers_and_writes_page_and_json(files, capsys):
+    folder, z = files
+    given = [str(folder / "model.toml"), "--measurements", str(folder / "z.csv"), "--tolerance", "0.01,inf"]
+    assert main([*given, "--report", str(folder / "out.html")]) == 0
+    expected = required_precision(read_model(folder / "model.toml"), 60, (0.01, math.inf), z=z)
+    shown = capsys.readouterr()
+    assert shown.out.strip() == str(expected)
+    assert "UD, bound: " in shown.err  # progress
+    found = json.loads((folder / "out.json").read_text(encoding="utf-8"))
+    assert found["digits"] == expected.precision
+    assert found["limiting"] == 0
+    assert found["errors"][0] == pytest.approx(dict(expected.tried)[expected.precision])
+    assert found["errors"][1] is None
+    assert {each["label"] for each in found["answers"]} >= {"innovation, emulation", "UD, bound"}
+    text = (folder / "out.html").read_text(encoding="utf-8")
+    assert f"<strong>{expected.precision} bits</strong>" in text
+    assert "tracker &lt;1&gt;" in text
+    for outside in ("http://", "https://", "<script", "<link", "src="):
+        assert outside not in text
+    assert "--tolerance 0.01,inf" in text
+    _Balanced().feed(text)
+
+
+class _Balanced(html.parser.HTMLParser):
+    """Every element of the page ends where it should."""
+
+    EMPTY = ("meta", "line", "circle", "polyline")
+
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.EMPTY:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
+    given = [str(files[0] / "model.toml"), "--tolerance", "1e-30", "--steps", "20", "--basis", "emulation"]
+    assert main(given) == 1
+    assert "no precision up to 53 digits" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tolerance": "small"}, "could not convert"),
+        ({"tolerance": "-1"}, "needed an error above 0"),
+        ({"model": "absent.toml"}, "absent.toml"),
+        ({"form": "square"}, "got form 'square'"),
+        ({"rounding": "sideways"}, "got rounding 'sideways'"),
+        ({"text": MODEL.replace("R =", "S =")}, "model.toml: R missing; S unknown"),
+        ({"text": "Phi = ["}, "model.toml is not TOML"),
+        ({"text": MODEL.replace("[[4]]", "[[-4]]")}, "model.toml: got R with a least eigenvalue"),
+        ({"z": "1\n2\nx\n"}, "z.csv, line 3: got 'x'"),
+        ({"z": "1\n2,3\n"}, "z.csv, line 2: got 2 cells; needed 1"),
+        ({"z": "1_0\n1\n"}, "z.csv, line 1"),
+        ({"z": "range\n"}, "z.csv: got no rows"),
+    ],
+)
+def test_bad_files_and_options_are_refused_with_the_place(files, capsys, change, message):
+    folder = files[0]
+    given = {"model": "model.toml", "tolerance": "0.01", "form": "UD", "rounding": "nearest"} | change
+    if "text" in change:
+        (folder / "model.toml").write_text(change["text"], encoding="utf-8")
+    (folder / "z.csv").write_text(change.get("z", "1\n2\n"), encoding="utf-8")
+    options = [f"--{name}={given[name]}" for name in ("tolerance", "form", "rounding")]
+    assert main([str(folder / given["model"]), "--measurements", str(folder / "z.csv"), *options]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_header_and_gaps_in_measurements(files):
+    found = read_measurements(files[0] / "z.csv")
+    assert found.shape == (60, 1)
+    assert np.isnan(found[7, 0])
+    assert np.array_equal(found, files[1], equal_nan=True)
+
+
+def test_systems_of_other_libraries_are_read():
+    discrete = signal.dlti(*signal.butter(2, 0.3), dt=1)
+    for given in (discrete, discrete.to_ss(), SimpleNamespace(A=[[1]], B=[[1]], C=[[1]], D=[[0]], dt=0.1)):
+        system = read_model(given)
+        assert isinstance(system, LinearSystem)
+    assert read_model(discrete.to_ss()).A.astype(float) == pytest.approx(discrete.to_ss().A)
+    with pytest.raises(ValueError, match="continuous system"):
+        read_model(signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]))
+    with pytest.raises(TypeError, match="got a int"):
+        read_model(3)
+
+
+def test_a_filter_of_filterpy_is_read():
+    """Its attributes; x is a column there, or a row."""
+    given = SimpleNamespace(
+        F=np.eye(2), H=np.array([[1.0, 0.0]]), Q=np.eye(2), R=np.array([[2.0]]), x=np.array([[1.0], [2.0]]), P=np.eye(2)
+    )
+    model = read_model(given)
+    assert isinstance(model, LinearModel)
+    assert model.x0.tolist() == [1, 2]
+
+
+def test_a_mapping_is_read():
+    assert read_model(MATRICES).p == 2
+    with pytest.raises(ValueError, match="the mapping: C2 unknown"):
+        read_model(MATRICES | {"C2": 1})
+
+
+def test_the_commands_are_listed(capsys):
+    assert top.main([]) == 0
+    shown = capsys.readouterr().out
+    assert all(f"  {name} " in shown for name in top.COMMANDS)
+    with pytest.raises(SystemExit, match="2"):
+        top.main(["bake"])
