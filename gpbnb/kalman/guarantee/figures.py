@@ -43,4 +43,4 @@ def draw_errors(
     loglog(ax)
     ax.set_ylim(bottom=1e-3 * found.bound[state])
     label(ax, "step", f"rounding error of the {quantity}")
-    legend(ax, loc="lower right")
+    legend(ax, loc="center left")
