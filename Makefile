@@ -62,8 +62,8 @@ test-pages: .venv/made-for ## the built book in a real Chromium without a networ
 	@$(PY) -m tests.pages.browser
 	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder tests/pages
 
-test-portable: .venv/made-for ## notebooks and numerical tests as on other machines; SETTINGS="nehalem locale-de" picks some
-	$(PY) scripts/portable.py $(SETTINGS)
+test-portable: .venv/made-for ## notebooks and numerical tests as on other machines; SETTINGS="nehalem locale-de" picks some, QUICK=1 a part
+	$(PY) scripts/portable.py $(if $(QUICK),--quick) $(SETTINGS)
 
 verify-sweeps: .venv/made-for ## a sample of every stored sweep computed again on this machine; SAMPLE=5 takes more cells
 	$(PY) -m gpbnb.sweeps verify --sample $(or $(SAMPLE),1)
@@ -80,7 +80,7 @@ format: .venv/made-for ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-exactness: .venv/made-for ## forty million operations compared with independent arithmetic, digit for digit
+exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit; it resumes
 	$(PY) -m benchmarks.exactness
 	$(PY) -m benchmarks.processors
 

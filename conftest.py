@@ -1,8 +1,14 @@
 """Settings for every test and notebook that pytest runs here."""
 
 import os
+import re
 
 import pytest
+
+try:
+    from xdist.scheduler import LoadScopeScheduling
+except ImportError:
+    LoadScopeScheduling = object
 
 # Stored outputs have no such notice, and nbval would miss or find it, depending on what was compiled before.
 os.environ.setdefault("GPBNB_QUIET", "1")
@@ -10,29 +16,48 @@ os.environ.setdefault("GPBNB_QUIET", "1")
 # What takes longest, longest first: with several processes none of it is left over at the end.
 LONGEST = (
     "tests/kalman/test_kalman_filter_run.py",
-    "alterations of kalman",
+    "alterations of hung1984.II",
+    "alterations of hung1982.III",
     "tests/ledger/checks/test_kalman_checks.py",
     "tests/kalman/test_kalman_guarantee.py",
+    "tests/kalman/test_kalman_compensated.py",
     "tests/wordlength/test_wordlength.py",
     "tests/ledger/test_ledger_cache.py",
     "tests/ledger/checks/test_rounding_checks.py",
     "tests/ledger/checks/test_inversion_checks.py",
-    "alterations of inversion",
-    "alterations of rounding",
     "tests/test_execute_notebooks.py",
     "tests/ledger/test_ledger_command.py",
 )
 
 
-@pytest.hookimpl(tryfirst=True)
+def group(nodeid):
+    """What one process is to run: a file; a chapter whose statements are altered; all tests of an opened page.
+
+    The other tests of pages need nothing of each other.
+    """
+    file, _, rest = nodeid.partition("::")
+    name, _, parameters = rest.partition("[")
+    if file.endswith("test_alterations.py"):
+        chapter = re.match(r"\w+\.\w+", parameters)
+        return f"alterations of {chapter[0]}" if chapter else file
+    if file.endswith(("pages/test_pages.py", "pages/test_calculators.py")):
+        page = re.match(r".+?\.html-(desktop|phone)\b", parameters)
+        return page[0] if page else name
+    return file
+
+
 def pytest_collection_modifyitems(items):
-    """Keep a file in one process (``--dist loadgroup``), if its tests do not name groups of their own."""
-    for item in items:
-        if item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
-    items.sort(key=_rank)
+    groups = [group(item.nodeid) for item in items]
+    rank = {name: LONGEST.index(name) if name in LONGEST else len(LONGEST) for name in groups}
+    items[:] = [item for _, item in sorted(zip(groups, items, strict=True), key=lambda pair: rank[pair[0]])]
 
 
-def _rank(item):
-    group = item.get_closest_marker("xdist_group").args[0]
-    return LONGEST.index(group) if group in LONGEST else len(LONGEST)
+# pytest-xdist has --dist loadgroup, whose groups pytest 9.2 does not let it write into the names of tests.
+class Groups(LoadScopeScheduling):
+    def _split_scope(self, nodeid):
+        return group(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    return Groups(config, log) if config.getvalue("dist") == "loadgroup" else None

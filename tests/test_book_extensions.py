@@ -267,8 +267,11 @@ def page_with(*paragraphs):
 
 def test_the_description_is_made_of_whole_sentences_without_formulas():
     long = "This sentence is long enough to end the description, " * 4 + "as it should."
-    assert metadata.description(page_with(f"How far is it?  Two\nmiles. {long}")) == "How far is it? Two miles."
-    assert metadata.description(page_with(r"With \beta it fails.", "It holds:")) == "It holds"
+    short = "How far is the computed angle from the true one? Two\nmiles."
+    assert metadata.description(page_with(f"{short} [Hung, 1984] {long}")) == " ".join(short.split())
+    question = "Which of the nine misalignments change the drift"
+    found = metadata.description(page_with(r"With \beta it fails.", "Too short.", f"{question} in a year:"))
+    assert found == f"{question} in a year"
     assert metadata.description(new_document("empty")) == ""
 
 

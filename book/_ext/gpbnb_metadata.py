@@ -16,20 +16,23 @@ from sphinx.application import Sphinx
 PREVIEW = "_static/preview.png"
 SIZE = (1200, 630)
 """Size of the preview picture in pixels, as link previews expect it."""
-LONGEST = 200
+SHORTEST, LONGEST = 50, 200
+"""Characters in a description."""
+CITATION = re.compile(r"\s*\[[^\]]*\d{4}\w?\]")
 
 
 def description(doctree: nodes.document) -> str:
-    """Return the first sentences of a page, without formulas; empty if the page has no paragraph."""
+    """Return the first sentences of a page, without formulas and citations; empty if there are none."""
     for paragraph in doctree.findall(nodes.paragraph):
         if not isinstance(paragraph.parent, nodes.section):
             continue
         kept = ""
-        for sentence in re.split(r"(?<=[.?!:])\s+", " ".join(paragraph.astext().split())):
+        text = CITATION.sub("", " ".join(paragraph.astext().split()))
+        for sentence in re.split(r"(?<=[.?!:])\s+", text):
             if "\\" in sentence or len(kept) + len(sentence) > LONGEST:
                 break
             kept = f"{kept} {sentence}".strip()
-        if kept:
+        if len(kept) >= SHORTEST:
             return kept.rstrip(":")
     return ""
 
@@ -44,7 +47,7 @@ def add_tags(app: Sphinx, page: str, template: str, context: dict, doctree: node
     """Add a description and Open Graph tags to the head of a page."""
     if doctree is None or app.builder.format != "html":
         return
-    title = re.sub(r"<[^>]*>", "", context.get("title", ""))
+    title = re.sub(r"<[^>]*>|^\d+\. ", "", context.get("title", ""))
     tags = {"og:title": title, "og:type": "article", "og:site_name": app.config.project}
     tags["og:image"] = address(app, PREVIEW) if app.config.html_baseurl else context["pathto"](PREVIEW, 1)
     tags["og:image:alt"] = app.config.html_title

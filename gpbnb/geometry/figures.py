@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gpbnb.display.style import (
-    COLOURS,
     MARKERS,
     OBSERVED,
     OBSERVED_OTHERS,
@@ -198,7 +197,8 @@ def first_rolls(still: Year, rolled: Year, ax: Axes) -> list[Artist]:
 def year_errors(results: Mapping[str, Year], ax: Axes, component: int) -> list[Artist]:
     """Draw the error of φ2 (0) or φ3 (1) over a year: simulated means (points) and the second-order theory (lines)."""
     artists: list[Artist] = []
-    for marker, colour, (case, result) in zip(MARKERS, COLOURS, results.items(), strict=False):
+    colours = (OBSERVED, OBSERVED_OTHERS[1], OBSERVED_OTHERS[3])
+    for marker, colour, (case, result) in zip(MARKERS, colours, results.items(), strict=False):
         some = np.linspace(0, len(result.time) - 1, 13).astype(int)
         time = result.time[some]
         simulated = result.phi[some, component] - result.case.drift[component] * time
@@ -229,9 +229,9 @@ def precessions(ax: Any, declination: float) -> list[Artist]:
     tip = gyro + 0.8 * star
     arrows = (
         ((0, 0, -0.8), (0, 0, 1.6), STRICT, "Earth's axis", (-0.42, 0, 0.78)),
-        (gyro, 0.8 * star, REFERENCE, "spin axis, to the star", gyro + 0.38 * star + np.array([0.1, 0, 0.2])),
+        (gyro, 0.8 * star, REFERENCE, "spin axis, to the star", gyro + 0.36 * star + np.array([0.1, 0, 0.27])),
         (tip, 0.5 * geodetic, OBSERVED, "geodetic", tip + 0.62 * geodetic),
-        (tip, 0.6 * motional, OBSERVED_OTHERS[1], "frame dragging", tip + motional + np.array([0.15, 0, -0.06])),
+        (tip, 0.6 * motional, OBSERVED_OTHERS[1], "frame dragging", tip + 0.62 * motional + np.array([0.0, 0, 0.06])),
     )
     for start, way, colour, name, place in arrows:
         artists.append(ax.quiver(*start, *way, color=colour, lw=1.8, arrow_length_ratio=0.12))
@@ -239,6 +239,6 @@ def precessions(ax: Any, declination: float) -> list[Artist]:
     artists.append(ax.text(-0.8, 0, -0.98, "polar orbit", color=REFERENCE, ha="center"))
     for limit, (low, high) in ((ax.set_xlim, (-0.6, 1.4)), (ax.set_ylim, (-1.0, 1.0)), (ax.set_zlim, (-0.9, 1.1))):
         limit(low, high)
-    ax.set_box_aspect((1, 1, 1), zoom=1.1)
+    ax.set_box_aspect((1, 1, 1), zoom=1.0)
     ax.view_init(elev=18, azim=-62)
     return artists

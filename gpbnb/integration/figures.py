@@ -13,7 +13,6 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.style import (
-    COLOURS,
     OBSERVED,
     OBSERVED_OTHERS,
     REFERENCE,
@@ -23,13 +22,15 @@ from gpbnb.display.style import (
     VALID,
     colours,
     label,
-    line_styles,
     loglog,
 )
 from gpbnb.display.style import name as write
 from gpbnb.display.tables import arithmetic
 from gpbnb.integration import theory
 from gpbnb.integration.experiment import Accuracy, RateSweep, Simulation, Sweep
+
+SERIES = (OBSERVED, OBSERVED_OTHERS[1], OBSERVED_OTHERS[3], OBSERVED_OTHERS[2])
+"""Colours of several series whose names are written in the same colour: dark ones, which can be read as text."""
 
 
 def block_diagram(ax: Axes) -> list[Artist]:
@@ -114,7 +115,7 @@ def approximations(terms: int, ax: Axes) -> list[Artist]:
     mu = np.geomspace(0.1, 20, 300)
     exact, total = theory.walk_factor(mu), np.zeros_like(mu)
     artists: list[Artist] = []
-    for k, (c, colour) in enumerate(zip(theory.series(terms), colours(terms, (REFUTED, *COLOURS)), strict=True)):
+    for k, (c, colour) in enumerate(zip(theory.series(terms), colours(terms, (REFUTED, *SERIES)), strict=True)):
         total = total + float(c) * mu ** (2 * k + 1)
         error = np.abs(np.sqrt(np.where(total > 0, total, np.nan) / exact) - 1)
         artists += ax.plot(mu, error, color=colour, label=f"{k + 1} terms" if k else "(39)")
@@ -198,7 +199,7 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
     for run, marker, colour, up in zip(runs, "os", (OBSERVED, OBSERVED_OTHERS[1]), (-1, 1), strict=True):
         observed = np.sqrt(run.variance) / unit
         artists += ax.plot(run.n, observed, marker, color=colour, label=run.rule.name)
-        artists.append(write(ax, run.rule.name.split(",")[0], (run.n[0], observed[0]), colour, (8, 15 * up), ha="left"))
+        artists.append(write(ax, run.rule.name.split(",")[0], (run.n[0], observed[0]), colour, (8, 21 * up), ha="left"))
     artists += ax.plot(n, np.sqrt(theory.error_variance(n, mu)), color=VALID, label="exact, trapezoidal")
     artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=VALID, ls=":", label="rectangular")
     artists += ax.plot(n, np.sqrt(walk), color=STRICT, ls="--", lw=1, label="random walk (35)")
@@ -215,7 +216,7 @@ def rules_first_order(rules: Sequence[str], ax: Axes) -> list[Artist]:
     mu = np.geomspace(0.03, 100, 60)
     least = [theory.walk_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
     artists: list[Artist] = []
-    for k, (rule, colour) in enumerate(zip(rules, colours(len(rules), (VALID, *COLOURS)), strict=True)):
+    for k, (rule, colour) in enumerate(zip(rules, colours(len(rules), (VALID, *SERIES)), strict=True)):
         rate = [theory.walk_rate(theory.first_order(1.0, one), 1.0, theory.RULES[rule]) for one in mu.tolist()]
         ratio = np.sqrt(np.array(rate) / least)
         artists += ax.plot(mu, ratio, color=colour, label=rule)
@@ -235,7 +236,7 @@ def rules_resonant(rules: Sequence[str], zeta: float, ax: Axes) -> list[Artist]:
     rate = np.geomspace(0.3, 30, 400)
     process = theory.resonant(1.0, 2 * np.pi, zeta)
     artists: list[Artist] = []
-    for rule, colour in zip(rules, colours(len(rules), (VALID, *COLOURS)), strict=True):
+    for rule, colour in zip(rules, colours(len(rules), (VALID, *SERIES)), strict=True):
         walk = [theory.walk_rate(process, f, theory.RULES[rule]) for f in rate.tolist()]
         artists += ax.plot(rate, np.sqrt(walk), color=colour, label=rule, lw=1.2)
     loglog(ax)
@@ -266,9 +267,7 @@ def errors_over_rate(result: RateSweep, ax: Axes) -> list[Artist]:
     ends = np.log10([float(result.discretization[0][-1]), *(line[-1] for line in result.rounding)])
     heights = [10**height for height in _apart(ends.tolist(), 0.6)]
     artists.append(write(ax, "discretization", (last, heights[0]), STRICT, (8, 0)))
-    for i, (fmt, (marker, colour)) in enumerate(
-        zip(result.formats, line_styles(len(result.formats), "sD^vo"), strict=True)
-    ):
+    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
         artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {arithmetic(fmt)}")
         artists += ax.plot(rates, result.theory(fmt, rates)[1], color=VALID, lw=1)
         artists.append(write(ax, arithmetic(fmt), (last, heights[1 + i]), colour, (8, 0)))
@@ -290,9 +289,7 @@ def totals(result: RateSweep, ax: Axes) -> list[Artist]:
     last = float(result.rates[-1])
     heights = [10**height for height in _apart([float(np.log10(line[-1])) for line in result.total], 0.3)]
     artists: list[Artist] = []
-    for i, (fmt, (marker, colour)) in enumerate(
-        zip(result.formats, line_styles(len(result.formats), "sD^vo"), strict=True)
-    ):
+    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
         artists += ax.plot(result.rates, result.total[i], marker, color=colour, label=arithmetic(fmt))
         artists += ax.plot(rates, result.theory(fmt, rates)[2], color=VALID, lw=1)
         artists.append(write(ax, arithmetic(fmt), (last, heights[i]), colour, (8, 0)))
@@ -324,14 +321,14 @@ def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequ
     """Draw the best iteration rate against the number of bits, for several durations in s."""
     ends: list[float] = []
     artists: list[Artist] = []
-    for (duration, seconds), colour in zip(durations.items(), colours(len(durations)), strict=True):
+    for (duration, seconds), colour in zip(durations.items(), colours(len(durations), SERIES), strict=True):
         for rounding, style in ((Rounding.NEAREST, "-"), (Rounding.CHOP, ":")):
             rate = [_best_rate(omega_bw, seconds, FloatFormat(2, t, rounding)) for t in precisions]
             named: dict[str, Any] = {"label": duration} if style == "-" else {}
             artists += ax.plot(precisions, rate, style, color=colour, **named)
             if style == "-":
                 ends.append(float(np.log10(rate[-1])))
-    for duration, height, colour in zip(durations, _apart(ends, 1.2), colours(len(durations)), strict=True):
+    for duration, height, colour in zip(durations, _apart(ends, 1.2), colours(len(durations), SERIES), strict=True):
         artists.append(write(ax, duration, (precisions[-1], 10**height), colour, (6, 0)))
     ax.set_yscale("log")
     ax.set_ylim(100, 10 ** (max(_apart(ends, 1.2)) + 1))
@@ -344,14 +341,14 @@ def needed_bits(omega_bw: float, durations: Mapping[str, float], rates: Sequence
     """Draw the bits for which rounding is a tenth of the discretization error, against the rate, for durations in s."""
     ends: list[float] = []
     artists: list[Artist] = []
-    for (duration, seconds), colour in zip(durations.items(), colours(len(durations)), strict=True):
+    for (duration, seconds), colour in zip(durations.items(), colours(len(durations), SERIES), strict=True):
         for rounding, style in ((Rounding.NEAREST, "-"), (Rounding.CHOP, ":")):
             bits = [theory.needed_precision(omega_bw, f, seconds, 2, rounding) for f in rates]
             named: dict[str, Any] = {"label": duration} if style == "-" else {}
             artists += ax.plot(rates, bits, style, drawstyle="steps-mid", color=colour, **named)
             if style == "-":
                 ends.append(float(bits[-1]))
-    for duration, height, colour in zip(durations, _apart(ends, 7), colours(len(durations)), strict=True):
+    for duration, height, colour in zip(durations, _apart(ends, 7), colours(len(durations), SERIES), strict=True):
         artists.append(write(ax, duration, (rates[-1], height), colour, (6, 0)))
     ax.set_xscale("log")
     ax.set_xlim(rates[0] / 1.2, 4 * rates[-1])

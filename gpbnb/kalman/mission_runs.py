@@ -5,17 +5,22 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman.lockstep import Lockstep, error_rows, run_lockstep
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.lockstep import REFERENCE, Lockstep, error_rows, run_lockstep
+from gpbnb.kalman.mission import STATES as MISSION_STATES
 from gpbnb.kalman.mission import Mission
+from gpbnb.kalman.records import Records
+from gpbnb.kalman.simulation import BLOCK
 from gpbnb.kalman.threshold import COLUMNS as ERROR_COLUMNS
 from gpbnb.kalman.threshold import FORMS, STATES
 from gpbnb.sweeps import Column, Sweep
@@ -39,7 +44,7 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Cell:
-    """Some formats of one base, for the same records of one setting."""
+    """Several formats of one base for the same records of one setting."""
 
     setting: str
     states: str
@@ -89,7 +94,7 @@ CELLS = _cells()
 
 
 def lockstep(cell: Cell, steps: int | None = None) -> Lockstep:
-    """All filters of a cell, before their first step."""
+    """Create all filters of a cell, before their first step."""
     formats = [FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions]
     records = range(cell.first, cell.first + cell.count)
     mission = cell.mission
@@ -97,20 +102,53 @@ def lockstep(cell: Cell, steps: int | None = None) -> Lockstep:
 
 
 def compute(cell: Cell, directory: Path | None = None, steps: int | None = None) -> dict[str, Any]:
-    """Run the years of a cell, and save them on the way if there is a directory."""
+    """Run the years of a cell, and save progress in a directory if one is given."""
     return run_lockstep(lockstep(cell, steps), directory)
 
 
 def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of the table: for each format and record, largest error of the year and error at its end."""
+    """List, for each format and record, the largest error of the year and the error at its end."""
     return error_rows(cell.heads(), cell.first, result)
 
 
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """The row of one format and record, computed alone."""
+    """Compute the row of one format and record alone."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
     one = replace(cell, precisions=(precision,), first=record, count=1)
     return rows(one, compute(one))
+
+
+class RollPhase(NamedTuple):
+    """How well the filter knows the roll-phase offset after some days: error and standard deviation, arcseconds."""
+
+    days: float
+    error: float
+    deviation: float
+
+
+def roll_phase_after(blocks: int, record: int = 0) -> RollPhase:
+    """Run the mission model in float64 with deviation states, and read what it knows about the roll phase.
+
+    Parameters
+    ----------
+    blocks : of 4096 steps.
+    record : of the measurements.
+    """
+    mission = Mission(deviations=True)
+    run = Records(mission.model(2), REFERENCE, Form.INNOVATION, 1)
+    truth = np.array(mission.start)
+    for block in range(blocks):
+        H = mission.matrices(block, 2)
+        z, truth = mission.measurements(record, block, truth, H, BLOCK)
+        run.use_measurement_matrices(H)
+        run.carry(z[:, :, np.newaxis], 1)
+    state = [name for name, _ in MISSION_STATES].index("roll-phase offset δ")
+    arcseconds = math.degrees(1e-3) * 3600  # of a milliradian
+    return RollPhase(
+        blocks * BLOCK * mission.interval / 86400,
+        abs(float(run.x[state, 0]) - truth[state]) * arcseconds,
+        math.sqrt(float(run.P[state, state])) * arcseconds,
+    )
 
 
 COLUMNS = (Column("setting", "text", choices=tuple(SETTINGS)), *ERROR_COLUMNS)

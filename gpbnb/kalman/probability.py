@@ -131,7 +131,8 @@ class Needed(NamedTuple):
     """The smallest precisions of one base that meet a tolerance with a probability; None if no format does.
 
     `observed`: the share of the records is as large. `lognormal`: the upper limit of the quantile is in the tolerance.
-    `shown`: the lower limit of the probability, without an assumption on the distribution, is as large.
+    `shown`: the lower limit of the probability, without an assumption on the distribution, is as large; no higher
+    precision that was run refutes it, and those may have fewer records.
     """
 
     observed: int | None
@@ -162,8 +163,11 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
             enough = share.fmt.precision
         return enough
 
+    by_precision = sorted(found, key=lambda each: each.fmt.precision)
+    refuted = [each.fmt.precision for each in by_precision if each.within < probability * each.records]
+    shown = (each.fmt.precision for each in by_precision if each.low >= probability)
     return Needed(
         first([each.within >= probability * each.records for each in found]),
         first([each.quantile_limit <= tolerance for each in found]),
-        first([each.low >= probability for each in found]),
+        next((each for each in shown if each > max(refuted, default=0)), None),
     )

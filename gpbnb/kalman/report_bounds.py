@@ -226,13 +226,24 @@ def order(second: bool) -> tuple[str, ...] | None:
 YEAR_SIZE = Fraction(6606)
 
 
-def gravity_probe_b_bound(beta: Fraction, k: int, size: Fraction, **faults: bool) -> float:
-    r"""Bound (125) for Gravity Probe B, n = 10 and m = 2, in mas: every figure of (125) draws this.
+def bound_for_size(beta: Fraction, k: int, n: int, m: int, size: Fraction, **faults: bool) -> Fraction:
+    r"""Bound (125) with :math:`\|x_k\| = B` = size: every line of (125) in a figure is drawn by this function.
+
+    Parameters
+    ----------
+    beta : unit roundoff. k, n, m : steps, states and measurements.
+    size : in the unit of the result.
+    faults : to correct, as for :func:`coefficients`.
+    """
+    return state_bound(size, size, beta, coefficients(k, n, m, **faults))
+
+
+def gravity_probe_b_bound(beta: Fraction, k: int, **faults: bool) -> float:
+    """Bound (125) for Gravity Probe B, in mas: n = 10, m = 2, and the drift of a year as size.
 
     Parameters
     ----------
     beta : unit roundoff. k : steps.
-    size : :math:`\|x_k\|` and B, in mas.
     faults : to correct, as for :func:`coefficients`.
     """
-    return float(state_bound(size, size, beta, coefficients(k, *EXAMPLE[1:], **faults)))
+    return float(bound_for_size(beta, k, *EXAMPLE[1:], YEAR_SIZE, **faults))

@@ -10,14 +10,17 @@ import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.display.tables import Table, arithmetic, scientific, short
-from gpbnb.kalman import contraction, report_bounds, smallest, year
+from gpbnb.kalman import contraction, probability, report_bounds, smallest, year
+from gpbnb.kalman.bounded_run import BoundedHistory
 from gpbnb.kalman.ensembles import Summary
 from gpbnb.kalman.gravity_probe_b import STATES
+from gpbnb.kalman.independent import FirstStep, ModelShare
 from gpbnb.kalman.mission import PARAMETERS
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.printed import Terms
 from gpbnb.kalman.probability import Share
 from gpbnb.kalman.requirement import Requirement
+from gpbnb.kalman.sensitivity import Moved
 
 DOUBLE = FloatFormat(2, 53)
 
@@ -271,3 +274,87 @@ def parameters() -> Table:
     """The numbers of the mission model, with their sources."""
     rows = tuple((each.name, f"{each.value:g}", each.unit, each.source) for each in PARAMETERS)
     return Table("parameters of the mission model", ("parameter", "value", "unit", "source"), rows)
+
+
+def sensitivity(moved: Sequence[Moved]) -> Table:
+    """By how many bits each choice moves the answer."""
+    rows = tuple(
+        (each.choice, each.before, each.after, f"{each.bits:+.1f}".replace("-", "−"), str(each.records))
+        for each in moved
+    )
+    return Table("what moves the answer", ("choice", "from", "to", "bits", "records at least"), rows)
+
+
+def needed_precisions(found: Sequence[Share]) -> Table:
+    """Smallest precisions that meet the tolerance with a probability of 99 %, a line for each kind of formats."""
+    groups: dict[tuple[str, ...], list[Share]] = {}
+    for each in found:
+        fmt = each.fmt
+        unit = "bits" if fmt.base == 2 else "decimal digits"
+        groups.setdefault((each.setting, each.states, each.form, fmt.rounding.value, unit), []).append(each)
+    rows = []
+    for (setting, states, form, rounding, unit), group in groups.items():
+        answer = probability.needed(group)
+        cells = ("none" if each is None else f"{each} {unit}" for each in answer)
+        rows.append((f"{setting}, {states}", f"{form}, {rounding}", *cells))
+    head = ("model and states", "form and rounding", "99 % of the records", "99 %, lognormal", "99 %, no assumption")
+    return Table("smallest precision that stays within a milliarcsecond", head, tuple(rows))
+
+
+def first_steps(found: Sequence[FirstStep]) -> Table:
+    """Models that exceed (105) in their first step, by kind, with the 95 % limits of the probability."""
+    rows = [(each.kind, str(each.models), str(each.exceeded), f"{each.low:.2f} to {each.high:.2f}") for each in found]
+    return Table(
+        "models that exceed (105) in their first step", ("kind", "models", "exceed", "probability"), tuple(rows)
+    )
+
+
+def shares_by_form(found: Sequence[ModelShare]) -> Table:
+    """Mean share of the formats in which random models exceed a bound, with its 95 % interval by model."""
+    rows = [
+        (
+            str(each.form),
+            f"({each.bound})",
+            str(each.models),
+            f"{100 * each.share:.0f} %",
+            f"{100 * each.low:.0f} to {100 * each.high:.0f} %",
+        )
+        for each in found
+    ]
+    head = ("form", "bound", "models", "mean share of formats", "95 % interval by model")
+    return Table("random models that exceed a bound", head, tuple(rows))
+
+
+def bound_costs(
+    found: Sequence[tuple[FloatFormat, BoundedHistory]], terms: Terms, reference: year.Bounds, time: float
+) -> Table:
+    """What each bound of a run costs, and bound over error of the drift rates at the last step.
+
+    Parameters
+    ----------
+    found : formats and their bounded runs; all of the same measurements and steps.
+    terms : of the model, for (125).
+    reference : bounds of the run in double-double, which serves as the companion.
+    time : processor time of that run with its bound, over that of a rounded run.
+    """
+    k = int(found[0][1].history.steps[-1])
+    (row,) = np.flatnonzero(np.asarray(reference.steps) == k)
+    ratios: dict[str, list[str]] = {"(125), least $B$": [], "running bound": [], "companion bound": []}
+    for fmt, each in found:
+        error = np.abs(each.history.state[-1, 2:4])
+        at = int(error.argmax())
+        bounds = (
+            terms.smallest_bound(fmt, k),
+            float(each.state[-1, 2 + at]),
+            float(contraction.companion_bound(error[at], reference.rate[row, at])),
+        )
+        for cells, value in zip(ratios.values(), bounds, strict=True):
+            cells.append(f"{value / float(error[at]):.3g}")
+    costs = (
+        ("a formula", "none"),
+        (f"{time:.0f} times the run", "106 bits for each step again"),
+        (f"{time:.0f} times the run", "106 bits for a second run"),
+    )
+    body = tuple((name, *cost, *cells) for (name, cells), cost in zip(ratios.items(), costs, strict=True))
+    head = ("bound", "processor time", "digits", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))
+    return Table(f"what a bound costs, after {k} steps", head, body)

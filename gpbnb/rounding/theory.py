@@ -1,4 +1,4 @@
-"""What may happen: bounds of the errors of sums, products, inner and matrix products.
+"""Theory: bounds on the errors of sums, products, inner products and matrix products.
 
 Bounds named ``printed_…`` are those of the documents; the others are derived in
 :mod:`gpbnb.rounding.derivation`. ``beta`` is the unit roundoff β, ``FloatFormat.unit_roundoff``.
@@ -107,7 +107,7 @@ def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
 
 
 def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> float:
-    r"""Bound of the error of a sum of n, as a multiple of :math:`\sum_j |x_j|`, of size √n β.
+    r"""Bound on the error of a sum of n terms, as a multiple of :math:`\sum_j |x_j|`, of size √n β.
 
     It fails with at most the probability `failure` if roundings are independent with mean zero:
     each of the n terms, of at most n - 1 roundings, may take its share of it.
@@ -173,7 +173,7 @@ def strict_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 
 
 def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
-    r"""Bound of the relative error of an inner product, which the documents leave out.
+    r"""Bound on the relative error of an inner product, which the documents omit.
 
     .. math:: \frac{|\tilde I|}{|I|} \le
         \gamma_n \frac{|a|^T|b|}{|a^Tb|}

@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb.arithmetic import search
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
 from gpbnb.inversion.bounds import smallest_precision
+from gpbnb.kalman import report_bounds
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.contraction import companion_bound
 from gpbnb.kalman.emulation import compare_runs
@@ -23,7 +25,6 @@ from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
-from gpbnb.kalman.report_bounds import coefficients, precision_for_coefficient
 from gpbnb.kalman.requirement import Requirement
 from gpbnb.kalman.year import Year
 
@@ -41,7 +42,14 @@ def printed_precision(
     ----------
     hung1984, ch. II, eq. (125) and the example of section 12.
     """
-    return precision_for_coefficient(sum(coefficients(k, n, m, **faults)), tolerance / size, base)
+
+    def meets(fmt: FloatFormat) -> bool:
+        return report_bounds.bound_for_size(fmt.unit_roundoff, k, n, m, size, **faults) <= tolerance
+
+    found = search.smallest_precision(meets, base, Rounding.NEAREST, monotone=True)
+    if found is None:
+        raise ArithmeticError("the unit roundoff falls without limit: some precision must be enough")
+    return found.precision
 
 
 def required_precision_by_steps(
@@ -324,7 +332,7 @@ def inverse_precision(
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
     conditions = [column_sum_norm(rationals(a)) * column_sum_norm(true_inverse(a)) for a in (matrix, scaled)]
-    expected = precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
+    expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
     proved = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
     return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, proved)
 

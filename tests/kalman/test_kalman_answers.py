@@ -121,13 +121,14 @@ def test_the_headline_says_beside_each_mark_what_it_is():
 def test_every_figure_draws_the_same_bound(monkeypatch):
     """Front page, chapter on the filter, its year by steps, and the chapter on wordlength."""
     drawn = []
-    exact = report_bounds.gravity_probe_b_bound
+    exact = report_bounds.bound_for_size
 
     def spy(beta, *arguments, **faults):
-        drawn.append(exact(beta, *arguments, **faults))
-        return drawn[-1]
+        value = exact(beta, *arguments, **faults)
+        drawn.append((beta, value))
+        return value
 
-    monkeypatch.setattr(report_bounds, "gravity_probe_b_bound", spy)
+    monkeypatch.setattr(report_bounds, "bound_for_size", spy)
     found = answers.find_answers()
     counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
     lines = []
@@ -135,18 +136,21 @@ def test_every_figure_draws_the_same_bound(monkeypatch):
         _, axes = style.figure()
         drawn.clear()
         draw(found, axes[0])
-        assert len(drawn) == 100  # two lines of fifty points
+        heights = [float(value) for _, value in drawn]
+        assert len(heights) == 100  # two lines of fifty points
         lines.append(
-            [list(line.get_ydata()) for line in axes[0].lines if list(line.get_ydata()) in (drawn[:50], drawn[50:])]
+            [list(line.get_ydata()) for line in axes[0].lines if list(line.get_ydata()) in (heights[:50], heights[50:])]
         )
     assert lines[0] == lines[1]
     assert len(lines[0]) == 2
     fmt = FloatFormat(2, 24)
     drawn.clear()
     (year_end,) = figures.bound_by_steps([report_bounds.EXAMPLE[0]], fmt, {})
-    assert drawn == [year_end] == [pytest.approx(6606 * 2.0**-24 * (counts.first + counts.second), rel=1e-15)]
+    assert drawn == [(fmt.unit_roundoff, year_end)]
+    assert year_end == pytest.approx(6606 * 2.0**-24 * (counts.first + counts.second), rel=1e-15)
     # The chapter on wordlength draws the bits at which the same bound meets the tolerance.
+    drawn.clear()
     bits = study.printed_precision(*report_bounds.EXAMPLE, Fraction(1), report_bounds.YEAR_SIZE)
-    of_year = report_bounds.EXAMPLE[0], report_bounds.YEAR_SIZE
-    assert exact(FloatFormat(2, bits).unit_roundoff, *of_year) <= 1
-    assert exact(FloatFormat(2, bits - 1).unit_roundoff, *of_year) > 1
+    met = {beta: value <= 1 for beta, value in drawn}
+    assert met[FloatFormat(2, bits).unit_roundoff]
+    assert not met[FloatFormat(2, bits - 1).unit_roundoff]

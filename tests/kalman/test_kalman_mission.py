@@ -114,3 +114,12 @@ def test_the_sweep_changes_one_choice_at_a_time():
     found = mission_runs.rows(cell, mission_runs.compute(replace(cell, count=2), steps=500))
     assert next(row[:7] for row in found) == cell.key
     assert len(found) == 2 * len(cell.precisions)
+
+
+def test_the_filter_learns_the_roll_phase():
+    early, late = (mission_runs.roll_phase_after(blocks) for blocks in (1, 6))
+    assert early.days == pytest.approx(4096 * 10 / 86400)
+    # A milliradian before the first measurement.
+    assert late.deviation < early.deviation < 206
+    assert early.error < 4 * early.deviation
+    assert late.error < 4 * late.deviation

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import ensembles, printed, report_bounds, smallest, tables, year, year_cases
+from gpbnb.kalman import ensembles, independent, printed, report_bounds, smallest, tables, year, year_cases
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import gravity_probe_b
+from gpbnb.kalman.probability import Share, interval
 from gpbnb.kalman.requirement import Requirement
 
 
@@ -177,3 +179,41 @@ def test_requirements():
         ["one", "bound", "5", "9 bits", "0.5"],
         ["two", "emulation", "5", "none", ""],
     ]
+
+
+def share(precision, within, records, **changes):
+    errors = np.where(np.arange(records) < within, 0.1, 2.0)
+    low, high = interval(within, records)
+    found = Share("simple", "absolute", "hung", FloatFormat(2, precision), errors, within, low, high, 0.5)
+    return found._replace(**changes)
+
+
+def test_needed_precisions():
+    found = [share(32, 9, 10), share(33, 300, 300), share(27, 5, 5, states="deviation")]
+    assert cells(tables.needed_precisions(found)) == [
+        ["simple, absolute", "hung, nearest", "33 bits", "32 bits", "33 bits"],
+        ["simple, deviation", "hung, nearest", "27 bits", "27 bits", "none"],
+    ]
+
+
+def test_first_steps_and_shares_by_form():
+    first = independent.FirstStep("stable", 100, 25, 0.18, 0.33)
+    assert cells(tables.first_steps([first])) == [["stable", "100", "25", "0.18 to 0.33"]]
+    by_model = independent.ModelShare("105", Form.HUNG, 170, 0.845, 0.7997, 0.8904, 159)
+    assert cells(tables.shares_by_form([by_model])) == [["Hung (1984)", "(105)", "170", "84 %", "80 to 89 %"]]
+
+
+def test_what_a_bound_costs():
+    fmt, k = FloatFormat(2, 24), 3
+    terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
+    error, bound = np.zeros((1, 10)), np.full((1, 10), 9.0)
+    error[0, 2:4], bound[0, 2:4] = (0.25, -0.5), (1.0, 4.0)
+    history = SimpleNamespace(steps=np.array([k]), state=error)
+    found = SimpleNamespace(history=history, state=bound)
+    reference = SimpleNamespace(steps=np.array([1, k]), rate=np.array([[0, 0], [0, 0.125]]))
+    first, second = report_bounds.coefficients(k, 10, 2)
+    rows = cells(tables.bound_costs([(fmt, found)], terms, reference, 8.2))
+    beta = float(fmt.unit_roundoff)
+    assert rows[0] == ["(125), least $B$", "a formula", "none", f"{beta * (7 * first + 5 * second) / 0.5:.3g}"]
+    assert rows[1] == ["running bound", "8 times the run", "106 bits for each step again", "8"]
+    assert rows[2] == ["companion bound", "8 times the run", "106 bits for a second run", "1.25"]

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from alterations import altered
 
-from gpbnb.ledger.checking import owners
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.finding import Verdict
 from gpbnb.ledger.formula import Undefined, Words
@@ -17,7 +16,6 @@ from gpbnb.ledger.statements import Statement, load_statements
 
 STATEMENTS = load_statements()
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
-TOPIC = owners(STATEMENTS)
 MOST = 5
 """Alterations judged of one statement; which ones depends on its id alone."""
 MUST_HAVE_FORM = ("equation", "number", "example", "table")
@@ -94,10 +92,8 @@ TAKEN = [each for each in STATEMENTS if each.form and takes_statement(CHECKED[ea
 
 
 def each_of(statements):
-    """Run a test for each of some statements. The checks of a topic share what they compute: one process runs them."""
-    group = pytest.mark.xdist_group
-    cases = [pytest.param(each, id=each.id, marks=group(f"alterations of {TOPIC[each.id]}")) for each in statements]
-    return pytest.mark.parametrize("statement", cases)
+    """Run a test for each of some statements."""
+    return pytest.mark.parametrize("statement", list(statements), ids=lambda statement: statement.id)
 
 
 @each_of(TAKEN)

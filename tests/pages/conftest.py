@@ -7,7 +7,6 @@ import pytest
 from . import browser as tools
 
 MISSING = tools.missing()
-APART = ("test_pages.py", "test_calculators.py")
 
 
 class Skipped(pytest.Module):
@@ -54,22 +53,11 @@ def open_page():
         yield open_page
 
 
-EVERY = [pytest.param((a, s), marks=pytest.mark.xdist_group(f"{s} {a}")) for a in tools.opened() for s in tools.SIZES]
-
-
-# One page is opened at a time, and serves all tests of it, which run in one process.
-@pytest.fixture(scope="module", params=EVERY, ids="-".join)
+# One page is opened at a time, and serves all tests of it.
+@pytest.fixture(scope="module", params=[(a, s) for a in tools.opened() for s in tools.SIZES], ids="-".join)
 def page(request, open_page):
     with open_page(*request.param, shared=True) as page:
         yield page
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Let several processes share the other tests of these files."""
-    for item in items:
-        if item.path.name in APART and item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.originalname))
 
 
 @pytest.fixture(scope="session")

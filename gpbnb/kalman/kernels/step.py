@@ -37,6 +37,7 @@ from gpbnb.arithmetic.kernels.scalar import (
 )
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.compensated import compensated_update
+from gpbnb.kalman.kernels.products import add_transposed, product_by_columns, product_with_units
 
 _HUNG, _HUNG_SECOND_GAIN, _INNOVATION, _JOSEPH, _UD = (int(each) for each in Form)
 
@@ -197,6 +198,15 @@ def workspace(x: Any, P: Any, K: Any, KT: Any, R: Any, y: Any) -> Any:
 
 
 @njit(nogil=True)
+def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F: Any, W: Any) -> None:
+    """W = I - K H; KT becomes K', and T and F are used up."""
+    transpose(fmt, K, KT)
+    product_with_units(fmt, hT, KT, T)
+    transpose(fmt, T, F)
+    difference(fmt, identity, F, W)
+
+
+@njit(nogil=True)
 def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
     """Take step k + 1, from x and P to x and P, with the measurement z; the gain is left in the workspace.
 
@@ -223,11 +233,15 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
                 return 0
             answer = min(answer, found)
         return answer
-    product(fmt, phi, P, T)
-    product_by_sparse(fmt, T, phiT, V)
-    matrix_sum(fmt, V, Q[k % Q.shape[0]], V)
+    # Products whose right factor is sparse are formed transposed, with the same digits.
+    product_with_units(fmt, phi, P, T)
+    transpose(fmt, T, F)
+    product_with_units(fmt, phi, F, W)
+    add_transposed(fmt, Q[k % Q.shape[0]], W)
+    transpose(fmt, W, V)
     place[0] = _OF_INNOVATION
-    product_by_sparse(fmt, V, hT, PHt)
+    product_with_units(fmt, h, W, HD)
+    transpose(fmt, HD, PHt)
     product(fmt, h, PHt, S)
     matrix_sum(fmt, S, r, S)
     place[0] = _INVERSE
@@ -236,36 +250,37 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
     if answer == 0:
         return 0
     place[0] = _GAIN
-    product(fmt, PHt, SI, K)
+    transpose(fmt, SI, pivots)
+    product_with_units(fmt, pivots, HD, KT)
+    transpose(fmt, KT, K)
     place[0] = _COVARIANCE
-    product_by_sparse(fmt, K, h, T)
-    difference(fmt, identity, T, W)
+    _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
     if form == _JOSEPH:
         transpose(fmt, W, WT)
         product(fmt, W, V, T)
         product(fmt, T, WT, F)
-        transpose(fmt, K, KT)
         product_by_sparse(fmt, K, r, B)
         product(fmt, B, KT, T)
         matrix_sum(fmt, F, T, P)
     else:
-        product(fmt, W, V, P)
+        product_by_columns(fmt, W, V, P)
     if form == _HUNG_SECOND_GAIN:
         place[0] = _GAIN
         product_by_sparse(fmt, P, hT, B)
         product(fmt, B, RI[k % R.shape[0]], K)
-        product_by_sparse(fmt, K, h, T)
-        difference(fmt, identity, T, W)
+        _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
     place[0] = _ESTIMATE
     if increment.shape[0] > 0:
         compensated_update(fmt, increment[k % Phi.shape[0]], h, K, z, x, carried, v, u, y, g)
     else:
         if form in (_HUNG, _HUNG_SECOND_GAIN):
-            product_by_sparse(fmt, W, phi, F)
+            transpose(fmt, W, WT)
+            product_with_units(fmt, phiT, WT, T)
+            transpose(fmt, T, F)
             product(fmt, F, x, u)
             product(fmt, K, z, v)
         else:
-            product(fmt, phi, x, u)
+            product_with_units(fmt, phi, x, u)
             product(fmt, h, u, y)
             difference(fmt, z, y, g)
             product(fmt, K, g, v)

@@ -1,0 +1,128 @@
+"""Compiled: products for the filter's step, which leave out factors of zero and leading factors of one.
+
+Products with zero or one and sums with zero are exact, so no digit changes. The inner loops run along rows, where
+numbers lie side by side in memory and the processor takes several at once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.extending import overload
+
+from gpbnb.arithmetic.kernels.binary import SAFE_TWICE
+from gpbnb.arithmetic.kernels.bits import bits, from_bits
+from gpbnb.arithmetic.kernels.scalar import (
+    add,
+    check,
+    compare,
+    first_product,
+    load,
+    multiply_add,
+    one,
+    put,
+    store,
+    zero,
+)
+from gpbnb.arithmetic.kernels.tags import Binary
+
+_MAGNITUDE = np.int64(2**63 - 1)
+_LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
+
+
+@njit(nogil=True)
+def _is_moderate(a: Any) -> Any:
+    """Whether all numbers are zero or from 2**-400 to 2**400 in magnitude."""
+    least, largest = _LARGEST, np.int64(0)
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            size = bits(a[i, j]) & _MAGNITUDE
+            least = min(least, size if size != 0 else _LARGEST)
+            largest = max(largest, size)
+    return least >= _LEAST and largest < _LARGEST
+
+
+def _short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """c = a b if the format is short and the numbers are moderate; returns whether it was."""
+    raise TypeError("got a call of _short_product from Python; needed one from a function compiled by numba")
+
+
+@overload(_short_product, strict=False)
+def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    def of_binary(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        # Up to 25 bits, a float64 result rounded again is right, and nothing leaves the range of float64: products are
+        # at least 2**-800, and sums are multiples of 2**-850. So no operation needs a check.
+        if not fmt.nearest or fmt.precision > SAFE_TWICE or not _is_moderate(a) or not _is_moderate(b):
+            return False
+        unit = np.int64(1) << (53 - fmt.precision)
+        half, mask = unit >> 1, -unit
+        for i in range(a.shape[0]):
+            for j in range(b.shape[1]):
+                c[i, j] = 0.0
+        for k in range(a.shape[1]):
+            for i in range(a.shape[0]):
+                factor = a[i, k]
+                if factor != 0.0:
+                    for j in range(b.shape[1]):
+                        p = from_bits((bits(factor * b[k, j]) + half) & mask)
+                        c[i, j] = from_bits((bits(c[i, j] + p) + half) & mask)
+        return True
+
+    return of_binary if getattr(fmt, "instance_class", None) is Binary else lambda fmt, a, b, c: False
+
+
+@njit(nogil=True)
+def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a b, each entry summed from left to right over the entries of a that are not zero; c is neither a nor b."""
+    for i in range(a.shape[0]):
+        fresh = True
+        for k in range(a.shape[1]):
+            factor = load(fmt, a, (i, k))
+            if compare(fmt, factor, zero(fmt)) == 0:
+                continue
+            if fresh and compare(fmt, factor, one(fmt)) == 0:
+                for j in range(b.shape[1]):
+                    put(fmt, c, (i, j), load(fmt, b, (k, j)))
+            elif fresh:
+                for j in range(b.shape[1]):
+                    put(fmt, c, (i, j), first_product(fmt, factor, load(fmt, b, (k, j))))
+            else:
+                for j in range(b.shape[1]):
+                    put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
+            fresh = False
+        if fresh:
+            for j in range(b.shape[1]):
+                put(fmt, c, (i, j), zero(fmt))
+    check(fmt, c)
+
+
+@njit(nogil=True)
+def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """As :func:`product_with_units`, with the same digits, column after column of a.
+
+    One row of c after another grows by a product; a processor computes them at once, as none waits for the last.
+    """
+    if _short_product(fmt, a, b, c):
+        return
+    for i in range(a.shape[0]):
+        for j in range(b.shape[1]):
+            put(fmt, c, (i, j), zero(fmt))
+    for k in range(a.shape[1]):
+        for i in range(a.shape[0]):
+            factor = load(fmt, a, (i, k))
+            if compare(fmt, factor, zero(fmt)) != 0:
+                for j in range(b.shape[1]):
+                    put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
+    check(fmt, c)
+
+
+@njit(nogil=True)
+def add_transposed(fmt: Any, a: Any, c: Any) -> None:
+    """c = c + a', over the entries of a that are not zero."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            x = load(fmt, a, (i, j))
+            if compare(fmt, x, zero(fmt)) != 0:
+                store(fmt, c, (j, i), add(fmt, load(fmt, c, (j, i)), x))

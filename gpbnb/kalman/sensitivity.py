@@ -1,0 +1,108 @@
+"""By how many bits each choice of the study moves the precision that a year needs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from gpbnb.arithmetic.formats import Rounding
+from gpbnb.kalman import answers, year, year_cases
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.probability import Share
+
+_USUAL = ("deviation", "hung", "2", "nearest")
+
+
+class Moved(NamedTuple):
+    """One choice, changed: what it was and became, and by how many bits the precision for the tolerance moves."""
+
+    choice: str
+    before: str
+    after: str
+    bits: float
+    records: int
+
+
+def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
+    """Precision at which the median error would equal the tolerance, for one kind of formats.
+
+    The format whose median is nearest to the tolerance on a logarithmic scale is taken; each further digit is assumed
+    to divide its error by the base.
+
+    Raises
+    ------
+    ValueError : no formats.
+    """
+    if not found:
+        raise ValueError("got no formats; needed at least one")
+
+    def away(each: Share) -> float:
+        return math.log(each.quantile(0.5) / tolerance, each.fmt.base)
+
+    nearest = min(found, key=lambda each: abs(away(each)))
+    return nearest.fmt.precision + away(nearest)
+
+
+def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
+    """Change one choice at a time, beside deviation states, Hung's form, base 2 and rounding to nearest.
+
+    A choice is left out if no such formats were run.
+
+    Parameters
+    ----------
+    found : shares of the simple model, in the setting "simple", and of settings of the mission model.
+    """
+    groups: dict[tuple[str, ...], list[Share]] = {}
+    for each in found:
+        fmt = each.fmt
+        groups.setdefault((each.setting, each.states, each.form, str(fmt.base), fmt.rounding.value), []).append(each)
+    pairs = []
+    for setting in ("simple", "mission"):
+        usual = (setting, *_USUAL)
+        for choice, place, after in (("states", 1, "absolute"), ("form", 2, "innovation"), ("rounding", 4, "chop")):
+            pairs.append((f"{choice}, {setting} model", usual, (*usual[:place], after, *usual[place + 1 :]), place))
+    for setting in dict.fromkeys(each.setting for each in found if each.setting != "simple"):
+        before = "simple" if setting == "mission" else "mission"
+        pairs.append(("model", (before, *_USUAL), (setting, *_USUAL), 0))
+    return tuple(
+        _moved(choice, usual[place], other[place], groups[usual], groups[other])
+        for choice, usual, other, place in pairs
+        if usual in groups and other in groups
+    )
+
+
+def _moved(choice: str, before: str, after: str, usual: Sequence[Share], other: Sequence[Share]) -> Moved:
+    """Compare two kinds of formats, in the formats that both have if there are any."""
+    common = {each.fmt.precision for each in usual} & {each.fmt.precision for each in other}
+    if common:
+        usual = [each for each in usual if each.fmt.precision in common]
+        other = [each for each in other if each.fmt.precision in common]
+    bits = median_precision(other) - median_precision(usual)
+    return Moved(choice, before, after, bits, min(each.records for each in (*usual, *other)))
+
+
+def single_record(runs: Sequence[year.Year], precision: int = 24) -> tuple[Moved, ...]:
+    """Change one choice at a time for one record of the simple model, with absolute angles.
+
+    Parameters
+    ----------
+    runs : years of :mod:`gpbnb.kalman.year`.
+    precision : in bits; each bit is assumed to halve the error.
+
+    Raises
+    ------
+    KeyError : a year that is needed was not run.
+    """
+    by_case = {run.case: run for run in runs}
+    usual = year_cases.Case(year_cases.MODELS[0], 2, precision, Rounding.NEAREST, Form.HUNG)
+    changes = [
+        *(("roll and process noise", usual.model, name, usual._replace(model=name)) for name in year_cases.MODELS[1:]),
+        ("rounding", "nearest", "chop", usual._replace(rounding=Rounding.CHOP)),
+        *(("form", "hung", form.name.lower(), usual._replace(form=form)) for form in (Form.INNOVATION, Form.UD)),
+    ]
+    error = answers.largest(by_case[usual])
+    return tuple(
+        Moved(choice, before, after, math.log2(answers.largest(by_case[case]) / error), 1)
+        for choice, before, after, case in changes
+    )

@@ -1,0 +1,79 @@
+"""gpbnb.kalman.kernels.products: the digits of the products of :mod:`gpbnb.arithmetic`, entry by entry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.products import add_transposed, product_by_columns, product_with_units
+from gpbnb.kalman.model import LinearModel
+
+
+@compiled
+def both(fmt, a, b, c, d):
+    product_by_columns(fmt, a, b, c)
+    product_with_units(fmt, a, b, d)
+
+
+@compiled
+def add_into(fmt, a, c):
+    add_transposed(fmt, a, c)
+
+
+def run_of(fmt):
+    one = [["1"]]
+    return Run(LinearModel(one, one, one, one, ["0"], one), fmt, Form.INNOVATION, ())
+
+
+def products(fmt, a, b):
+    run = run_of(fmt)
+    first, second = run.as_packed(a), run.as_packed(b)
+    c, d = run.as_packed(np.ones((len(a), b.shape[1]))), run.as_packed(np.ones((len(a), b.shape[1])))
+    both(run.tag, first, second, c, d)
+    return run.exactly(c), run.exactly(d)
+
+
+@pytest.mark.parametrize("rounding", Rounding.documented(), ids=lambda rounding: rounding.value)
+@pytest.mark.parametrize("precision", [1, 2, 8, 24, 25, 26, 53])
+@pytest.mark.parametrize("exponent", [0, -390, 390, -430, 440])
+def test_products_have_the_digits_of_the_arithmetic(precision, rounding, exponent):
+    fmt = FloatFormat(2, precision, rounding)
+    rng = np.random.default_rng([precision, abs(exponent)])
+    a, b = rng.standard_normal((5, 6)), rng.standard_normal((6, 9)) * 2.0**exponent
+    a[rng.random(a.shape) < 0.3] = 0
+    a[rng.random(a.shape) < 0.3] = 1
+    b[:, 3] = 0
+    a[2] = 0
+    expected = (fmt.array(a) @ fmt.array(b)).to_fractions()
+    for found in products(fmt, a, b):
+        assert (found == expected).all()
+
+
+def test_decimal_products_too():
+    fmt = FloatFormat(10, 4)
+    rng = np.random.default_rng(10)
+    a, b = rng.standard_normal((3, 4)), rng.standard_normal((4, 5))
+    a[rng.random(a.shape) < 0.4] = 1
+    expected = (fmt.array(a) @ fmt.array(b)).to_fractions()
+    for found in products(fmt, a, b):
+        assert (found == expected).all()
+
+
+def test_what_leaves_the_range_is_reported():
+    fmt = FloatFormat(2, 24)
+    for sizes in ((2.0**-900, 2.0**-900), (2.0**900, 2.0**900)):
+        with pytest.raises(OverflowError):
+            products(fmt, np.full((2, 2), sizes[0]), np.full((2, 2), sizes[1]))
+
+
+def test_a_sparse_matrix_is_added_transposed():
+    fmt = FloatFormat(2, 5)
+    run = run_of(fmt)
+    a, c = np.array([[0.0, 3.0], [0.0, 1.0]]), np.array([[1.0, 2.0], [40.0, 0.25]])
+    packed = run.as_packed(c)
+    add_into(run.tag, run.as_packed(a), packed)
+    assert run.exactly(packed).tolist() == (fmt.array(c) + fmt.array(a.T)).to_fractions().tolist()

@@ -1,0 +1,64 @@
+"""gpbnb.kalman.sensitivity: by how many bits a choice moves the answer, for errors that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.kalman import answers, tables, year, year_cases
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.probability import Share
+from gpbnb.kalman.sensitivity import Moved, median_precision, sensitivity, single_record
+
+
+def share(precision, error, setting="simple", states="deviation", form="hung", rounding=Rounding.NEAREST, records=3):
+    errors = np.full(records, error)
+    return Share(setting, states, form, FloatFormat(2, precision, rounding), errors, 0, 0.0, 1.0, 1.0)
+
+
+def test_the_nearest_format_says_where_the_median_meets_the_tolerance():
+    assert median_precision([share(24, 4.0)]) == 26
+    assert median_precision([share(24, 64.0), share(27, 0.5), share(30, 0.01)]) == 26
+    assert median_precision([share(24, 4.0)], tolerance=0.25) == 28
+    decimal = share(24, 0.01)._replace(fmt=FloatFormat(10, 9))
+    assert median_precision([decimal]) == pytest.approx(7)
+    with pytest.raises(ValueError, match="got no formats"):
+        median_precision([])
+
+
+def test_one_choice_changes_at_a_time():
+    found = [
+        share(25, 1.0),
+        share(26, 0.25),  # nearest to the tolerance is 25, where only these states were run
+        share(33, 1.0, states="absolute", records=2),
+        share(26, 1.0, rounding=Rounding.CHOP),
+        share(25, 4.0, form="innovation"),
+        share(25, 2.0, setting="mission"),
+        share(26, 1.0, setting="mission"),
+        share(26, 0.5, setting="white noise only", records=1),
+        share(26, 9.0, setting="white noise only", states="absolute"),  # two choices at once
+    ]
+    assert sensitivity(found) == (
+        Moved("states, simple model", "deviation", "absolute", 8, 2),
+        Moved("form, simple model", "hung", "innovation", 2, 3),
+        Moved("rounding, simple model", "nearest", "chop", 2, 3),
+        Moved("model", "simple", "mission", 1, 3),
+        Moved("model", "mission", "white noise only", -1, 1),
+    )
+    rows = tables.sensitivity(sensitivity(found)).body
+    assert rows[0] == ("states, simple model", "deviation", "absolute", "+8.0", "2")
+    assert rows[-1][3] == "−1.0"
+
+
+def test_what_is_stored_of_one_record():
+    runs = year.load()
+    found = {(each.choice, each.after): each for each in single_record(runs)}
+    by = {run.case: run for run in runs}
+    usual = year_cases.Case(year_cases.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
+    chopped = answers.largest(by[usual._replace(rounding=Rounding.CHOP)]) / answers.largest(by[usual])
+    assert 2 ** found["rounding", "chop"].bits == pytest.approx(chopped)
+    assert found["rounding", "chop"].bits > 1 > abs(found["form", "innovation"].bits)
+    assert len(found) == 5
+    with pytest.raises(KeyError):
+        single_record(runs, precision=23)

@@ -1,0 +1,44 @@
+"""How the tests are shared among processes: the functions of the conftest.py at the root."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def root(pytestconfig):
+    plugins = pytestconfig.pluginmanager.get_plugins()
+    return next(each for each in plugins if getattr(each, "__file__", None) == str(ROOT / "conftest.py"))
+
+
+@pytest.mark.parametrize(
+    ("nodeid", "group"),
+    [
+        ("tests/rounding/test_rounding_theory.py::test_a[1]", "tests/rounding/test_rounding_theory.py"),
+        ("book/kalman.ipynb::Cell 3", "book/kalman.ipynb"),
+        ("tests/ledger/test_alterations.py::test_a[hung1984.II.eq8]", "alterations of hung1984.II"),
+        ("tests/ledger/test_alterations.py::test_a", "tests/ledger/test_alterations.py"),
+        ("tests/pages/test_pages.py::test_a[book/story.html-phone]", "book/story.html-phone"),
+        ("tests/pages/test_pages.py::test_a[book/story.html-phone-dark]", "book/story.html-phone"),
+        ("tests/pages/test_pages.py::test_a[dark]", "test_a"),
+        ("tests/pages/test_calculators.py::test_b[kalman]", "test_b"),
+        ("tests/pages/test_ledger_page.py::test_a[True]", "tests/pages/test_ledger_page.py"),
+    ],
+)
+def test_one_process_runs_what_shares_something(root, nodeid, group):
+    assert root.group(nodeid) == group
+
+
+def test_what_takes_longest_is_there(root):
+    files = [each for each in root.LONGEST if not each.startswith("alterations")]
+    assert [each for each in files if not (ROOT / each).is_file()] == []
+
+
+def test_the_longest_files_come_first(root, request):
+    names = [root.group(item.nodeid) for item in request.session.items]
+    longest = [name for name in names if name in root.LONGEST]
+    assert names[: len(longest)] == longest == sorted(longest, key=root.LONGEST.index)
