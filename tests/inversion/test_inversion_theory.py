@@ -415,7 +415,7 @@ def test_input_is_left_alone():
         (lambda: theory.right_side_bounds(RIGHTS[:2], BETA), r"got 2 right sides of shapes \[\(3, 2\)\]; needed n"),
         (
             lambda: theory.strict_right_side_bounds(STAGES, [[[1]]], BETA),
-            "got 3 stages and 1 right sides; needed equally many",
+            "got 3 stages and 1 right sides; needed the same number of both",
         ),
         (
             lambda: theory.bound(Reduction(STAGES, RIGHTS, [[1]]), BETA),
