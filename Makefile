@@ -80,7 +80,7 @@ format: .venv/made-for ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-exactness: .venv/made-for ## forty million operations compared with independent arithmetic, digit for digit
+exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit; it resumes
 	$(PY) -m benchmarks.exactness
 	$(PY) -m benchmarks.processors
 

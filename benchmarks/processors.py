@@ -48,6 +48,7 @@ from tqdm import tqdm
 from gpbnb.arithmetic import named
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import bits, elementwise, processor, rules
+from gpbnb.display.tables import Table
 
 RESULTS = Path(__file__).parent / "results"
 SMALL: dict[str, tuple[FloatFormat, Any]] = {
@@ -292,6 +293,16 @@ def write(counts: list[Count]) -> None:
         writer.writerow((*Count._fields, "date", "commit", "code", "numpy", "ml_dtypes"))
         for count in counts:
             writer.writerow((*count, date, commit, code_digest(), np.__version__, ml_dtypes.__version__))
+    body = []
+    for fmt in (*SMALL, *MACHINE):
+        mine = {count.operation: count for count in counts if count.fmt == fmt}
+        pairs_compared = sum(mine[name].compared for name in OPERATIONS)
+        others = [f"{mine[name].compared:,}" if name in mine else "" for name in ("fused", "sqrt", "conversion")]
+        body.append((fmt, f"{pairs_compared:,}", *others, str(sum(count.different for count in mine.values()))))
+    header = ("format", "+ - * /", "fused", "square root", "conversion", "different")
+    table = Table("results compared", header, tuple(body)).markdown()
+    about = f"Compared on {date} at commit {commit} with numpy {np.__version__} and ml_dtypes {ml_dtypes.__version__}."
+    (RESULTS / "processors.md").write_text(f"{table}\n\n{about}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

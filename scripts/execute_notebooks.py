@@ -61,7 +61,8 @@ def executed(
     Parameters
     ----------
     paths : of notebooks; they are not changed.
-    jobs : how many to execute at a time; by default as many as there are processors.
+    jobs : how many to execute at a time; by default one more than there are processors, because one may wait for what
+        another compiles.
     say : is told of each start and end.
     findings : whether to run the checks of the ledger meanwhile, for the pages that show them.
 
@@ -78,7 +79,7 @@ def executed(
     waiting = [path for path, file in stored.items() if _outputs(file) is None]
     if waiting:
         say(f"{len(waiting)} of {len(paths)} notebooks to execute: what they depend on has changed")
-        _execute_all({path: stored[path] for path in _longest_first(waiting)}, jobs or _processors(), say, findings)
+        _execute_all({path: stored[path] for path in _longest_first(waiting)}, jobs or _processors() + 1, say, findings)
     for path, notebook in notebooks.items():
         outputs = _outputs(stored[path])
         if outputs is None:
@@ -219,7 +220,7 @@ def _compared(cell: Any) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
     parser.add_argument("notebooks", nargs="*", type=Path, help="default: all of the book")
-    parser.add_argument("--jobs", type=int, help="how many at a time; default: one a processor")
+    parser.add_argument("--jobs", type=int, help="how many at a time; default: one more than processors")
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--check", action="store_true", help="compare with the stored outputs and change nothing")
     given = parser.parse_args(arguments)

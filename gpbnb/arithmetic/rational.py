@@ -72,7 +72,7 @@ def true_inverse(a: Any) -> Any:
         return rationals(a).inv()
     except ZeroDivisionError:
         raise np.linalg.LinAlgError(
-            "got a singular matrix; needed one with an inverse, in whatever precision; change an entry"
+            "the matrix is singular: it has no inverse in any precision; change an entry"
         ) from None
 
 

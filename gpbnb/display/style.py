@@ -8,7 +8,7 @@ inverts the lightness of a picture and keeps its hues, so that a figure needs no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib.pyplot as plt
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 OBSERVED = "#0072B2"
 """Colour of errors that were measured or simulated."""
-OBSERVED_OTHERS = ("#56B4E9", "#7B3FA0", "#CC79A7", "#1F2F6B")
+OBSERVED_OTHERS = ("#7B3FA0", "#B8478C", "#1F2F6B", "#3E93C8")
 COLOURS = (OBSERVED, *OBSERVED_OTHERS)
 """Blues and purples for several observed series in one figure."""
 VALID = "#007D5F"
@@ -34,8 +34,8 @@ MARKERS = "osD^v"
 
 WIDTH = 6.4
 """Width of a figure in inches."""
-TEXT = 10.5
-"""Size of the text in points. It gives 16 pixels on a desktop and more than 8 on a phone 390 pixels wide."""
+TEXT = 11.0
+"""Size of the text in points. It gives 17 pixels on a desktop and more than 8 on a phone 390 pixels wide."""
 
 _STYLE: dict[Any, Any] = {
     "figure.dpi": 110,
@@ -128,6 +128,43 @@ def name(
     options.setdefault("va", "bottom" if up > 0 else "top" if up < 0 else "center")
     options.setdefault("fontsize", TEXT)
     return ax.annotate(text, at, shift, textcoords="offset points", color=colour, **options)
+
+
+def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotation]:
+    """Write names to the right of a panel, each at the height where its curve ends; move colliding names apart.
+
+    Call it last, when scales, limits and axis labels are set.
+
+    Parameters
+    ----------
+    ends : height in data coordinates and colour, for each name.
+    """
+    ax.figure.draw_without_rendering()  # type: ignore[union-attr]
+    points = 72 / ax.figure.dpi
+    heights = {text: float(ax.transData.transform((1, y))[1]) * points for text, (y, _) in ends.items()}
+    order = sorted(ends, key=heights.__getitem__)
+    placed = [heights[text] for text in order]
+    for _ in range(200):
+        for i in range(len(order) - 1):
+            lines = sum(text.count("\n") + 1 for text in order[i : i + 2]) / 2
+            overlap = 1.25 * TEXT * lines - (placed[i + 1] - placed[i])
+            if overlap > 0:
+                placed[i] -= overlap / 2
+                placed[i + 1] += overlap / 2
+    return [
+        ax.annotate(
+            text,
+            (1, ends[text][0]),
+            (6, place - heights[text]),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            color=ends[text][1],
+            va="center",
+            fontsize=TEXT,
+            annotation_clip=False,
+        )
+        for text, place in zip(order, placed, strict=True)
+    ]
 
 
 def label(ax: Axes, x: str, y: str, title: str = "") -> None:

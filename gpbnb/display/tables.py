@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from gpbnb.arithmetic.fixed import FixedFormat
     from gpbnb.arithmetic.formats import FloatFormat
 
 POWER = re.compile(r"(?<![\w.])(\d[\d.]*)e([+-]?\d+)(?!\w)")
@@ -42,15 +43,34 @@ class Table:
         return f"<{self.title}>"
 
 
-def digits(fmt: FloatFormat) -> str:
+def digits(fmt: FloatFormat | FixedFormat) -> str:
     """Name the precision of a format, as in "4 decimal digits" or "24 bits"."""
     unit = {2: "bit", 10: "decimal digit"}.get(fmt.base, f"base-{fmt.base} digit")
     return f"{fmt.precision} {unit}{'s' if fmt.precision > 1 else ''}"
 
 
-def arithmetic(fmt: FloatFormat) -> str:
-    """Name digits and rounding of a format, as in "24 bits, chopped"."""
-    return digits(fmt) + (", chopped" if fmt.rounding.value == "chop" else "")
+_ROUNDINGS = {
+    "nearest": "",
+    "chop": ", chopped",
+    "even": ", ties to even",
+    "up": ", rounded up",
+    "down": ", rounded down",
+    "odd": ", rounded to odd",
+    "stochastic": ", stochastically rounded",
+}
+
+
+def arithmetic(fmt: FloatFormat | FixedFormat) -> str:
+    """Name digits, rounding and range of a format, as in "24 bits, ties to even, exponents -126 to 127"."""
+    rounding, fraction = _ROUNDINGS[fmt.rounding.value], getattr(fmt, "fraction_bits", None)
+    if fraction is not None:
+        overflow = {"saturate": ", saturated", "wrap": ", wrapped around"}.get(getattr(fmt, "overflow", ""), "")
+        return f"fixed point of {1 + fmt.precision} bits, {fraction} of them fraction{rounding}{overflow}"
+    least, largest = getattr(fmt, "emin", None), getattr(fmt, "emax", None)
+    if least is None:
+        return digits(fmt) + rounding
+    flushed = "" if getattr(fmt, "subnormal", True) else ", no subnormal numbers"
+    return f"{digits(fmt)}{rounding}, exponents {least} to {largest}{flushed}"
 
 
 def scientific(value: Fraction | float, figures: int) -> str:

@@ -1,4 +1,4 @@
-"""``python -m gpbnb.inversion``: compute the long sweeps of the chapter anew and write their results to a folder."""
+"""``python -m gpbnb.inversion``: recompute the long sweeps of the chapter and write their results to a folder."""
 
 from __future__ import annotations
 

@@ -1,17 +1,17 @@
-r"""Bounds of the error of a computed inverse that can be trusted, from a priori to a posteriori.
+r"""Proved bounds on the error of a computed inverse, from a priori to a posteriori.
 
-Each bounds :math:`\|X - A^{-1}\|`, with the column sum norm (22), where X is the inverse of the t-digit matrix A as
-:func:`gpbnb.arithmetic.linalg.inv` computes it. Each is a float64 above the value of its formula, or ValueError where
-it proves nothing. They differ in what they look at:
+Each function bounds :math:`\|X - A^{-1}\|` in the column-sum norm (22), where X is the inverse of the t-digit matrix A
+as :func:`gpbnb.arithmetic.linalg.inv` computes it. It returns a float64 above the value of its formula, and raises
+ValueError where it proves nothing. :mod:`gpbnb.inversion.costs` compares sharpness and cost. The bounds use:
 
 ============================  =========================================================================
-bound                         looks at
+bound                         uses
 ============================  =========================================================================
-:func:`wilkinson`             the size of the numbers that occurred
+:func:`wilkinson`             the largest numbers that occurred
 :func:`higham`                the computed factors
-:func:`higham_probabilistic`  the same; holds but for a probability, if roundings are random
+:func:`higham_probabilistic`  the same; may fail with a stated probability, if roundings are random
 :func:`rule_of_thumb`         the same, with the root of the count of roundings; proves nothing
-:func:`ball`                  nothing of the computation: A is inverted again, in ball arithmetic
+:func:`ball`                  a second inversion of A, in ball arithmetic
 :func:`a_posteriori`          the residual of X, in ball arithmetic of more bits
 ============================  =========================================================================
 """
@@ -105,7 +105,9 @@ def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> f
     Higham & Mary 2019.
     """
     if x.format.rounding is not Rounding.NEAREST:
-        raise ValueError(f"got {x.format}; needed rounding to nearest, whose errors may have mean zero; use higham")
+        raise ValueError(
+            f"this bound needs rounding to nearest, whose errors can average out; got {x.format}. Use higham."
+        )
     n = len(x)
     one = gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3))
     return _from_factors(factors, x, 3 * one + one * one)
@@ -138,7 +140,7 @@ def _solved(first: float, ratio: float, n: int) -> float:
     """First over 1 - ratio, rounded up: no number here has seen more than 8n roundings of float64."""
     slack = 1 + 16 * n * 2.0**-53
     if not ratio * slack < 1:
-        raise ValueError(f"got ‖G‖ = {ratio:.3g}; needed less than 1, or nothing is proved; use more digits")
+        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more digits.")
     return first * slack / (1 - ratio * slack) * slack
 
 
@@ -170,7 +172,7 @@ def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None =
             inverse = _balls(a).solve(_identity(len(x)), algorithm="precond" if preconditioned else "lu")
         except ZeroDivisionError:
             raise ValueError(
-                f"got a matrix that {precision} bits cannot tell from a singular one; needed another; use more bits"
+                f"in {precision} bits, the matrix cannot be distinguished from a singular one; use more bits"
             ) from None
     with _working(precision + 64):
         return _upper(_column_sum(_balls(x) - inverse))
@@ -204,7 +206,7 @@ def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
         size = _upper(_column_sum(residual))
         if not size < 1:
             raise ValueError(
-                f"got ‖I - AX‖ up to {size:.3g}; needed less than 1, or nothing is proved; use more digits"
+                f"‖I - AX‖ must be below 1 to prove a bound; it may be as large as {size:.3g}. Use more digits."
             )
         return _upper(_column_sum(guess * residual) / (1 - flint.arb(size)))
 
@@ -261,7 +263,7 @@ def true_error(x: Any, inverse: Any) -> Fraction:
 
 @dataclass(frozen=True)
 class Guarantee:
-    """A computed inverse and what is proved of it: its relative error norm is at most `bound`."""
+    """A computed inverse whose relative error norm is proved to be at most `bound`."""
 
     fmt: FloatFormat
     inverse: FloatArray
@@ -270,43 +272,43 @@ class Guarantee:
 
 def smallest_precision(
     a: Any,
-    goal: float,
+    tolerance: float,
     base: int = 10,
     rounding: Rounding = Rounding.NEAREST,
     pivot: bool = True,
     largest: int = 60,
 ) -> Guarantee:
-    r"""Find the fewest digits in which the computed inverse of a matrix is proved to be good enough.
+    r"""Find the fewest digits in which the computed inverse of a matrix is proved to be within a tolerance.
 
     In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
-    and the result held against the matrix as given by :func:`a_posteriori`. Proved is
-    :math:`\|X - A^{-1}\| \le \text{goal}\,\|A^{-1}\|`, rounding of the entries included.
+    and :func:`a_posteriori` compares the result X with the matrix as given. The function proves
+    :math:`\|X - A^{-1}\| \le \text{tolerance}\,\|A^{-1}\|`, including the rounding of the entries.
 
     Parameters
     ----------
     a : (n, n), exact: strings, ints, Fractions; a float counts with its exact binary value.
-    goal : relative error, above 0.
+    tolerance : relative error, above 0.
     base, rounding : of the formats.
-    pivot : partial pivoting.
-    largest : precision to give up at.
+    pivot : whether to pivot partially.
+    largest : highest precision to try.
 
     Returns
     -------
-    guarantee : the format, the inverse and its bound. The next higher precision is enough as well, if it is not above
-        `largest`.
+    guarantee : the format, the inverse and its bound. The next higher precision meets the tolerance as well, unless it
+        is above `largest`.
 
     Raises
     ------
-    ValueError : `goal` is not above 0, `a` is not square, or no precision up to `largest` is enough.
+    ValueError : `tolerance` is not above 0, `a` is not square, or no precision up to `largest` is enough.
     numpy.linalg.LinAlgError : `a` is singular, so that no precision helps.
     """
-    if not (isinstance(goal, (int, float, Fraction)) and goal > 0 and math.isfinite(goal)):
-        raise ValueError(f"goal: got {goal!r}; needed a relative error above 0, as 1e-6")
+    if not (isinstance(tolerance, (int, float, Fraction)) and tolerance > 0 and math.isfinite(tolerance)):
+        raise ValueError(f"tolerance must be a relative error above 0, such as 1e-6; got {tolerance!r}")
     if largest < 1:
-        raise ValueError(f"largest: got {largest}; needed a precision of at least 1")
+        raise ValueError(f"largest must be a precision of at least 1; got {largest}")
     given = exact(a)
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
-        raise ValueError(f"a: got shape {given.shape}; needed a square matrix (n, n), n at least 1")
+        raise ValueError(f"a must be a square matrix (n, n) with n at least 1; got shape {given.shape}")
     true_inverse(given)
     tried: dict[FloatFormat, Guarantee] = {}
 
@@ -316,16 +318,16 @@ def smallest_precision(
             tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
         except (np.linalg.LinAlgError, ValueError):  # singular in so few digits, or nothing proved
             return False
-        return tried[fmt].bound <= goal
+        return tried[fmt].bound <= tolerance
 
     found = search.smallest_precision(meets, base, rounding, largest=largest)
     if found is not None:
         return tried[found]
     best = min((each.bound for each in tried.values()), default=math.inf)
-    reached = f"the best bound was {best:.3g}" if best < math.inf else "none had a bound at all"
+    reached = f"the best proved bound is {best:.3g}" if best < math.inf else "no precision gives a bound at all"
     raise ValueError(
-        f"got the goal {float(goal):.3g}; needed one that an inverse in at most {largest} base-{base} digits is proved "
-        f"to reach, and {reached}; raise largest, or the goal"
+        f"no inverse in at most {largest} base-{base} digits is proved to have a relative error of "
+        f"{float(tolerance):.3g}; {reached}. Raise largest or the tolerance."
     )
 
 
@@ -334,5 +336,5 @@ def _relative(bound: float, x: FloatArray) -> float:
     with _working(128):
         norm = flint.arb(flint.fmpq(*column_sum_norm(rationals(x)).as_integer_ratio())) - flint.arb(bound)
         if not norm > 0:
-            raise ValueError("got a bound above the norm of the inverse; needed a smaller one; use more digits")
+            raise ValueError("the bound exceeds the norm of the inverse: no relative error is proved; use more digits")
         return _upper(flint.arb(bound) / norm)

@@ -21,7 +21,7 @@ X_HAT, X, H_HAT, H, ERROR, B, D_X = sp.symbols(r"\hat{x} x \hat{h} h E b {\Delta
 
 
 def minus(expression: sp.Expr) -> sp.Expr:
-    """The negative, kept together."""
+    """Negate an expression without expanding it."""
     return sp.Mul(-1, expression, evaluate=False)
 
 
@@ -29,7 +29,7 @@ def minus(expression: sp.Expr) -> sp.Expr:
 
 
 def first_approach() -> Derivation:
-    r"""From the residual to the error, (34)-(42); u = A h by (33)."""
+    r"""Derive the error of a solution from its residual, (34)-(42); u = A h by (33)."""
     residual = A * H_HAT - A * H
     changed = (A + DELTA) * H_HAT - A * H
     inverse = A**-1
@@ -62,7 +62,7 @@ def first_approach() -> Derivation:
 
 
 def first_approach_norms() -> Derivation:
-    r"""The norms of (39)-(44), and without anything dropped.
+    r"""Derive the norms of (39)-(44) and their strict forms.
 
     Let a = ‖A⁻¹‖, ρ = ‖R‖, d = ‖Δ‖, e = ‖E‖, and x = ‖X‖ that of the computed inverse. A norm that satisfies
     e ≤ f + q e with q < 1 is at most the solution of e = f + q e.
@@ -73,7 +73,7 @@ def first_approach_norms() -> Derivation:
     posterior = x * rho / (1 - rho)
     return Derivation(
         (
-            Step("(44): (43) over $a$", over(printed, a), rho + a * d),
+            Step("(44): (43) divided by $a$", over(printed, a), rho + a * d),
             Step(
                 "(43) to every order: $e = a\\rho + a d\\,(a + e)$ has this solution",
                 together(a * rho, a * d * (a + strict)),
@@ -92,7 +92,7 @@ def first_approach_norms() -> Derivation:
 
 
 class Entry(NamedTuple):
-    """An entry before and after one step, the exact product of multiplier and pivot row, and the three errors."""
+    """Entry before and after one elimination step, the exact product of multiplier and pivot row, and three errors."""
 
     old: sp.Symbol
     new: sp.Symbol
@@ -102,7 +102,7 @@ class Entry(NamedTuple):
 
 
 def entry() -> Entry:
-    r"""One entry through one step: division, multiplication and subtraction, each with its own error.
+    r"""Carry one entry through one step: division, multiplication and subtraction, each with its own error.
 
     :math:`\bigl(a(0) - p\,(1+\epsilon_1)(1+\epsilon_2)\bigr)(1+\epsilon_3)` with :math:`p = a(0) - a(1)`.
     """
@@ -113,7 +113,7 @@ def entry() -> Entry:
 
 
 def entry_error() -> sp.Expr:
-    """First-order error of :func:`entry`, of either sign in each of its roundings."""
+    """First-order error of :func:`entry`; each rounding error can have either sign."""
     found = entry()
     return first_order(found.computed, found.errors)
 
@@ -125,7 +125,7 @@ def printed_entry_error() -> sp.Expr:
 
 
 def one_step() -> Derivation:
-    """An entry through one step of elimination: as printed, with an error for each rounding, and its bounds."""
+    """Derive the error of one elimination step: as printed, with an error for each rounding, and its bounds."""
     old, new, product, (e1, e2, e3), _ = entry()
     p, w, size = sp.symbols("p w u", nonnegative=True)
     done, exact = sp.symbols(r"\hat{a} p")
@@ -166,7 +166,7 @@ def one_step() -> Derivation:
 
 
 def reductions() -> Derivation:
-    r"""The errors of all steps, (59), add up to a change of the given matrix: by induction over the steps.
+    r"""Show by induction that the errors of all steps, (59), add up to a change of the given matrix.
 
     :math:`l_{ik} = \hat a_{ik}(k-1)/\hat a_{kk}(k-1)` is not rounded, and ã_ij(k) is what step k adds to
     :math:`\hat a_{ij}(k-1) - l_{ik}\hat a_{kj}(k-1)`. Then :math:`s(r) = \sum_{k\le r} l_{ik}\hat a_{kj}(k-1)`.
@@ -198,7 +198,7 @@ def reductions() -> Derivation:
 
 
 class Stages(NamedTuple):
-    """Elimination with free symbols for what was computed: L, A_T, A and the sum of the changes, (n, n) each."""
+    """Elimination with free symbols for computed entries: L, A_T, A and the sum of the changes, each (n, n)."""
 
     lower: sp.Matrix
     upper: sp.Matrix
@@ -207,7 +207,7 @@ class Stages(NamedTuple):
 
 
 def stages(n: int) -> Stages:
-    r"""The n - 1 steps of an n × n matrix, each entry of each stage a symbol of its own.
+    r"""Eliminate an n × n matrix in n - 1 steps, with a separate symbol for each entry of each stage.
 
     A change is what step k adds to the exact step: Ã(k), the sum of (53) over k.
     """
@@ -234,7 +234,7 @@ def stages(n: int) -> Stages:
 
 
 def perturbed_system() -> Derivation:
-    r"""(67)-(68): the error of the solution of a perturbed system.
+    r"""Derive the error of the solution of a perturbed system, (67)-(68).
 
     A x = b; (A + Δ) x̂ = b + Δb; Δx = x̂ - x.
     """
@@ -264,7 +264,7 @@ def perturbed_system() -> Derivation:
 
 
 def two_systems() -> Derivation:
-    r"""What (91) and (92) add up: Ã and b̃ change the given system, ΔA and Δb the triangular one.
+    r"""Show what (91) and (92) add: Ã and b̃ change the given system, ΔA and Δb the triangular one.
 
     :math:`L A_T = A + \tilde A` and :math:`L b_T = b + \tilde b`, all of it computed but L; back substitution solves
     :math:`(A_T + \Delta A)\hat x = b_T + \Delta b` exactly.
@@ -275,14 +275,16 @@ def two_systems() -> Derivation:
     return Derivation(
         (
             Step(
-                "(91) as it must be: the matrix whose solution was found",
+                "(91) corrected: the matrix whose exact solution was computed",
                 L * unevaluated(upper + DELTA_A),
                 A + A_TILDE + L * DELTA_A,
             ),
-            Step("(92) as it must be: its right side", L * unevaluated(right + DELTA_B), B + B_TILDE + L * DELTA_B),
-            Step("what (91) leaves out", together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)), (L - 1) * DELTA_A),
+            Step("(92) corrected: its right-hand side", L * unevaluated(right + DELTA_B), B + B_TILDE + L * DELTA_B),
             Step(
-                "or all of it as a change of the triangular matrix $L^{-1}A$",
+                "term missing from (91)", together(A_TILDE + L * DELTA_A, minus(A_TILDE + DELTA_A)), (L - 1) * DELTA_A
+            ),
+            Step(
+                "the same as a change of the triangular matrix $L^{-1}A$",
                 together(upper, DELTA_A, minus(L**-1 * A)),
                 L**-1 * A_TILDE + DELTA_A,
             ),
@@ -292,7 +294,7 @@ def two_systems() -> Derivation:
 
 
 def transfer_cost() -> Derivation:
-    r"""What L can add to the sizes of (91): at most a factor (n + 3)/2.
+    r"""Bound what L can add to the absolute values of (91): at most a factor (n + 3)/2.
 
     Entry (i, j) of :math:`|L||\Delta A|` has terms :math:`(n-j+3)\beta|l_{ik}\hat a_{kj}|`, and to first order
     :math:`|l_{ik}\hat a_{kj}| \le |\hat a_{ij}(k)| + |\hat a_{ij}(k-1)|`: let it be less by w.
@@ -302,7 +304,7 @@ def transfer_cost() -> Derivation:
     return Derivation(
         (
             Step(
-                "a term of the size of (59) has room for two products, $u = |\\hat a(k-1)|$, $v = |\\hat a(k)|$",
+                "each absolute value in (59) bounds two products, $u = |\\hat a(k-1)|$, $v = |\\hat a(k)|$",
                 3 * new + 2 * old,
                 2 * unevaluated(new + old - w),
                 new + 2 * w,
@@ -318,18 +320,18 @@ def transfer_cost() -> Derivation:
 
 
 def inverse_norms() -> Derivation:
-    """From (95) to (96) and (97), and without anything dropped: x = ‖X‖, c = ‖E‖, e the norm of the error."""
+    """Derive (96) and (97) from (95), and their strict form: x = ‖X‖, c = ‖E‖, e is the norm of the error."""
     x, c = sp.symbols("x c", positive=True)
     strict = x * c / (1 - c)
     return Derivation(
         (
-            Step("(97): (96) over $x$", over(x * c, x), c),
+            Step("(97): (96) divided by $x$", over(x * c, x), c),
             Step(
                 "(96) to every order: $e = (x + e)\\,c$, since $\\|A^{-1}\\| \\le x + e$, has this solution",
                 unevaluated(x + strict) * c,
                 strict,
             ),
-            Step("what (96) leaves out, relative to it", over(strict - x * c, x * c), c / (1 - c)),
+            Step("term missing from (96), relative to (96)", over(strict - x * c, x * c), c / (1 - c)),
         )
     )
 
@@ -362,7 +364,7 @@ def back_row(terms: int) -> Row:
 
 
 def back_row_weights(terms: int) -> tuple[int, tuple[int, ...]]:
-    """Roundings of the right side and of each product in :func:`back_row`, counted in the expression."""
+    """Count the roundings of the right side and of each product in the expression of :func:`back_row`."""
     row = back_row(terms)
     error = sp.Poly(first_order(row.value, row.errors), *sorted(row.value.free_symbols - set(row.errors), key=str))
 
@@ -373,15 +375,11 @@ def back_row_weights(terms: int) -> tuple[int, tuple[int, ...]]:
 
 
 def back_substitution_weights() -> Derivation:
-    """The weights (85)-(88) for every n: what b_k and a_kj pass through in row k."""
+    """Derive the weights (85)-(88) for every n: the roundings that b_k and a_kj pass through in row k."""
     return Derivation(
         (
             Step("(86): $n-k$ subtractions and the division", together(N - K, 1), N - K + 1),
-            Step(
-                "(85): $a_{kj}$ is multiplied, subtracted, and passes the $n-j$ subtractions after it and the division",
-                together(1, 1, N - J, 1),
-                N - J + 3,
-            ),
+            Step("(85): product, subtraction, $n-j$ more, and the division", together(1, 1, N - J, 1), N - J + 3),
             Step(
                 "one more row and column, the last: each weight grows by one",
                 together(N - J + 3, 1),
@@ -428,7 +426,7 @@ def first_row(a: sp.Matrix, b: sp.Expr, second: sp.Expr, third: sp.Expr) -> sp.E
 
 
 def linear(expression: sp.Expr) -> sp.Expr:
-    """The part of an expression linear in the one ε of the documents."""
+    """Part of an expression that is linear in the single ε of the documents."""
     return first_order(expression, (EPSILON,))
 
 
@@ -453,7 +451,7 @@ def printed_before_78() -> sp.Expr:
 
 
 def leftover(equation: int, hats: bool = True) -> sp.Expr:
-    """What (76), (77), (78) or (79) leaves of first order, left less right side; zero where it holds.
+    """First-order difference between both sides of (76), (77), (78) or (79); zero if the equation holds.
 
     Without `hats`, (77) has the true x_3 in place of the computed one, as printed in 1984.
     """

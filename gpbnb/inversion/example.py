@@ -1,4 +1,4 @@
-"""The numerical example of section 11.4: Table 1, in every reading of it.
+"""The numerical example of section 11.4: Table 1 in every reading.
 
 The report gives a matrix, three wordlengths and six numbers, and leaves open what a wordlength of so many "places after
 decimal point" is, which norm was taken, and what was computed with how many digits. Here each number is computed in
@@ -62,16 +62,16 @@ class Wordlength:
             raise ValueError(f"kind: got {self.kind!r}; needed 't = places', 't = places + 1' or 'fixed point'")
 
     def format(self, places: int) -> FloatFormat:
-        """The floating-point format; for fixed point, that of the unit roundoff of numbers of size 1."""
+        """Floating-point format; for fixed point, the format with the same unit roundoff for numbers near 1."""
         more = 1 if self.kind == "fixed point" else int(self.kind.partition("+")[2] or 0)
         return FloatFormat(10, places + more, self.rounding)
 
     def rounder(self, places: int) -> Rounder:
-        """The rounding of one number."""
+        """Function that rounds one number."""
         return self.fixed(places) if self.kind == "fixed point" else self.format(places).round
 
     def fixed(self, places: int) -> Rounder:
-        """Rounding to a multiple of the last place, half away from zero or towards zero."""
+        """Round to a multiple of the last place, half away from zero or towards zero."""
         unit = Fraction(1, 10**places)
         half = Fraction(1, 2) if self.rounding is Rounding.NEAREST else 0
 
@@ -109,7 +109,7 @@ def eliminate(a: Matrix, fl: Rounder) -> Matrix:
 
 
 def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
-    """Gauss-Jordan: each row is divided by its pivot and taken from all the others."""
+    """Invert by Gauss-Jordan: divide each row by its pivot and subtract multiples of it from all others."""
     n = len(a)
     rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
     for k in range(n):
@@ -123,7 +123,7 @@ def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
 
 
 def round_once(a: Matrix, fl: Rounder) -> Matrix:
-    """The true inverse, each entry rounded: the best that a format can hold."""
+    """Round each entry of the true inverse: the most accurate inverse in a format."""
     return each_rounded(inverse_of(a), fl)
 
 
@@ -167,7 +167,7 @@ class Column:
 
     @property
     def ratios(self) -> tuple[float, ...]:
-        """Each number over the printed one."""
+        """Ratio of each number to the printed one."""
         return tuple(v / float(p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
 
     @property
@@ -177,12 +177,12 @@ class Column:
 
     @property
     def agreements(self) -> int:
-        """How many of the numbers agree with the printed one in each of its four digits."""
+        """Number of values that agree with the print in all four digits."""
         return sum(agree(v, p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
 
     @property
     def same_digits(self) -> bool:
-        """Whether all have the same four digits, and differ in the exponent."""
+        """Whether all values have the same four digits and differ only in the exponent."""
         return len({f"{v:.3e}".split("e")[0] for v in self.values}) == 1
 
     @property
@@ -192,7 +192,7 @@ class Column:
 
 
 def agree(value: float | Fraction, printed: str) -> bool:
-    """Whether a value, rounded or chopped to the digits that are printed, is the printed one."""
+    """Whether a value, rounded or chopped to the printed digits, agrees with the print."""
     low, high = interval(printed)
     return bool(low <= Fraction(value) < high)
 
@@ -205,7 +205,7 @@ def chance(printed: str) -> float:
 
 @cache
 def interval(printed: str) -> tuple[Fraction, Fraction]:
-    """Numbers that are printed so if rounded, or if chopped."""
+    """Interval of the numbers that round or chop to the printed one."""
     digits, exponent = printed.split("e")
     unit = Fraction(10) ** (int(exponent) - len(digits.split(".")[1]))
     return Fraction(printed) - unit / 2, Fraction(printed) + unit
@@ -272,7 +272,7 @@ def error_readings() -> tuple[Column, ...]:
 def pairs(
     norm: str = "column sum", relative: bool = False, source: str = "its own digits"
 ) -> list[tuple[Column, Column]]:
-    """Readings of both columns that belong together: a bound, and the error of elimination with the same wordlength."""
+    """Pair each reading of the bound with the error of elimination in the same wordlength."""
     errors = {
         (one.wordlength, one.norm, one.relative): one
         for one in error_readings()
@@ -287,7 +287,7 @@ def pairs(
 
 @dataclass(frozen=True)
 class Search:
-    """What came of a search among readings: agreements in all digits, beside those that chance alone would give.
+    """Result of a search among readings: agreements in all digits, and the number expected by chance.
 
     Parameters
     ----------
@@ -323,7 +323,7 @@ def search(column: str) -> Search:
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of section 11.4, and in how many readings it holds."""
+    """A sentence of section 11.4 and the number of readings for which it holds."""
 
     name: str
     readings: int
@@ -332,7 +332,7 @@ class Claim:
 
 
 def claims() -> tuple[Claim, ...]:
-    """What the text says of Table 1, in every reading.
+    """Test each sentence about Table 1 in every reading.
 
     That a bound is conservative is asked of each bound beside the error of elimination with the same wordlength and
     norm, both absolute or both relative.

@@ -1,4 +1,4 @@
-"""Whether any matrix of so many digits has the error that Table 1 of section 11.4 prints.
+"""Search for matrices of a given wordlength that have the error printed in Table 1 of section 11.4.
 
 Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
 """
@@ -23,7 +23,7 @@ from gpbnb.inversion.procedure import NORMS
 
 @dataclass(frozen=True)
 class Possible:
-    """Whether a printed error is that of any matrix of numbers of a wordlength, and one such matrix.
+    """Answer whether some matrix of a wordlength has a printed error, with one such matrix.
 
     `reference` is the matrix whose inverse it is held against: "given", or "stored" in the wordlength.
     """
@@ -49,7 +49,7 @@ def possible(
     printed: str | None = None,
     reference: str = "given",
 ) -> Possible:
-    """Look through all matrices X of a wordlength for one whose error has the printed norm.
+    """Search all matrices X of a wordlength for one whose error has the printed norm.
 
     How X was computed does not matter: rounding plays no part, only which numbers there are.
 
@@ -93,7 +93,7 @@ def possible(
 
 @cache
 def all_possible() -> tuple[Possible, ...]:
-    """Every wordlength, one of a digit more, and every norm searched.
+    """Search every wordlength, one with an additional digit, and every norm.
 
     Rounding matters only where three digits cannot hold the matrix as given.
     """

@@ -1,6 +1,6 @@
-"""What does happen: inverses computed in a format, beside their true errors and every bound.
+"""Experiments: inverses computed in a format, with their true errors and every bound.
 
-True errors are exact rationals, by python-flint; a violation is one, however small.
+True errors are exact rationals, computed by python-flint, so even the smallest violation counts.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ MAY_BE_ABSENT = BETTER[1:]
 
 @dataclass(frozen=True)
 class Trial(BoundedError):
-    """One computed inverse: its matrix, its error, and the bounds of that error, norms (22).
+    """One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
 
     A bound that proves nothing is absent from `bounds`. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
     """
@@ -75,7 +75,7 @@ class Trial(BoundedError):
 
 
 def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None, family: str = "") -> Trial:
-    """Invert a matrix, and bound the error of its inverse.
+    """Invert a matrix and evaluate bounds on the error of its inverse.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
 
 
 class _Computing:
-    """A matrix, its inverse, and what was left behind, each computed once and when it is needed."""
+    """A matrix, its inverse and intermediate results, each computed once, on demand."""
 
     def __init__(self, a: FloatArray, pivot: bool) -> None:
         self.a, self.pivot = a, pivot
@@ -166,7 +166,7 @@ def _nearly_singular(n: int, rng: np.random.Generator) -> NDArray[Any]:
 
 
 def conditioned(n: int, digits: float, rng: np.random.Generator) -> NDArray[Any]:
-    """The last row is the sum of the others, but for a part of 10**-digits, which the condition number undoes."""
+    """Random matrix whose last row is the sum of the others plus a part of size 10**-digits: nearly singular."""
     a = _uniform(n, rng)
     a[-1] = a[:-1].sum(axis=0) + a[-1] * Fraction(10.0**-digits)
     return a
@@ -217,7 +217,7 @@ FIXED = ("Hilbert", "Frank", "Kahan")
 
 @dataclass(frozen=True)
 class Cell:
-    """A part of a sweep that can be computed by itself: it has its own seed.
+    """An independent part of a sweep, with its own seed.
 
     `sizes` are the numbers of rows, each drawn `repeats` times; a matrix that is the same at every draw, once.
     """
@@ -247,12 +247,12 @@ class Cell:
 
 
 def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
-    """Random matrices of growing size, inverted with pivoting beside :data:`BETTER`."""
+    """Invert random matrices of growing size with pivoting and evaluate :data:`BETTER`."""
     return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
 
 
 def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np.random.Generator) -> list[Trial]:
-    """Matrices of one size that are nearer and nearer to singular, see :func:`conditioned`, beside :data:`BETTER`.
+    """Invert matrices of one size that approach a singular one, see :func:`conditioned`; evaluate :data:`BETTER`.
 
     Those that the format cannot tell from singular are left out.
     """
@@ -281,14 +281,14 @@ RANDOM_SIZES = {n: 3000 if n <= 6 else 1010 if n <= 10 else 100 for n in range(2
 
 
 def variant_cells() -> list[Cell]:
-    """All families of matrices, n = 2 ... 20, with and without pivoting: for every reading and bound."""
+    """Cells of the sweep over all families of matrices, n = 2 ... 20, with and without pivoting."""
     cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
     sizes = tuple(range(2, 21))
     return [Cell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
 
 
 def random_cells() -> list[Cell]:
-    """Random matrices by the hundred thousand, with pivoting: for the better bounds."""
+    """Cells of the sweep over a hundred thousand random matrices, with pivoting."""
     cases = product(RANDOM_FORMATS, RANDOM_SIZES.items())
     return [Cell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
 
@@ -318,7 +318,7 @@ REGULAR = 0.01
 
 
 class Sample:
-    """What is kept of trials: for each bound how often it was absent or violated, and its ratios to the error.
+    """Statistics of trials: how often each bound was absent or violated, and its ratios to the error.
 
     `failed` counts matrices that are singular in the format, `exact` inverses without error, which have no ratio;
     `regular` matrices have a condition number of at most :data:`REGULAR` over β.
@@ -360,7 +360,7 @@ class Sample:
                 mine[name] = mine[name] + count
 
     def rows(self, *where: str) -> list[dict[str, str]]:
-        """One row of text a bound, with four digits of every ratio."""
+        """Return one row of text for each bound, with four digits of every ratio."""
         result = []
         for name, ratios in self.ratios.items():
             counts = (
@@ -390,19 +390,19 @@ def cell_sample(cell: Cell, names: Sequence[str]) -> Sample:
 
 
 def cell_rows(cell: Cell, sample: Sample) -> list[dict[str, str]]:
-    """The rows of one cell of a sweep, as they are kept."""
+    """Rows of one cell of a sweep, as stored."""
     return sample.rows(*_where(cell).values())
 
 
 def _where(cell: Cell) -> dict[str, str]:
-    """How the rows of a cell are told from others."""
+    """Key of the rows of a cell."""
     sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
     texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
     return dict(zip(_FIELDS, texts, strict=False))
 
 
 def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> list[dict[str, str]]:
-    """The rows of each family together, if there are several, and of all together."""
+    """Rows for each family, if there are several, and for all families together."""
     rows, whole, families = [], Sample(names), dict[str, Sample]()
     for cell, sample in samples:
         families.setdefault(cell.family, Sample(names)).merge(sample)
@@ -414,13 +414,13 @@ def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> li
 
 
 def sweep_rows(cells: Iterable[Cell], names: Sequence[str]) -> list[dict[str, str]]:
-    """Compute cells: the rows of each, of each family together, and of all together."""
+    """Compute cells and return the rows of each cell, each family, and all families together."""
     samples = [(cell, cell_sample(cell, names)) for cell in cells]
     return [row for each in samples for row in cell_rows(*each)] + sum_rows(samples, names)
 
 
 def worst(bound: str, sweep: str = "variants") -> Trial:
-    """Of the regular matrices of a kept sweep, the one whose error is largest beside a bound; computed anew.
+    """Recompute the regular matrix of a stored sweep whose error is largest relative to a bound.
 
     Parameters
     ----------
@@ -446,7 +446,7 @@ def format_name(fmt: FloatFormat) -> str:
 
 @dataclass(frozen=True)
 class Frozen:
-    """The kept result of a sweep: where it comes from, and its rows."""
+    """Stored result of a sweep: its provenance and its rows."""
 
     provenance: Mapping[str, str]
     rows: tuple[Mapping[str, str], ...]
@@ -458,7 +458,7 @@ class Frozen:
 
 @cache
 def frozen(sweep: str) -> Frozen:
-    """Read the kept result of a sweep, "variants" or "random"; ``python -m gpbnb.inversion`` computes it anew.
+    """Read the stored result of a sweep, "variants" or "random"; ``python -m gpbnb.inversion`` recomputes it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-r"""The procedure of Figure III-1: a bound of the error of an inverse, computed beside the inverse itself.
+r"""The procedure of Figure III-1: a bound on the error of an inverse, computed while inverting.
 
 One function for each box of the chart, and :func:`run` for the whole. The inverse is computed in the arithmetic of the
 format; the errors are then evaluated from its digits by the formulas of :mod:`gpbnb.inversion.theory`. Whatever the
@@ -27,7 +27,7 @@ from gpbnb.inversion.theory import Norm, Perturbation, Reduction
 
 
 class Triangularization(NamedTuple):
-    """Every stage of the elimination of a matrix, and what was done to get there.
+    """Every stage of the elimination of a matrix, with multipliers and row order.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def substitute(upper: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def reduce(a: FloatArray, pivot: bool = False) -> Reduction:
-    """The three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays.
+    """Run the three boxes of the computation: stages, right-hand sides and the inverse, as FloatArrays.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def reduce(a: FloatArray, pivot: bool = False) -> Reduction:
 
 
 def as_floats(reduction: Reduction) -> Reduction:
-    """The same as float64, nearest, in which bounds are quick to evaluate."""
+    """Convert a reduction to float64, in which bounds are quick to evaluate."""
     stages, rights = (tuple(part.to_float() for part in parts) for parts in reduction[:2])
     return Reduction(stages, rights, reduction.solution.to_float())
 
@@ -155,7 +155,7 @@ FORMS = ("chart", "(96)", "norms throughout")
 
 @dataclass(frozen=True)
 class Reading:
-    """How the procedure is read where its text leaves a choice.
+    """A choice of what the text of the procedure leaves open.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class Reading:
 
 
 def readings() -> Iterator[Reading]:
-    """Every reading that differs from the others: norms are sizes, whatever the signs."""
+    """All distinct readings; sums of norms do not depend on signs."""
     for signed, form, triangular, norm in product((True, False), FORMS, (False, True), NORMS):
         if not (signed and form == "norms throughout"):
             yield Reading(signed, form, triangular, norm)
@@ -236,7 +236,7 @@ def error_norm(error: Any, norm: str = "column sum") -> Any:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What the procedure hands on from box to box, and its bound.
+    """Intermediate results and bound of the procedure.
 
     `norm_of_inverse` is that of the computed inverse, by which (97) divides to get the relative bound.
     """
@@ -255,7 +255,7 @@ class Outcome:
 
 
 def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) -> Outcome:
-    """The boxes of the errors, in one reading.
+    """Evaluate the boxes of the errors in one reading.
 
     Parameters
     ----------
@@ -268,7 +268,7 @@ def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) ->
 
 
 def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) -> Iterator[Outcome]:
-    """The same in several readings, with what they share computed once."""
+    """Evaluate several readings, with their common parts computed once."""
     solution = _plain(reduction.solution)
     second = {signed: back_substitution_errors(reduction, beta, signed) for signed in (True, False)}
     errors = {s: resultant_errors(triangularization_errors(reduction, beta, s), second[s]) for s in second}
@@ -288,7 +288,7 @@ def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) ->
 
 
 def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> Outcome:
-    """The whole chart, from the given matrix to the error bound of its computed inverse; the bound is exact.
+    """Run the whole chart, from the given matrix to the error bound of its inverse; the bound is exact.
 
     Parameters
     ----------
@@ -337,5 +337,5 @@ def _upper_inverse(upper: Any) -> NDArray[Any]:
 
 
 def _plain(a: Any) -> NDArray[Any]:
-    """Float64 as it is, everything else exact."""
+    """Keep float64, convert everything else to exact numbers."""
     return a if isinstance(a, np.ndarray) and a.dtype == np.float64 else exact(a)

@@ -1,4 +1,4 @@
-"""The stored sweeps over inverses, which can be computed again and verified."""
+"""The stored sweeps over inverses, which can be recomputed and verified."""
 
 from __future__ import annotations
 

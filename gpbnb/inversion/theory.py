@@ -1,4 +1,4 @@
-r"""What may happen: bounds of the error of an inverse from elimination and back substitution.
+r"""Theory: bounds on the error of an inverse from elimination and back substitution.
 
 Bounds named ``printed_…`` are those of the documents; the others are derived in
 :mod:`gpbnb.inversion.derivation`. ``beta`` is the unit roundoff β. Entries are exact (Fractions, ints, a FloatArray) or
@@ -31,7 +31,7 @@ Norm = Callable[[NDArray[Any]], Any]
 
 
 class Reduction(NamedTuple):
-    r"""What elimination and back substitution leave behind; rows in the order in which they were eliminated.
+    r"""Intermediate results of elimination and back substitution, with rows in the order of elimination.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def printed_first_relative_bound(inverse: Any, residual: Any, change: Any = None
 
 
 def strict_first_bound(inverse: Any, residual: Any, change: Any = None, norm: Norm = column_sum) -> Any:
-    r"""The same to every order: (43) over :math:`1 - \|A^{-1}\|\|\Delta A\|`.
+    r"""Strict form of (43): (43) divided by :math:`1 - \|A^{-1}\|\|\Delta A\|`.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def strict_right_side_bounds(stages: Sequence[Any], rights: Sequence[Any], beta:
     r"""Sizes of b̃_i, at most :math:`\sum_k[\gamma_1|\hat b_i(k)| + \gamma_2|l_{ik}\hat b_k(k-1)|]`, always."""
     matrices, columns = _stages(stages), _rights(rights)
     if len(matrices) != len(columns):
-        raise ValueError(f"got {len(matrices)} stages and {len(columns)} right sides; needed equally many")
+        raise ValueError(f"got {len(matrices)} stages and {len(columns)} right sides; needed the same number of both")
     return _strict(matrices, columns, beta, columns=False)
 
 
@@ -290,7 +290,7 @@ def _matrix(x: Any, name: str) -> NDArray[Any]:
     if entries.ndim != 2 or not entries.size:
         raise ValueError(f"{name}: got shape {entries.shape}; needed a matrix (m, n); reshape a vector to (n, 1)")
     if entries.dtype != object and not np.isfinite(entries).all():
-        raise ValueError(f"{name}: got an entry that is NaN or infinite; needed numbers; mend the data")
+        raise ValueError(f"{name}: got an entry that is NaN or infinite; needed finite numbers; correct the data")
     return np.asarray(entries)
 
 

@@ -76,7 +76,7 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
 
 
 def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Axes) -> list[Artist]:
-    """Bounds against the step: name, steps and values of each; the last one is black, the others are printed ones."""
+    """Draw bounds against the step: name, steps and values of each. The last one is black, the others are printed."""
     artists: list[Artist] = []
     for number, (name, steps, values) in enumerate(curves):
         last = number == len(curves) - 1
@@ -86,7 +86,7 @@ def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Ax
 
 
 def level(name: str, value: float, ax: Axes) -> Artist:
-    """A bound that is the same at each step."""
+    """Draw a bound that is the same at each step."""
     return ax.axhline(value, color=BOUND, label=name)
 
 
@@ -154,7 +154,7 @@ def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
 
 
 def headline(found: Answers, ax: Axes) -> list[Artist]:
-    """The same as :func:`digits_needed` for somebody who has a minute: words beside what they name, and no forms."""
+    """Draw :func:`digits_needed` for the front page, with direct labels and without the forms of the filter."""
     artists: list[Artist] = []
     for rounding, colour, word in (
         (Rounding.CHOP, OBSERVED_OTHERS[2], "emulated, chopped"),
@@ -186,7 +186,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
 
 
 def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
-    """Digits of each run that has a format, and its largest error in the year."""
+    """List the digits of each rounded run and its largest error in the year."""
     return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
 
 

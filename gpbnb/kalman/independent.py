@@ -59,7 +59,7 @@ def stored_shares(bound: str, form: Form) -> ModelShare:
 
 
 class FirstStep(NamedTuple):
-    """How many models exceed (105) in their first step, where its assumption of an exact covariance is true.
+    """Number of models that exceed (105) in their first step, where its assumption of an exact covariance is true.
 
     `low` and `high` limit the probability, each with 95 % confidence.
     """

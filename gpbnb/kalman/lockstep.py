@@ -125,7 +125,7 @@ class Lockstep:
         return arrays
 
     def save(self, file: Path) -> None:
-        """Write all of it, or nothing."""
+        """Save the state; a file that exists is replaced as a whole."""
         draft = file.with_suffix(".draft.npz")
         given = {"cell": np.array(self.name), "block": np.array(self.block), "steps": np.array(self.steps)}
         np.savez(draft, allow_pickle=False, **self._arrays(), **given)
@@ -152,7 +152,7 @@ class Lockstep:
 
 
 def run_lockstep(lockstep: Lockstep, directory: Path | None, blocks_per_save: int = 16) -> dict[str, Any]:
-    """Run to the end, saving on the way if there is a directory, and return the result."""
+    """Run to the end, save progress in a directory if one is given, and return the result."""
     total = -(-lockstep.steps // BLOCK)
     file = None if directory is None else directory / f"{zlib.crc32(lockstep.name.encode()):08x}.npz"
     if file is not None:
@@ -168,7 +168,7 @@ def run_lockstep(lockstep: Lockstep, directory: Path | None, blocks_per_save: in
 
 
 def error_rows(heads: Sequence[tuple[str, ...]], first: int, result: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of a table: for each format and record, largest errors of the year and errors at its end.
+    """List, for each format and record, the largest errors of the year and the errors at its end.
 
     Parameters
     ----------

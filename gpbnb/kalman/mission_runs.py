@@ -44,7 +44,7 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Cell:
-    """Some formats of one base, for the same records of one setting."""
+    """Several formats of one base for the same records of one setting."""
 
     setting: str
     states: str
@@ -94,7 +94,7 @@ CELLS = _cells()
 
 
 def lockstep(cell: Cell, steps: int | None = None) -> Lockstep:
-    """All filters of a cell, before their first step."""
+    """Create all filters of a cell, before their first step."""
     formats = [FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions]
     records = range(cell.first, cell.first + cell.count)
     mission = cell.mission
@@ -102,17 +102,17 @@ def lockstep(cell: Cell, steps: int | None = None) -> Lockstep:
 
 
 def compute(cell: Cell, directory: Path | None = None, steps: int | None = None) -> dict[str, Any]:
-    """Run the years of a cell, and save them on the way if there is a directory."""
+    """Run the years of a cell, and save progress in a directory if one is given."""
     return run_lockstep(lockstep(cell, steps), directory)
 
 
 def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of the table: for each format and record, largest error of the year and error at its end."""
+    """List, for each format and record, the largest error of the year and the error at its end."""
     return error_rows(cell.heads(), cell.first, result)
 
 
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """The row of one format and record, computed alone."""
+    """Compute the row of one format and record alone."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
     one = replace(cell, precisions=(precision,), first=record, count=1)
     return rows(one, compute(one))

@@ -1,6 +1,6 @@
-"""How many digits a year needs, with what probability: hundreds of measurement records in each number format.
+"""How many digits a year needs, and with what probability: many measurement records in each number format.
 
-``python -m gpbnb.kalman.threshold`` computes the sweep and goes on where it was interrupted. The year is that of
+``python -m gpbnb.kalman.threshold`` computes the sweep and resumes where it was interrupted. The year is that of
 :mod:`gpbnb.kalman.year`: 3,153,600 steps, the simple model, measurements in whole milliarcseconds. Record 0 is the
 one of that module. The errors are differences between the rounded filter and the same filter in float64, at every
 step.
@@ -44,7 +44,7 @@ _HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Cell:
-    """Some formats of one base, for the same records, they share measurements and reference."""
+    """Several formats of one base for the same records, which share measurements and reference."""
 
     states: str
     base: int
@@ -116,7 +116,7 @@ class SimpleYear:
         return model(MODELS[0], base)
 
     def matrices(self, block: int, base: int) -> None:
-        """Nothing: the model has them."""
+        """Return None, because the model has the matrices."""
 
     def simulation(self, record: int) -> Simulation:
         """The measurements of one record."""
@@ -135,24 +135,24 @@ def _simulation(states: str, record: int) -> Simulation:
 
 
 def lockstep(cell: Cell, steps: int = YEAR) -> Lockstep:
-    """All filters of a cell, before their first step."""
+    """Create all filters of a cell, before their first step."""
     formats = [FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions]
     records = range(cell.first, cell.first + cell.count)
     return Lockstep(repr(cell), SimpleYear(cell.states), formats, FORMS[cell.form], records, steps)
 
 
 def compute(cell: Cell, directory: Path | None = None, steps: int = YEAR) -> dict[str, Any]:
-    """Run the years of a cell, and save them on the way if there is a directory."""
+    """Run the years of a cell, and save progress in a directory if one is given."""
     return run_lockstep(lockstep(cell, steps), directory)
 
 
 def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
-    """Rows of the table: for each format and record, largest error of the year and error at its end."""
+    """List, for each format and record, the largest error of the year and the error at its end."""
     return error_rows(cell.heads(), cell.first, result)
 
 
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """The row of one format and record, computed alone."""
+    """Compute the row of one format and record alone."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
     one = replace(cell, precisions=(precision,), first=record, count=1)
     return rows(one, compute(one))

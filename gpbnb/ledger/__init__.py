@@ -5,11 +5,10 @@
     from gpbnb import ledger
 
     rows = ledger.rows(document="hung1984", chapter="II", sections=range(1, 10))
-    ledger.summary_table(rows)
     ledger.error_table(rows)
 """
 
-from gpbnb.ledger.checking import Row, counts, examine, rows, summary
+from gpbnb.ledger.checking import Row, counts, examine, rows
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.html import CHAPTERS, Html
 from gpbnb.ledger.page import (
@@ -23,7 +22,7 @@ from gpbnb.ledger.page import (
     select_topic,
     topics,
 )
-from gpbnb.ledger.render import summary_table, table
+from gpbnb.ledger.render import table
 from gpbnb.ledger.roots import by_root, load_roots
 from gpbnb.ledger.statements import Statement, load_statements, quote, select
 
@@ -49,8 +48,6 @@ __all__ = [
     "rows",
     "select",
     "select_topic",
-    "summary",
-    "summary_table",
     "table",
     "topics",
 ]

@@ -6,7 +6,6 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from gpbnb.caching import PACKAGE
 from gpbnb.ledger import cache
@@ -33,14 +32,6 @@ class Row:
         if self.finding is not None:
             return self.finding.verdict.value
         return MISSING if self.error is None else FAILED
-
-
-class Place(NamedTuple):
-    """A section of a document."""
-
-    document: str
-    chapter: str
-    section: str
 
 
 def owners(statements: Iterable[Statement], topics: Mapping[str, Checks] = TOPICS) -> dict[str, str]:
@@ -199,15 +190,6 @@ def counts(rows: Iterable[Row]) -> dict[str, int]:
     outcomes = [row.outcome for row in rows]
     order = [*(verdict.value for verdict in Verdict), FAILED, MISSING]
     return {outcome: outcomes.count(outcome) for outcome in order if outcome in outcomes}
-
-
-def summary(rows: Iterable[Row]) -> dict[Place, dict[str, int]]:
-    """Count the outcomes section by section, in reading order."""
-    sections: dict[Place, list[Row]] = {}
-    for row in in_reading_order(rows):
-        place = Place(row.statement.document, row.statement.chapter, row.statement.section)
-        sections.setdefault(place, []).append(row)
-    return {place: counts(inside) for place, inside in sections.items()}
 
 
 def in_reading_order(rows: Iterable[Row]) -> tuple[Row, ...]:

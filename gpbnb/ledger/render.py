@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterable
 
 from gpbnb.display.tables import Table, one_line
-from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order, summary
+from gpbnb.ledger.checking import FAILED, MISSING, Row, counts, in_reading_order
 from gpbnb.ledger.statements import Statement
 
 COLUMNS = ("id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note")
@@ -69,24 +69,6 @@ def table(rows: Iterable[Row]) -> Table:
         for row in rows
     )
     return Table(_title(rows), ("Item", "Verdict", "Printed", "Recomputed", "Note"), body)
-
-
-def summary_table(rows: Iterable[Row]) -> Table:
-    """Tabulate the counts of `rows`: a line a section, a column an outcome that occurs, and the sums."""
-    rows = tuple(rows)
-    total = counts(rows)
-    body = [
-        (
-            place.document,
-            section_name(place.chapter, place.section),
-            *(str(inside.get(outcome, 0)) for outcome in total),
-            str(sum(inside.values())),
-        )
-        for place, inside in summary(rows).items()
-    ]
-    body.append(("all", "", *map(str, total.values()), str(len(rows))))
-    header = ("Document", "Section", *(outcome_name(outcome) for outcome in total), "statements")
-    return Table(f"{_title(rows)}; by section", header, tuple(body))
 
 
 def describe(counted: dict[str, int]) -> str:

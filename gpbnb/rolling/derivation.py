@@ -29,12 +29,12 @@ def one_dimension() -> Derivation:
     return Derivation(
         (
             Step(
-                "(3), first against last line; the middle one lacks $\\cos\\omega_rt$",
+                "(3), the first and last lines agree; the middle line lacks $\\cos\\omega_rt$",
                 unevaluated(rolled) * unevaluated(sp.cos(phi + THETA)),
                 SIGNAL * sp.cos(THETA) / 2 + SIGNAL * sp.cos(2 * phi + THETA) / 2 + NOISE * sp.cos(phi + THETA),
             ),
             Step(
-                "(4), the mean of the signal's part over a turn",
+                "(4), the mean of the signal over a turn",
                 sp.Integral(SIGNAL * sp.cos(phi) * sp.cos(phi + THETA), (TIME, 0, 2 * sp.pi / ROLL))
                 * ROLL
                 / (2 * sp.pi),
@@ -67,10 +67,10 @@ def two_dimensions() -> Derivation:
                 SX + (deroll(phi) * sp.Matrix([N1, N2]))[0],
             ),
             Step("(7), $s_4$", ideal[1], SY + (deroll(phi) * sp.Matrix([N1, N2]))[1]),
-            Step("a phase error, $s_3$: the other drift comes in", off[0], SX * sp.cos(THETA) - SY * sp.sin(THETA)),
+            Step("a phase error, $s_3$: the other drift appears", off[0], SX * sp.cos(THETA) - SY * sp.sin(THETA)),
             Step("the same, $s_4$", off[1], SX * sp.sin(THETA) + SY * sp.cos(THETA)),
             Step(
-                "readouts of unequal gain, $1\\pm e/2$: the term at twice the roll frequency is back",
+                "readouts of unequal gain, $1\\pm e/2$: the term at twice the roll frequency returns",
                 unequal[0],
                 SX + e / 2 * (SX * sp.cos(2 * phi) + SY * sp.sin(2 * phi)),
             ),
@@ -91,7 +91,7 @@ def fits() -> Derivation:
     on_white = sp.Integral(12 * ((1 - v) + w - sp.Rational(1, 2)) / sp.sqrt(sp.pi * w), (w, 0, v))
     return Derivation(
         (
-            Step("a ramp $kt$ has the slope $k$", sp.Integral(c * k * TIME, (TIME, 0, T)), k),
+            Step("a fitted ramp $kt$ has the slope $k$", sp.Integral(c * k * TIME, (TIME, 0, T)), k),
             Step(
                 "off-tuned by $\\Delta$, the drift across is $kt\\cdot\\Delta t$ to first order",
                 sp.Integral(c * k * OFF * TIME**2, (TIME, 0, T)),
@@ -135,23 +135,23 @@ def filters() -> Derivation:
             Step("moving average: it lags by half its length", sp.Integral(s / length, (s, 0, length)), length / 2),
             Step("moving average: noise bandwidth", sp.Integral(1 / length**2, (s, 0, length)) / 2, 1 / (2 * length)),
             Step(
-                "so lag and noise of the single pole, by its bandwidth",
+                "single pole: lag and noise against its bandwidth",
                 (k * tau) ** 2 + n0 / (4 * tau),
                 error.subs(b, unevaluated(1 / (4 * tau))),
             ),
             Step(
-                "and of the moving average: the same function",
+                "moving average: the same function",
                 (k * length / 2) ** 2 + n0 / (2 * length),
                 error.subs(b, unevaluated(1 / (2 * length))),
             ),
             Step(
-                "never less than at $B=B_0$, where $k^2 = 8N_0B_0^3$",
+                "never smaller than at $B=B_0$, where $k^2 = 8N_0B_0^3$",
                 error.subs(k, sp.sqrt(8 * n0 * least**3)),
                 sp.Rational(3, 2) * n0 * least,
                 n0 * (b - least) ** 2 * (2 * b + least) / (2 * b**2),
             ),
             Step(
-                "which is",
+                "the least mean square error",
                 sp.Rational(3, 2) * n0 * unevaluated(sp.cbrt(k**2 / (8 * n0))),
                 sp.Rational(3, 4) * sp.cbrt(k * n0) ** 2,
             ),
@@ -200,7 +200,7 @@ def roll_rate() -> Derivation:
     a, w, b = sp.symbols("a Omega beta", positive=True)
     return Derivation(
         (
-            Step("what a step of the rate at $u$ does to the fit", free, (1 - u) * (1 - u**3)),
+            Step("effect of a step of the rate at $u$ on the fit", free, (1 - u) * (1 - u**3)),
             Step(
                 "without resets",
                 k**2 * q * sp.Integral(sp.expand(free.doit() ** 2), (u, 0, 1)),

@@ -1,4 +1,4 @@
-"""Rounded rotations, emulated digit by digit: by recursion, and each angle on its own."""
+"""Rounded rotations, emulated digit by digit: recursively, and directly from each angle."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gpbnb.rolling.theory import INTERVAL
 
 
 def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
-    """What the register of a format does to ω_r = 2π/T: the rounded less the true, rad/s."""
+    """Rounding error of ω_r = 2π/T in a register: the rounded less the true rate, rad/s."""
     rate = theory.roll_rate(period)
     return float(fmt.round(rate) - rate)
 
@@ -103,7 +103,7 @@ def recursion(
     steps: Sequence[int],
     interval: float = INTERVAL,
 ) -> Rotation:
-    """Rotate by one sample's angle again and again, with every operation rounded: the deroll of (7), recursively.
+    """Rotate by the angle of one sample repeatedly, with every operation rounded: the recursive deroll of (7).
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def recursion(
 
 
 def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
-    """Cosine and sine of the product of a rounded roll rate and a rounded time, each rounded: in any format."""
+    """Compute cosine and sine of a rounded roll rate times a rounded time, each rounded to a format."""
     marks = np.asarray(steps, dtype=np.int64)
     rate = fmt.array(theory.roll_rate(period))
     values = []
@@ -149,7 +149,7 @@ def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: floa
 def digits_needed_observed(
     method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
 ) -> int:
-    """Smallest precision with which a year's deroll of a drift stays within `error` mas.
+    """Find the smallest precision with which a year's deroll of a drift stays within `error` mas.
 
     Found by :func:`gpbnb.arithmetic.search.smallest_precision` up to what the bound proves to be enough.
 

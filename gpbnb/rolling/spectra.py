@@ -148,7 +148,7 @@ def spectra(
     offsets: int = 25,
     bands: int = 40,
 ) -> Spectra:
-    """Simulate what Figures III-1 and III-3 sketch: a drift along x, and noise of gyros with two readouts each.
+    """Simulate Figures III-1 and III-3: a drift along x, and the noise of gyros with two readouts each.
 
     The record is a whole number of turns.
     """
@@ -197,7 +197,7 @@ def derolled_record(
     interval: float = INTERVAL,
     phase_error: Callable[[Any], Any] | None = None,
 ) -> dict[str, NDArray[np.complex128]]:
-    """One gyro with two readouts through (5)-(7), x and y as real and imaginary part.
+    """Simulate one gyro with two readouts through (5)-(7), with x and y as real and imaginary part.
 
     Parameters
     ----------

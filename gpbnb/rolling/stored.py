@@ -1,4 +1,4 @@
-"""The stored survey of drift rates as a sweep, which can be computed again and verified."""
+"""The stored survey of drift rates as a sweep, which can be recomputed and verified."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gpbnb.sweeps import Sweep
 
 
 def compute(gyros: int, directory: Path | None = None) -> list[tuple[str, ...]]:
-    """Simulate the years of so many gyros; each has the same noise whatever the number."""
+    """Simulate a year for each of several gyros; the noise of each does not depend on their number."""
     study = experiment.drift_rates(
         experiment.SURVEY_PERIODS, gyros, experiment.survey_rng(), progress=directory is not None
     )

@@ -12,7 +12,7 @@ from gpbnb.rolling import experiment, theory
 
 
 def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
-    """What rounding ω_r costs in a year: worst case, then as it is."""
+    """Tabulate the cost of rounding ω_r in a year: in the worst case, and as it rounds."""
     body = []
     for fmt in formats:
         for case, error in (
@@ -43,7 +43,7 @@ def _small(value: float) -> str:
 
 
 def phase_costs(angles: Mapping[str, float], drift: tuple[float, float] = theory.DRIFTS) -> Table:
-    """Cost of a constant phase error: share of power in one dimension, error of both drifts in two."""
+    """Tabulate the cost of a constant phase error: lost power in one dimension, error of both drifts in two."""
     body = []
     for name, angle in angles.items():
         x, y = theory.phase_error_cost(drift, angle)
@@ -53,7 +53,7 @@ def phase_costs(angles: Mapping[str, float], drift: tuple[float, float] = theory
 
 
 def drift_errors(study: experiment.DriftStudy) -> Table:
-    """Standard errors of drift, simulated and in closed form; and what rolling buys."""
+    """Tabulate standard errors of a drift, simulated and in closed form, and the gain of rolling."""
     found = study.standard_error()
     duration = study.samples * study.interval
     plain = theory.drift_error_unrolled(study.level, duration, at_rest=True)
@@ -101,7 +101,7 @@ def filters(
 def needed(
     periods: Sequence[float], bases: Sequence[int], drift: float, steps: Sequence[int], error: float = 1.0
 ) -> Table:
-    """Digits with which a year's deroll of a drift stays within an error in mas: observed, and by the bound."""
+    """Tabulate the digits that keep a year's deroll of a drift within an error in mas: observed, and by the bound."""
     body = []
     duration = steps[-1] * theory.INTERVAL
     limit = error / (drift * duration / YEAR)

@@ -1,4 +1,4 @@
-r"""What may happen: closed forms of rolling, 1/f noise, filters, an uneven roll rate and rounded rotations.
+r"""Theory: closed forms for rolling, 1/f noise, filters, an uneven roll rate and rounded rotations.
 
 Times are in seconds, angles of roll in radians, angles of the gyro in milliarcseconds (mas), drift rates in mas a year.
 The 1/f noise has the one-sided power spectral density `level` / f, in mas² a hertz; `level` is in mas². A pair
@@ -69,7 +69,7 @@ def phase_error_cost(drift: tuple[float, float], phase: float) -> NDArray[np.flo
 
 
 def largest_phase(drift: tuple[float, float], error: float) -> float:
-    """The constant phase error, in rad, at which the drift vector is off by `error`; both in one unit."""
+    """Constant phase error, in rad, that changes the drift vector by `error`; both in the same unit."""
     size = math.hypot(*drift)
     if not 0 < error <= 2 * size:
         raise ValueError(f"got an error of {error} for a drift of {size:g}; needed 0 < error <= {2 * size:g}")
@@ -79,7 +79,7 @@ def largest_phase(drift: tuple[float, float], error: float) -> float:
 def fitted_drift(
     drift: tuple[float, float], phase: Callable[[Any], Any], duration: float = YEAR
 ) -> NDArray[np.float64]:
-    r"""Drifts that a straight line, fitted by least squares, finds in a ramp derolled with a moving phase error.
+    r"""Drifts that a least-squares line finds in a ramp derolled with a varying phase error.
 
     .. math:: \frac{12}{T^3}\int_0^T \Bigl(t-\frac T2\Bigr)\, z t\, e^{i\psi(t)}\, dt
 
@@ -106,7 +106,7 @@ def fitted_drift(
 
 
 def roll_rate(period: float) -> Fraction:
-    """ω_r = 2π/T in rad/s, to 60 digits; the period is taken at its exact binary value."""
+    """ω_r = 2π/T in rad/s, to 60 digits, from the exact binary value of the period."""
     if not (period > 0 and math.isfinite(period)):
         raise ValueError(f"got a roll period of {period} s; needed a positive number; leave rolling out for none")
     with mpmath.workdps(80):
@@ -115,7 +115,7 @@ def roll_rate(period: float) -> Fraction:
 
 
 def worst_rate_error(period: float, fmt: FloatFormat) -> Fraction:
-    """Bound of the error of ω_r in a register, rad/s: half a unit of its last digit, or a whole one if chopped.
+    """Bound on the error of ω_r in a register, rad/s: half a unit in the last place, or a whole unit if chopped.
 
     References
     ----------
@@ -131,7 +131,7 @@ def off_tuned_loss(rate_error: float, duration: float = YEAR) -> float:
 
 
 def off_tuned_drift(drift: float, rate_error: float, duration: float = YEAR) -> float:
-    r"""Drift that a constant frequency error makes across a drift k in two dimensions, about :math:`k\,\Delta\omega T`.
+    r"""False drift across a drift k from a constant frequency error in two dimensions, about :math:`k\,\Delta\omega T`.
 
     In the unit of `drift`; `rate_error` in rad/s.
     """
@@ -142,7 +142,7 @@ def off_tuned_drift(drift: float, rate_error: float, duration: float = YEAR) -> 
 
 
 def printed_ramp_density(drift: float, frequency: Any) -> NDArray[np.float64]:
-    r"""As printed, :math:`k^2/\omega^4`, with k in mas/s; hung1984, ch. III, section 5."""
+    r"""Density of a drift as printed, :math:`k^2/\omega^4`, with k in mas/s; hung1984, ch. III, section 5."""
     return np.asarray((drift / YEAR) ** 2 / (2 * np.pi * np.asarray(frequency, dtype=np.float64)) ** 4)
 
 
@@ -167,7 +167,7 @@ def ramp_density(drift: float, duration: float, frequency: Any) -> NDArray[np.fl
 
 
 def flicker_density(level: float, frequency: Any, interval: float | None = None) -> NDArray[np.float64]:
-    r"""One-sided density of the noise, level/f; of its samples, with `interval`, as generated.
+    r"""One-sided density of the noise, level/f; with `interval`, the density of its samples as generated.
 
     .. math:: \frac{A}{f}, \qquad \frac{\pi A\,\Delta t}{|\sin \pi f \Delta t|}
 
@@ -245,7 +245,7 @@ def slope_weights(samples: int, interval: float = INTERVAL) -> NDArray[np.float6
 
 
 def drift_error(level: float, samples: int, period: float | None = None, interval: float = INTERVAL) -> float:
-    """Standard error of a fitted drift rate, in mas a year: exactly, of samples of the noise that starts at rest.
+    """Exact standard error of a fitted drift rate, in mas a year, for sampled noise that starts at rest.
 
     Parameters
     ----------
@@ -261,7 +261,7 @@ def drift_error(level: float, samples: int, period: float | None = None, interva
 
 
 def drift_error_unrolled(level: float, duration: float = YEAR, at_rest: bool = False) -> float:
-    r"""The same without rolling, of continuous 1/f noise: :math:`3\sqrt A/T`, whatever the sampling; mas a year.
+    r"""Standard error of a drift without rolling, for continuous 1/f noise: :math:`3\sqrt A/T`; mas a year.
 
     .. math:: \sigma^2 = \int_0^\infty \frac Af\, \frac{36}{T^2}\, j_1(\pi f T)^2\, df
         = \frac{36A}{T^2}\cdot\frac14
@@ -276,7 +276,7 @@ def drift_error_unrolled(level: float, duration: float = YEAR, at_rest: bool = F
 
 
 def drift_error_rolled(level: float, period: float, duration: float = YEAR, interval: float | None = None) -> float:
-    r"""The same with rolling, for many turns: :math:`\sqrt{6 S(f_r)/T^3}`, that of white noise; mas a year.
+    r"""Standard error of a drift with many turns, as for white noise: :math:`\sqrt{6 S(f_r)/T^3}`; mas a year.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def drift_error_rolled(level: float, period: float, duration: float = YEAR, inte
 
 
 def rolling_gain(period: float, duration: float = YEAR) -> float:
-    r"""How much smaller rolling makes the standard error of drift, :math:`\sqrt{3T/(2T_r)}`."""
+    r"""Factor by which rolling reduces the standard error of a drift, :math:`\sqrt{3T/(2T_r)}`."""
     return math.sqrt(1.5 * duration / period)
 
 
@@ -326,7 +326,7 @@ def filter_gain(weights: Any, frequency: Any, interval: float = INTERVAL) -> NDA
 
 
 def filter_lag(weights: Any, interval: float = INTERVAL) -> float:
-    """How long, in s, a filter is behind a ramp."""
+    """Time, in s, by which a filter lags behind a ramp."""
     return float(np.sum(np.arange(len(weights)) * np.asarray(weights)) * interval)
 
 
@@ -349,7 +349,7 @@ def filtered_variance(
 
 
 def filtered_error(drift: float, density: float, bandwidth: Any) -> NDArray[np.float64]:
-    r"""Mean square error of a ramp behind a low-pass filter, in mas²: lag and noise.
+    r"""Mean square error of a ramp after a low-pass filter, in mas²: lag and noise.
 
     .. math:: \frac{k^2}{16B^2} + N_0 B
 
@@ -367,7 +367,7 @@ def filtered_error(drift: float, density: float, bandwidth: Any) -> NDArray[np.f
 
 
 def best_bandwidth(drift: float, density: float) -> float:
-    r"""The noise bandwidth of the least error, :math:`B = \sqrt[3]{k^2/(8N_0)}`, in Hz.
+    r"""Noise bandwidth with the least error, :math:`B = \sqrt[3]{k^2/(8N_0)}`, in Hz.
 
     The error is then :math:`\tfrac34 (k N_0)^{2/3}`, two thirds of it noise.
     """
@@ -380,7 +380,7 @@ def signal_to_noise(drift: float, duration: float, error: Any) -> NDArray[np.flo
 
 
 def pedestal(weights: Any, level: float, samples: int, period: float, interval: float = INTERVAL) -> float:
-    r"""Power of the slow noise that derolling moves to the roll frequency, behind a filter: mas², about.
+    r"""Approximate power, after a filter, of the slow noise that derolling moves to the roll frequency, in mas².
 
     .. math:: |H(f_r)|^2\, \pi A \sum_{k<n} h_k^2
 
@@ -391,7 +391,7 @@ def pedestal(weights: Any, level: float, samples: int, period: float, interval: 
 
 
 def image_in_fit(drift: float, period: float, samples: int, interval: float = INTERVAL) -> float:
-    r"""What the term at twice the roll frequency, of (3), adds to a drift fitted over whole turns; mas a year.
+    r"""Error of a drift fitted over whole turns due to the term of (3) at twice the roll frequency; mas a year.
 
     .. math:: \frac{12k}{n(n^2-1)}\Bigl[\frac{n}{2\sin^2(\omega_r\Delta t)} - \frac{n(n+1)}{4}\Bigr]
 
@@ -454,7 +454,7 @@ def rate_sine_error(drift: float, amplitude: float, period: float, reset: float 
 
 
 def recursion_bound(steps: int, beta: Fraction) -> float:
-    r"""Bound of the error of n rotations by one rounded angle, each rounded; to every order.
+    r"""Strict bound on the error of n rotations by one rounded angle, each rounded.
 
     .. math:: |\hat z_n - e^{in\delta}| \le \bigl[(1+\beta)(1+\sqrt2\,\gamma_2)\bigr]^n - 1
         \approx (1 + 2\sqrt2)\, n\beta
@@ -471,7 +471,7 @@ def recursion_bound(steps: int, beta: Fraction) -> float:
 
 
 def direct_bound(phase: float, beta: Fraction) -> float:
-    r"""Bound of the error of cosine and sine of a rounded product, :math:`\omega t\,\gamma_3 + \beta`.
+    r"""Bound on the error of cosine and sine of a rounded product, :math:`\omega t\,\gamma_3 + \beta`.
 
     The rate, the time and their product are rounded, and then cosine and sine.
     """
@@ -488,7 +488,7 @@ def rotation_bound(method: str, period: float, steps: int, interval: float = INT
 
 
 def digits_needed(bound: Callable[[Fraction], float], base: int, largest: float) -> int:
-    """The least precision at which a bound, a function of the unit roundoff, is no larger than `largest`."""
+    """Least precision at which a bound, given as a function of the unit roundoff, is at most `largest`."""
 
     def meets(fmt: FloatFormat) -> bool:
         return 3 * fmt.unit_roundoff < 1 and bound(fmt.unit_roundoff) <= largest

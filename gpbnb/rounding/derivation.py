@@ -1,4 +1,4 @@
-"""The algebra of hung1984, ch. II, sections 3-9, derived again; for general n by induction.
+"""The algebra of hung1984, ch. II, sections 3-9, re-derived; for general n by induction.
 
 The documents drop every product of two rounding errors. A bound for general n is proved from its
 recurrence: one more operation multiplies what is there by 1 + ε, and adds its own.
@@ -20,7 +20,7 @@ N, M, J, K = sp.symbols("n m j k", integer=True, positive=True)
 
 
 def one_rounding() -> Derivation:
-    """From (2) to the unit roundoffs (8) and (13), and the sharper bound of rounding to nearest.
+    """Derive the unit roundoffs (8) and (13) from (2), and the sharper bound for rounding to nearest.
 
     With x = (u + v/b^t) b^e the relative error is largest where u is smallest, u = 1/b: there,
     rounding drops v < 1/2 or adds 1 - v <= 1/2; chopping drops v < 1.
@@ -33,7 +33,7 @@ def one_rounding() -> Derivation:
     half = b ** (e - t) / 2
     return Derivation(
         (
-            Step("(8): the bound (5) over the least $|x|$ of (6)", over(half, smallest), unit),
+            Step("(8): bound (5) divided by the smallest $|x|$ of (6)", over(half, smallest), unit),
             Step("(13): the same for chopping", over(b ** (e - t), smallest), b ** (1 - t)),
             Step("(14): chopping doubles the unit roundoff, in any base", over(b ** (1 - t), unit), sp.Integer(2)),
             Step(
@@ -49,7 +49,7 @@ def one_rounding() -> Derivation:
 
 
 def rounded_sum(n: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...], tuple[sp.Symbol, ...]]:
-    """The computed sum of n terms with an error at each addition, the terms, and the errors."""
+    """Computed sum of n terms with an error in each addition, with its terms and errors."""
     x, eps = sp.symbols(f"x_1:{n + 1}"), errors(n - 1)
     total: sp.Expr = x[0]
     for term, e in zip(x[1:], eps, strict=True):
@@ -71,7 +71,7 @@ def printed_sum_error(n: int) -> sp.Expr:
 
 
 def sums() -> Derivation:
-    """Bounds of a sum of n terms, by induction over n."""
+    """Derive the bounds for a sum of n terms, by induction over n."""
     first, later = N - 1, N + 1 - J
     return Derivation(
         (
@@ -92,7 +92,7 @@ def sums() -> Derivation:
                 sp.Integer(1),
             ),
             Step(
-                "(18), first inequality: what $x_j$ lacks of weight $n-1$",
+                "(18), first inequality: the difference between the weight of $x_j$ and $n-1$",
                 first,
                 together(later, J - 2),
             ),
@@ -125,7 +125,7 @@ def ties() -> Derivation:
 
 
 def tie_sum_ratio() -> sp.Expr:
-    """The right side of :func:`ties`."""
+    """Right-hand side of :func:`ties`."""
     return 1 / (1 - (N - 4) * BETA / 2)
 
 
@@ -133,7 +133,7 @@ def tie_sum_ratio() -> sp.Expr:
 
 
 def roundings() -> Derivation:
-    r"""k roundings on top of each other, :math:`\prod(1+\epsilon_i) - 1`, to every order."""
+    r"""Derive strict bounds for k roundings in sequence, :math:`\prod(1+\epsilon_i) - 1`."""
     j = sp.Symbol("j", integer=True, positive=True)
     growth = (1 + BETA / (1 + BETA)) ** K
     return Derivation(
@@ -178,7 +178,7 @@ def roundings() -> Derivation:
 
 
 def product_operations() -> sp.Expr:
-    """Roundings of a product of n factors over a product of m divisors, one division each: n + m - 1."""
+    """Number of roundings of n factors over m divisors, with one division for each divisor: n + m - 1."""
     return sp.expand((N - 1) + M)
 
 
@@ -193,7 +193,7 @@ def quotient_error(n: int, m: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...]]:
 
 
 def matrix_sums() -> Derivation:
-    r"""The rounded sum of two matrices: (15) for each entry, summed over the largest column.
+    r"""Derive the bound for the sum of two matrices: (15) for each entry, summed over the largest column.
 
     For an entry with :math:`c = |a_{ij}+b_{ij}|`, let :math:`|\epsilon_{ij}| = \beta - w`, w ≥ 0.
     """
@@ -201,7 +201,7 @@ def matrix_sums() -> Derivation:
     return Derivation(
         (
             Step(
-                "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, without anything left out",
+                "(24) for one entry, $|r_{ij}| = c\\,(\\beta - w)$, with no term left out",
                 BETA * c,
                 unevaluated(c) * unevaluated(BETA - w),
                 c * w,
@@ -239,14 +239,14 @@ def roundings_of(error: sp.Expr, term: sp.Expr, eps: Sequence[sp.Symbol]) -> int
 
 
 def dots() -> Derivation:
-    """Weights of an inner product of n: those of a sum, and one for the product itself."""
+    """Derive the weights of an inner product of n terms: those of a sum, plus one for the product itself."""
     error, products, eps = dot_error(3)
     e1, e2, e3, e4, e5 = eps
     printed = products[0] * (e1 + e3 + e5) + products[1] * (e2 + e3 + e5) + products[2] * (e4 + e5)
     return Derivation(
         (
             Step("three products, as printed before (26)", error, printed),
-            Step("(26), weight of $a_1 b_1$: a sum's, and one", N, together(N - 1, 1)),
+            Step("(26), weight of $a_1 b_1$: the weight in a sum, plus one", N, together(N - 1, 1)),
             Step("(26), weight of $a_j b_j$, $j \\ge 2$: the same", N + 2 - J, together(N + 1 - J, 1)),
             Step(
                 "no weight is above $n$, written with $j = k + 1$",
@@ -262,7 +262,7 @@ def dots() -> Derivation:
 
 
 def chains() -> Derivation:
-    r"""Norm of the error of a chain, relative to :math:`\prod\|M_j\|`, by induction.
+    r"""Derive the norm of the error of a chain, relative to :math:`\prod\|M_j\|`, by induction.
 
     Step i multiplies the error so far by M_{i+1} and adds the error of this product, at most
     d_i β times the norm of what was computed.
@@ -291,7 +291,7 @@ def chain_shortcut() -> sp.Expr:
 
 
 def examples() -> Derivation:
-    """R = ABC + D with the chain's error E: the addition rounds ABC + D, and E is not part of ABC."""
+    """Derive the error of R = ABC + D, where the product ABC has the error E."""
     abc, d, e, eps = sp.symbols("P D E epsilon")
     return Derivation(
         (

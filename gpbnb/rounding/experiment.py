@@ -390,7 +390,7 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
 
 
 def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: bool = False) -> Trial:
-    """Find the terms that bring the error of a sum nearest to its first-order bound, or beyond.
+    """Find the terms for which the error of a sum comes nearest to its first-order bound, or exceeds it most.
 
     Looks at every sequence of zeros and of terms ``±m * base**e`` with e in `exponents`, by
     dynamic programming over partial sums; the ratio of the error to the bound, "weights" or (26),

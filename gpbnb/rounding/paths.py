@@ -26,7 +26,7 @@ def exact_terms(fmt: FloatFormat, exponents: Sequence[int], products: bool) -> d
 
 
 def sum_table(choices: FloatArray, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Tabulate the partial sum that each addition leads to, and the error of the addition.
+    """Tabulate the result and the error of each addition to a partial sum.
 
     Row 0 is the empty sum. Partial sums that only the last addition reaches have no row.
     """

@@ -11,7 +11,7 @@ from gpbnb.rounding.experiment import Trial, bound_statistics
 
 
 def bound_statistics_table(trials: Mapping[str, Sequence[Trial]]) -> Table:
-    """Violations and ratios of every bound, a line each, by sort of computation."""
+    """Tabulate violations and ratios of every bound, one line each, by kind of computation."""
     body = [
         (
             sort,
@@ -29,7 +29,7 @@ def bound_statistics_table(trials: Mapping[str, Sequence[Trial]]) -> Table:
 
 
 def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
-    """Single computations digit by digit: operands, computed and true result, error over each bound."""
+    """Tabulate single computations: operands, computed and true result, error over each bound."""
     body = [
         (
             name,

@@ -1,4 +1,4 @@
-"""What may happen: bounds of the errors of sums, products, inner and matrix products.
+"""Theory: bounds on the errors of sums, products, inner products and matrix products.
 
 Bounds named ``printed_…`` are those of the documents; the others are derived in
 :mod:`gpbnb.rounding.derivation`. ``beta`` is the unit roundoff β, ``FloatFormat.unit_roundoff``.
@@ -10,6 +10,7 @@ A bound of first order leaves out terms in β²; a strict one, made of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -72,6 +73,8 @@ def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
     ----------
     Higham 2002, Lemma 3.1, term by term.
     """
+    if (found := _strict_bound_of_floats(x, beta)) is not None:
+        return found
     terms = _vector(x)
     return sum(
         (gamma(w, beta) * abs(term) for w, term in zip(sum_weights(len(terms)), terms, strict=True)),
@@ -79,8 +82,32 @@ def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
     )
 
 
+MANY_TERMS = 1000
+"""Above as many float64 terms, the strict bound is itself computed in float64 and rounded up."""
+
+
+def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
+    """The strict bound of many float64 terms, at most 2**-45 of itself above; None for others, to be summed exactly.
+
+    The exact sum has a denominator of millions of digits. Here each factor and product is off by less than 2**-50,
+    their sum is correctly rounded, and the result is raised by more than all of that.
+    """
+    if not isinstance(x, np.ndarray) or x.dtype != np.float64 or x.ndim != 1 or len(x) <= MANY_TERMS:
+        return None
+    size = np.abs(x)
+    if not np.isfinite(size).all() or (size[size > 0] < 1e-250).any() or (size > 1e250).any():
+        return None
+    gamma(len(x) - 1, beta)  # refuses too many roundings
+    unit = float(beta)
+    if Fraction(unit) != beta or unit * len(x) > 0.5:
+        return None
+    weights = np.array(sum_weights(len(x)), dtype=np.float64)
+    total = math.fsum((weights * unit / (1 - weights * unit) * size).tolist())
+    return Fraction(total) * (1 + Fraction(1, 2**46))
+
+
 def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> float:
-    r"""Bound of the error of a sum of n, as a multiple of :math:`\sum_j |x_j|`, of size √n β.
+    r"""Bound on the error of a sum of n terms, as a multiple of :math:`\sum_j |x_j|`, of size √n β.
 
     It fails with at most the probability `failure` if roundings are independent with mean zero:
     each of the n terms, of at most n - 1 roundings, may take its share of it.
@@ -146,7 +173,7 @@ def strict_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 
 
 def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
-    r"""Bound of the relative error of an inner product, which the documents leave out.
+    r"""Bound on the relative error of an inner product, which the documents omit.
 
     .. math:: \frac{|\tilde I|}{|I|} \le
         \gamma_n \frac{|a|^T|b|}{|a^Tb|}

@@ -10,16 +10,17 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, STRICT, label, legend, line_styles
+from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, REFUTED, STRICT, label, legend, line_styles
 from gpbnb.wordlength.examples import STANDARD
 
-#: The looks of each kind of answer, as an emulation observes and a bound bounds; open markers are of (125).
+#: The looks of each kind of answer, as an emulation observes and a bound bounds. Open markers, in the colour of refuted
+#: formulas, are of (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
     "bound": ("|", BOUND, BOUND),
     "theory": ("D", STRICT, STRICT),
-    "printed": ("o", BOUND, "none"),
-    "corrected": ("s", STRICT, "none"),
+    "printed": ("o", REFUTED, "none"),
+    "corrected": ("s", REFUTED, "none"),
 }
 Curve = Sequence[tuple[int, float]]
 
@@ -32,7 +33,8 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
         if low <= fmt.precision <= high:
             draw = ax.axvline if upright else ax.axhline
             artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
-            x, y = (fmt.precision, 1.0) if upright else (1.0, fmt.precision)
+            above = 1.035 if name == "binary32" else 1.0  # beside binary16, whose name would touch it
+            x, y = (fmt.precision, above) if upright else (1.0, fmt.precision)
             transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
             side: Any = "center" if upright else "right"
             artists.append(
@@ -64,7 +66,8 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
     for (name, curve), (marker, colour) in zip(points.items(), line_styles(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
     for (name, curve), style in zip(lines.items(), ("-", "--", "-.", ":"), strict=False):
-        artists += ax.plot(*zip(*curve, strict=True), style, color=BOUND, label=name)
+        colour = REFUTED if name.startswith("(125)") else BOUND
+        artists += ax.plot(*zip(*curve, strict=True), style, color=colour, label=name)
     ax.set_xscale("log")
     artists += standards(ax, upright=False)
     legend(ax, fontsize=8.5)
@@ -103,4 +106,39 @@ def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
     artists += standards(ax)
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     ax.set_xlabel("bits")
+    return artists
+
+
+def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axes) -> list[Artist]:
+    """Errors of several ways to compute over that of the first way, a line a way; a refused one is not drawn."""
+    artists: list[Artist] = []
+    for (label_, values), (marker, colour) in zip(errors.items(), line_styles(len(errors), "osD^"), strict=True):
+        points = [(value / values[0], y) for y, value in enumerate(values) if math.isfinite(value)]
+        artists += ax.plot(*zip(*points, strict=True), marker, color=colour, mfc="none", label=label_)
+    ax.axvline(1, color=REFERENCE, lw=0.8)
+    ax.set_xscale("log")
+    ax.set_yticks(range(len(names)), names)
+    ax.invert_yaxis()
+    ax.set_xlabel("error over that of the first way")
+    legend(ax, loc="upper center", bbox_to_anchor=(0.3, -0.18), ncols=2)
+    return artists
+
+
+def bands(found: Mapping[str, Sequence[tuple[int, Sequence[float]]]], ax: Axes, share: float = 0.9) -> list[Artist]:
+    """Median, a central share and the largest of many records' errors over the tolerance, against the bits."""
+    artists: list[Artist] = []
+    low, high = (1 - share) / 2, (1 + share) / 2
+    for (name, points), (_, colour) in zip(found.items(), line_styles(len(found)), strict=True):
+        bits = [t for t, _ in points]
+        below, middle, above, most = np.array([np.quantile(each, (low, 0.5, high, 1)) for _, each in points]).T
+        artists.append(
+            ax.fill_between(bits, below, above, color=colour, alpha=0.3, lw=0, label=f"{share:.0%} of records")
+        )
+        artists += ax.plot(bits, middle, "-", color=colour, label=f"{name}: median")
+        artists += ax.plot(bits, most, ":", color=colour, label="the worst record")
+    artists.append(ax.axhline(1, color=REFERENCE, ls="--", lw=1.0))
+    ax.annotate("tolerance", (1, 1), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=REFERENCE)
+    ax.set_yscale("log")
+    legend(ax, loc="lower left")
+    label(ax, "bits", "largest error over the tolerance")
     return artists

@@ -35,7 +35,6 @@ from gpbnb.kalman.model import LinearModel
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
-_HALF = (Rounding.NEAREST, Rounding.EVEN)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,13 +167,21 @@ def guaranteed(
     ------
     ValueError : the filter is not stable.
     """
+    return bound_per_unit(given, coefficient_bits, wide) * (largest_rounding(fmt.rounding) * float(fmt.unit))
+
+
+def largest_rounding(rounding: Rounding) -> float:
+    """How large a rounding error gets, in units of the last bit."""
+    return 0.5 if rounding in (Rounding.NEAREST, Rounding.EVEN) else 1.0
+
+
+def bound_per_unit(given: ScaledFilter, coefficient_bits: int = 15, wide: bool = False) -> NDArray[np.float64]:
+    """The bound of :func:`guaranteed` if each rounding errs by at most one; it is proportional to that."""
     program = given.filter.program
     coefficients = stored_coefficients(given.filter, coefficient_bits)
     A, _ = _state_space(program, coefficients)
-    G = _effects(program, coefficients, wide)
-    each = _peak_sums(A, G)
-    share = Fraction(1, 2) if fmt.rounding in _HALF else Fraction(1)
-    return np.asarray(each * float(share * fmt.unit) * 2.0 ** given.state.astype(float))
+    sums = _peak_sums(A, _effects(program, coefficients, wide))
+    return np.asarray(sums * 2.0 ** given.state.astype(float))
 
 
 def required_fraction_bits(
@@ -208,9 +215,9 @@ def required_fraction_bits(
         fmt = FixedFormat(before, fraction, rounding)
         try:
             if basis == "guarantee":
-                if bound is None:  # proportional to the unit
-                    bound = guaranteed(given, fmt, coefficient_bits, wide) / float(fmt.unit)
-                error = bound * float(fmt.unit)
+                if bound is None:
+                    bound = bound_per_unit(given, coefficient_bits, wide)
+                error = bound * (float(fmt.unit) * largest_rounding(rounding))
             else:
                 error = abs(emulated(given, z, fmt, coefficient_bits, wide)).max(axis=0)
             ratio = float((error[asked] / goal[asked]).max())

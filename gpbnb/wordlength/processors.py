@@ -209,3 +209,16 @@ def compensated_sum(x: FloatArray) -> NDArray[np.float64]:
         new = total + d
         carried, total = (new - total) - d, new
     return np.asarray(total.to_float())
+
+
+def increments(samples: int, paths: int, seed: int = 0) -> NDArray[np.float64]:
+    """Angles that a gyroscope adds in each step, (samples, paths): 1 °/s rms, 50 Hz bandwidth, 1024 samples a second.
+
+    Each is the product of half the period and the sum of two samples of a Gauss-Markov process.
+    """
+    rate, rng = 1024.0, np.random.default_rng(seed)
+    keep = math.exp(-2 * math.pi * 50 / rate)
+    x = rng.standard_normal((samples + 1, paths))
+    for k in range(1, samples + 1):
+        x[k] = keep * x[k - 1] + math.sqrt(1 - keep * keep) * x[k]
+    return np.asarray((x[1:] + x[:-1]) / (2 * rate))

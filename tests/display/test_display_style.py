@@ -33,7 +33,7 @@ def test_panels_one_below_the_other():
 
 
 def test_text_can_be_read_on_a_phone():
-    """A phone 390 pixels wide shows a figure 358 pixels wide."""
+    """A phone 390 pixels wide shows a figure 342 pixels wide."""
     fig, (ax,) = style.figure()
     style.label(ax, "x (no unit)", "y (no unit)", "a title")
     ax.plot([1, 2], label="a line")
@@ -42,7 +42,7 @@ def test_text_can_be_read_on_a_phone():
     fig.canvas.draw()
     texts = [ax.xaxis.label, ax.yaxis.label, ax.title, named, *ax.get_legend().get_texts()]
     texts += [*ax.get_xticklabels(), *ax.get_yticklabels()]
-    assert min(text.get_fontsize() for text in texts) * 358 / (72 * fig.get_size_inches()[0]) >= 8
+    assert min(text.get_fontsize() for text in texts) * 342 / (72 * fig.get_size_inches()[0]) >= 8
 
 
 @pytest.mark.parametrize(
@@ -75,6 +75,21 @@ def test_axes_are_named():
     assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_title(loc="left")) == ("time (s)", "length (m)", "")
     style.label(ax, "time (s)", "length (m)", "a title")
     assert ax.get_title(loc="left") == "a title"
+
+
+def test_names_at_the_right_edge_do_not_collide():
+    fig, (ax,) = style.figure()
+    style.loglog(ax)
+    ax.plot([1, 10], [1, 1000])
+    style.label(ax, "x (no unit)", "y (no unit)")
+    ends = {"low": (1.0, style.VALID), "same": (30.0, style.REFUTED), "also\nsame": (30.0, style.OBSERVED)}
+    names = style.name_ends(ax, ends)
+    fig.canvas.draw()
+    boxes = [each.get_window_extent() for each in names]
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+    assert all(box.x0 > ax.get_window_extent().x1 and box.x1 <= fig.bbox.x1 for box in boxes)
+    assert {each.get_text(): each.get_color() for each in names} == {k: colour for k, (_, colour) in ends.items()}
+    assert names[0].get_position() == (6, 0)
 
 
 def test_the_legend_has_no_frame():

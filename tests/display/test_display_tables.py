@@ -7,7 +7,9 @@ from fractions import Fraction
 
 import pytest
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.named import BINARY32, IBM_HEX32
 from gpbnb.display.tables import Table, arithmetic, digits, one_line, scientific, short
 
 
@@ -93,3 +95,9 @@ def test_short_numbers(value, figures, text):
 def test_an_arithmetic_is_named_by_its_digits_and_by_chopping():
     assert arithmetic(FloatFormat(2, 24)) == "24 bits"
     assert arithmetic(FloatFormat(10, 4, Rounding.CHOP)) == "4 decimal digits, chopped"
+    assert arithmetic(BINARY32) == "24 bits, ties to even, exponents -126 to 127"
+    assert arithmetic(IBM_HEX32) == "6 base-16 digits, chopped, exponents -65 to 62, no subnormal numbers"
+    assert arithmetic(FixedFormat(0, 15)) == "fixed point of 16 bits, 15 of them fraction"
+    saturated = FixedFormat(2, 13, Rounding.DOWN, "saturate")
+    assert arithmetic(saturated) == "fixed point of 16 bits, 13 of them fraction, rounded down, saturated"
+    assert len({arithmetic(FloatFormat(2, 8, mode)) for mode in Rounding}) == len(Rounding)

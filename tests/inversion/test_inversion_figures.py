@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from drawn import colour, legend_of
+from drawn import colour, legend_of, names_of
 from matplotlib.patches import FancyArrowPatch
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -49,12 +49,13 @@ def test_table1(ax):
     ):
         assert sorted(points.get_ydata()) == sorted(v for c in columns for v in c.values)
         assert [float(v) for v in example.PRINTED[name]] == list(printed.get_ydata())
-        assert printed.get_markerfacecolor() == "white"
-    assert colour(drawn[0]) == style.BOUND
+        assert printed.get_markerfacecolor() == "none"
+    assert colour(drawn[0]) == style.REFUTED
     assert colour(drawn[2]) == style.OBSERVED
     assert [label.get_text() for label in ax.get_xticklabels()] == ["3", "5", "8"]
     assert ax.get_yscale() == "log"
-    assert legend_of(ax) == ["bounds, every reading", "bounds as printed", "errors, every reading", "errors as printed"]
+    expected = ["all readings\nof the bound", "bound as\nprinted", "all readings\nof the error", "error as\nprinted"]
+    assert names_of(ax) == expected
 
 
 def test_violations(ax):
@@ -63,11 +64,15 @@ def test_violations(ax):
         for i, family in enumerate(("random", "Kahan", "all"))
         for k, bound in enumerate(("x", "chart, A_T"))
     ]
-    bars = figures.violations(Frozen({}, tuple(rows)), ("x", "chart, A_T"), ax)
-    assert [bar.get_height() for bar in bars] == [0, 5, 2.5, 7.5]
-    assert [label.get_text() for label in ax.get_xticklabels()] == ["random", "Kahan"]
-    assert legend_of(ax) == ["x", "chart, $A_T^{-1}$"]
-    assert "(%)" in ax.get_ylabel()
+    points = figures.violations(Frozen({}, tuple(rows)), ("x", "chart, A_T"), ax)
+    assert [list(each.get_xdata()) for each in points] == [[0, 5], [2.5, 7.5]]
+    assert [each.get_markeredgecolor() for each in points] == [style.REFUTED] * 2
+    assert len({(each.get_marker(), each.get_markerfacecolor()) for each in points}) == 2
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["random", "Kahan"]
+    assert legend_of(ax) == ["x", "norm of (95), $A_T^{-1}$"]
+    assert "(%)" in ax.get_xlabel()
+    with pytest.raises(ValueError, match="got 5 bounds; needed at most 4"):
+        figures.violations(Frozen({}, tuple(rows)), ("x",) * 5, ax)
 
 
 class TestRatios:
@@ -75,29 +80,25 @@ class TestRatios:
 
     def test_against_size(self, ax):
         trials = experiment.against_size(FMT, (2, 4), 5, np.random.default_rng(1))
-        drawn = figures.ratios(trials, self.NAMES, ax)
-        assert len(drawn) == 2 * 3 + 1
-        for line, name in zip(drawn[1::2], self.NAMES, strict=False):
+        *lines, error = figures.ratios(trials, self.NAMES, ax)
+        for line, name in zip(lines, self.NAMES, strict=True):
             assert list(line.get_xdata()) == [2, 4]
             expected = [np.median([one.overestimation(name) for one in trials if one.n == n]) for n in (2, 4)]
             assert list(line.get_ydata()) == expected
-        assert list(drawn[-1].get_ydata()) == [1, 1]
-        assert colour(drawn[-1]) == style.BOUND
+            assert colour(line) == style.VALID
+        assert list(error.get_ydata()) == [1, 1]
+        assert colour(error) == style.OBSERVED
+        assert sorted(names_of(ax)) == sorted([*self.NAMES, "error"])
         assert ax.get_yscale() == "log"
-        assert (ax.get_xlabel(), ax.get_ylabel()) == ("rows $n$", "bound / error (no unit)")
+        assert (ax.get_xlabel(), ax.get_ylabel()) == ("rows $n$ (no unit)", "bound / error (no unit)")
 
     def test_against_condition(self, ax):
         trials = experiment.against_condition(FMT, 4, np.linspace(0, 7, 8), np.random.default_rng(1))
         *points, _, limit = figures.ratios(trials, self.NAMES, ax, "condition")
         for artist, name in zip(points, self.NAMES, strict=True):
-            having = [one for one in trials if name in one.bounds]
+            having = sorted((one for one in trials if name in one.bounds), key=lambda one: one.condition)
             assert list(artist.get_xdata()) == [one.condition for one in having]
             assert list(artist.get_ydata()) == [one.overestimation(name) for one in having]
         assert list(limit.get_xdata()) == [2**24, 2**24]
         assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
         assert "condition number" in ax.get_xlabel()
-
-    def test_no_more_bounds_than_colours(self, ax):
-        trials = experiment.against_size(FMT, (2,), 1, np.random.default_rng(1))
-        with pytest.raises(ValueError, match="got 7 curves; needed at most 6, or colours repeat; draw two figures"):
-            figures.ratios(trials, experiment.BETTER[:7], ax)

@@ -7,8 +7,10 @@ import math
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.inversion import example, existence, experiment, tables
+from gpbnb.inversion import costs, example, existence, experiment, tables
 from gpbnb.inversion.experiment import Frozen
+
+PRINTED = example.PRINTED["bound"]
 
 
 def number(value):
@@ -32,7 +34,7 @@ def test_table1():
     bound, error = readings[2]
     line = table.body[3]
     assert line[0] == "t = places, nearest"
-    assert line[1] == "signed, (96), $A^{-1}$, its own digits"
+    assert line[1] == "with signs, product (96), $A^{-1}$, its own digits"
     assert line[2] == f"{number(bound.values[0])} ({bound.values[0] / 3.706e-2:.3g})"
     assert line[7] == f"{number(error.values[2])} ({error.values[2] / 4.672e-10:.3g})"
     assert len(table.header) == len(line) == 8
@@ -41,10 +43,10 @@ def test_table1():
 def test_searches():
     found = [example.search("bound"), example.search("error")]
     first, second = tables.searches(found).body
-    assert first[:4] == ("By proposed method", "800", "2400", str(found[0].agreements))
-    assert second[:4] == ("Actual value", "240", "720", str(found[1].agreements))
-    assert first[4] == f"{found[0].expected:.2g}"
-    assert first[6] == ", ".join(number(v) for v in found[0].closest.values)
+    assert first[:3] == ("By proposed method", "800", f"{found[0].agreements} of 2400")
+    assert second[:3] == ("Actual value", "240", f"{found[1].agreements} of 720")
+    assert first[3] == f"{found[0].expected:.2g}"
+    assert first[5] == ", ".join(f"{v / float(p):.3g}" for v, p in zip(found[0].closest.values, PRINTED, strict=True))
 
 
 def test_claims():
@@ -87,32 +89,45 @@ ROWS = tuple(
 
 def test_violations():
     table = tables.violations(Frozen({}, ROWS), ("signed, chart, A_T", "ball"))
-    assert table.header == ("matrices", "inversions", "signed, chart, $A_T^{-1}$", "ball")
-    assert table.body == (("random", "40", "0", "1"), ("Kahan", "40", "0", "1"), ("all", "40", "0", "1"))
-    regular = tables.violations(Frozen({}, ROWS), ("signed, chart, A_T", "ball"), regular=True)
-    assert regular.body[0] == ("random", "30", "7", "8")
+    assert table.body == (
+        ("with signs, norm of (95), $A_T^{-1}$", "30", "7", "23.3%"),
+        ("ball", "30", "8", "26.7%"),
+    )
+    assert len(table.header) == 4
 
 
 def test_summary():
     table = tables.summary(Frozen({}, ROWS), ("ball",))
-    assert table.body == (("ball", "40", "3", "1", "0.5", "2", r"$1.500\times10^{9}$"),)
+    assert table.body == (("ball", "3", "1", "0.5", "2", r"$1.500\times10^{9}$"),)
+
+
+def test_prices():
+    found = (costs.Price("Higham", (31.62, 1234.5), 2.266, "53 bits"),)
+    table = tables.prices(found, (2, 10))
+    assert table.header == (
+        "bound",
+        "bound / error, n = 2",
+        "bound / error, n = 10",
+        "operations / inversion",
+        "digits",
+    )
+    assert table.body == (("Higham", "31.6", "1230", "2.3", "53 bits"),)
 
 
 def test_worst():
     one = experiment.trial(FloatFormat(10, 3).array([[-12, -11], [-17, 83]]), True, ("signed, chart, A",), "by hand")
     (line,) = tables.worst({"signed, chart, A": one}).body
-    assert line[:4] == ("signed, chart, $A^{-1}$", "by hand, 2 rows", "3 decimal digits, nearest", "yes")
-    bound = one.bounds["signed, chart, A"]
-    assert line[4:] == ("8", number(one.error), number(bound), f"{bound / one.error:.3g}")
+    assert line[1:3] == ("by hand, 2 rows, with pivoting", "3 decimal digits")
+    assert line[3:] == ("8", f"{float(one.error) / one.bounds['signed, chart, A']:.3g}")
     assert one.condition == pytest.approx(7.95, abs=0.01)
 
 
 def test_worked():
     fmt = FloatFormat(10, 3)
     one = experiment.trial(fmt.array([[-12, -11], [-17, 83]]), names=("signed, chart, A", "a posteriori"))
-    (line,) = tables.worked({"signed, chart, A": one}, ("signed, chart, A", "ball")).body
-    assert line[0] == "signed, chart, $A^{-1}$"
-    assert line[1] == "-12 -11; -17 83"
-    assert line[2] == "3 decimal digits"
-    assert line[3] == "; ".join(" ".join(str(v) for v in row) for row in one.computed)
-    assert line[4:] == (number(one.error), number(one.bounds["signed, chart, A"]), "none")
+    table = tables.worked({"two rows": one}, ("signed, chart, A", "ball"))
+    (line,) = table.body
+    assert line[:2] == ("two rows", "-12 -11; -17 83")
+    assert line[2] == "; ".join(" ".join(str(v) for v in row) for row in one.computed)
+    assert line[3:] == (number(one.error), number(one.bounds["signed, chart, A"]), "none")
+    assert table.header[4] == "with signs, norm of (95), $A^{-1}$"

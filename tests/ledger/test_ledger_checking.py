@@ -4,8 +4,8 @@ import importlib
 
 import pytest
 
-from gpbnb.ledger import Row, counts, load_statements, rows, summary
-from gpbnb.ledger.checking import TOPICS, Place, in_reading_order, owners
+from gpbnb.ledger import Row, counts, load_statements, rows
+from gpbnb.ledger.checking import TOPICS, in_reading_order, owners
 from gpbnb.ledger.finding import Verdict, compare
 from gpbnb.ledger.statements import Statement
 
@@ -117,16 +117,3 @@ def test_reading_order_sorts_sections_by_number_and_keeps_the_rest():
     ]
     order = [row.statement.item for row in in_reading_order(iter(some))]
     assert order == [f"eq ({n})" for n in (2, 5, 4, 1, 6, 3, 7, 8)]
-
-
-def test_summary_counts_section_by_section():
-    some = [
-        made(None, 1, "3"),
-        made(Verdict.VERIFIED, 2, "2"),
-        made(Verdict.MISPRINT, 3, "3"),
-        made(Verdict.MISPRINT, 4, "3"),
-    ]
-    assert list(summary(some).items()) == [
-        (Place("hung1984", "II", "2"), {"verified": 1}),
-        (Place("hung1984", "II", "3"), {"misprint": 2, "missing": 1}),
-    ]

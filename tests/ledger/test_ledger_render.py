@@ -11,7 +11,7 @@ import pytest
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-from gpbnb.ledger import Row, load_statements, summary_table, table
+from gpbnb.ledger import Row, load_statements, table
 from gpbnb.ledger.finding import Verdict, answer, compare, unverifiable
 from gpbnb.ledger.render import to_csv, to_json, to_markdown, to_text
 from gpbnb.ledger.statements import Statement
@@ -147,27 +147,10 @@ def test_the_whole_inventory_makes_a_sound_table():
 
 def test_rows_may_be_an_iterator():
     assert table(iter(ROWS)) == table(ROWS)
-    assert summary_table(iter(ROWS)) == summary_table(ROWS)
 
 
 def test_representations_are_short_and_stable():
     title = "Ledger of 6 statements: 1 verified, 1 misprint, 1 unverifiable, 1 answered, 1 check failed, 1 no check"
     assert repr(table(ROWS)) == f"<{title}>"
-    assert repr(summary_table(ROWS)) == f"<{title}; by section>"
     assert repr(table(())) == "<Ledger of 0 statements: none>"
     assert table(ROWS)._repr_markdown_() == table(ROWS).markdown() == to_markdown(ROWS)[:-1]
-
-
-def test_summary_table():
-    far = Row(replace(ENTRY, section="9.2"), FINDINGS["verified"])
-    apart = Row(Statement("savage2016.main.eq1", "savage2016", "-", "analysis", "eq (1)", "equation", "$a$"), None)
-    plain = Row(Statement("hung1984.I.x", "hung1984", "I", "-", "x", "claim", "a"), None)
-    found = [[prose for _, prose in row] for row in rendered(summary_table((*ROWS[:2], far, apart, plain)).markdown())]
-    assert found == [
-        ["Document", "Section", "verified", "misprint", "no check", "statements"],
-        ["hung1984", "II.6", "1", "1", "0", "2"],
-        ["hung1984", "II.9.2", "1", "0", "0", "1"],
-        ["hung1984", "I", "0", "0", "1", "1"],
-        ["savage2016", "analysis", "0", "0", "1", "1"],
-        ["all", "", "2", "1", "2", "5"],
-    ]

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from drawn import colour, legend_of
+from drawn import colour, names_of
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm
@@ -33,20 +33,20 @@ def test_sawtooth(ax, rule):
     assert colour(points) == style.OBSERVED
     beta = float(result.fmt.unit_roundoff)
     assert list(line.get_ydata()) == [beta, beta]
-    assert colour(line) == style.BOUND
+    assert colour(line) == style.VALID
     assert ax.get_xscale() == "log"
     assert ax.get_ylim()[0] == 0
     assert max(result.error.max(), beta) < ax.get_ylim()[1]
-    names = legend_of(ax)
+    assert names_of(ax) == [r"bound $\beta$"]
     if rule is NEAREST:
         assert list(sharp[0].get_ydata()) == [beta / (1 + beta)] * 2
-        assert names[1] == "unit roundoff, (8)"
-        assert len(names) == 3
     else:
         assert not sharp
-        assert names == ["error", "unit roundoff, (13)"]
     check_names(ax, "number $x$ (no unit)", "relative error")
-    assert ax.get_title(loc="left") == f"{rule.value}, 2 decimal digits"
+    assert (
+        ax.get_title(loc="left")
+        == rf"{rule.value}, 2 decimal digits: bound $\beta$, {'(8)' if rule is NEAREST else '(13)'}"
+    )
 
 
 def test_worst_ratios(ax):
@@ -58,8 +58,8 @@ def test_worst_ratios(ax):
         assert line.get_marker() not in ("", "None")
     assert len({colour(line) for line in lines}) == 2
     assert list(bound.get_ydata()) == [1, 1]
-    assert colour(bound) == style.BOUND
-    assert legend_of(ax) == ["1 decimal digit", "4 bits", "bound"]
+    assert colour(bound) == style.REFUTED
+    assert set(names_of(ax)) == {"1 decimal digit", "4 bits", "bound (20)"}
     check_names(ax, "factors $n$", "worst error / bound (20)")
 
 
@@ -79,8 +79,9 @@ def test_growth(ax):
     assert list(bound.get_ydata()) == [1, 9, 39]
     beta = results[0].fmt.unit_roundoff
     assert list(law.get_ydata()) == [theory.probabilistic_sum_factor(n, beta) / float(beta) for n in lengths]
-    assert legend_of(ax)[:3] == ["like signs, nearest", "like signs, chop", "constant, nearest"]
-    assert "fails in 1 %" in legend_of(ax)[-1]
+    named = {"like signs,\nnearest", "like signs,\nchop", "constant,\nnearest", "bound $n-1$", r"$\sqrt{n}$ law"}
+    assert set(names_of(ax)) == named
+    assert (colour(bound), colour(law)) == (style.VALID, style.REFUTED)
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     check_names(ax, "terms $n$", r"error of the sum / $\beta\sum|x_j|$")
 
@@ -91,16 +92,19 @@ def test_cancellation(ax):
     trials = [*experiment.cancelling_chains(fmt, 4, np.random.default_rng(4)), exact]
     inexact = [trial for trial in trials if trial.error]  # a logarithmic axis has no place for zero
     assert not exact.error
-    lost = [
-        float(column_sum_norm(t.inputs[0]) * column_sum_norm(t.inputs[1]) / column_sum_norm(t.true)) for t in inexact
-    ]
-    *points, bound = figures.cancellation(trials, ax)
-    for artist, name in zip(points, ("(31)", "(32)"), strict=True):
-        assert list(artist.get_xdata()) == lost
-        assert list(artist.get_ydata()) == [trial.ratio(name) for trial in inexact]
-    assert list(bound.get_ydata()) == [1, 1]
-    assert legend_of(ax) == ["error / (31)", "error / (32)", "bound"]
-    check_names(ax, "cancellation", "error / bound")
+    points, printed, bound = figures.cancellation(trials, ax)
+    norms = [float(column_sum_norm(t.inputs[0]) * column_sum_norm(t.inputs[1])) for t in trials]
+    lost = [norm / float(column_sum_norm(t.true)) for norm, t in zip(norms, trials, strict=True)]
+    assert list(points.get_xdata()) == pytest.approx(lost[:-1])
+    assert list(points.get_ydata()) == pytest.approx(
+        [float(t.error) / norm for norm, t in zip(norms, inexact, strict=False)]
+    )
+    beta = float(fmt.unit_roundoff)
+    assert list(bound.get_ydata()) == pytest.approx([2 * beta] * len(trials))
+    assert list(printed.get_ydata()) == pytest.approx([2 * beta / x for x in sorted(lost)])
+    assert [colour(each) for each in (points, printed, bound)] == [style.OBSERVED, style.REFUTED, style.VALID]
+    assert set(names_of(ax)) == {"error", "bound (32)", "(31) as\nprinted"}
+    check_names(ax, "cancellation", "error / ")
     assert "no unit" in ax.get_xlabel()
 
 
@@ -113,9 +117,9 @@ def test_pessimism(ax):
         np.median([trial.ratio("strict") for trial in trials]) for _, trials in groups
     ]
     assert [label.get_text() for label in ax.get_xticklabels()] == ["3", "8"]
-    assert any(colour(line) == style.BOUND and list(line.get_ydata()) == [1, 1] for line in ax.lines)
+    assert any(colour(line) == style.VALID and list(line.get_ydata()) == [1, 1] for line in ax.lines)
     assert ax.get_yscale() == "log"
-    check_names(ax, "products $n$", "error / the strict bound")
+    check_names(ax, "products $n$", "error / bound")
 
 
 def test_every_function_returns_the_artists_it_drew(ax):

@@ -71,10 +71,10 @@ def test_typical_errors_are_root_mean_squares() -> None:
 
 
 def test_a_compensated_sum_is_better_and_a_stochastic_one_unbiased() -> None:
-    x = np.full((3000, 2), 2.0**-10)
+    x = np.full((1500, 2), 2.0**-10)
     found = {each.name: each.add(x)[0] for each in processors.integrators()}
-    exact = 3000 * 2.0**-10
-    assert found["bfloat16 alone"] < 0.2 * exact
+    exact = 1500 * 2.0**-10
+    assert found["bfloat16 alone"] < 0.4 * exact
     assert abs(found["bfloat16 alone, compensated"] / exact - 1) < 0.01
     assert abs(found["bfloat16 alone, stochastic rounding"] / exact - 1) < 0.3
     assert found["Cortex-M4F, binary32"] == exact

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -29,3 +31,35 @@ def test_an_overflow_that_is_not_found_differs() -> None:
     assert processors.differing(np.array([np.nan, 1.0]), expected) == 0
     assert processors.differing(np.array([np.nan, np.nan]), expected) == 1
     assert processors.differing(np.array([np.nan, -0.0]), np.array([np.inf, 0.0], np.float16)) == 1
+
+
+def test_a_wrong_format_is_found_in_pairs(monkeypatch: pytest.MonkeyPatch) -> None:
+    right, wrong = processors.SMALL["FP8 E4M3"], processors.SMALL["FP8 E5M2"]
+    monkeypatch.setitem(processors.SMALL, "FP8 E4M3", (wrong[0], right[1]))
+    counts = list(processors.pairs("FP8 E4M3", 1, np.random.default_rng(0)))
+    assert all(count.different > 1000 for count in counts)
+
+
+def test_a_journal_resumes_where_it_ended(tmp_path: Path) -> None:
+    file = tmp_path / "journal.csv"
+    journal = processors.Journal(file)
+    first = list(processors.pairs("FP8 E5M2", 1, np.random.default_rng(0), journal))
+    again = processors.Journal(file)
+    assert again.parts == journal.parts != {}
+    marked = next(iter(again.parts))
+    again.parts[marked] = again.parts[marked]._replace(different=7)  # taken as it stands, not compared anew
+    assert sum(count.different for count in first) == 0
+    assert sum(c.different for c in processors.pairs("FP8 E5M2", 1, np.random.default_rng(0), again)) == 7
+    file.write_text(file.read_text(encoding="utf-8").replace(again.code, "00000000"), encoding="utf-8")
+    assert processors.Journal(file).parts == {}
+
+
+def test_the_machine_converts_to_float16_as_numpy_does() -> None:
+    patterns = np.arange(2**16, dtype=np.uint32) << 16
+    x = np.concatenate([(patterns | low).view(np.float32) for low in (0, 0x1000, 0x1001, 0x0FFF)])
+    x = x[np.isfinite(x)]
+    found = processors.operate("add", np.float16, np.float32(0), x)
+    with np.errstate(all="ignore"):
+        expected = x.astype(np.float16)
+    same = found.view(np.float16) == expected
+    assert same.all()

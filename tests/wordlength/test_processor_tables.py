@@ -1,0 +1,67 @@
+"""Tables and figures of the chapters on processors and wordlength."""
+
+from __future__ import annotations
+
+import math
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
+from gpbnb.kalman.guarantee.linear import biquad
+from gpbnb.wordlength import figures, fixed_point, processor_tables
+from gpbnb.wordlength.processors import Outcome, Processor, Sum
+
+
+def test_outcomes_show_errors_or_why_there_is_none() -> None:
+    processor = Processor("narrow", BFLOAT16)
+    found = {
+        "tilt, °": [Outcome(processor, np.array([0.25, 3.0]), "")],
+        "tracker, m": [Outcome(processor, np.array([math.inf]), "overflow in the gain at step 812")],
+    }
+    table = processor_tables.outcomes(found)
+    assert table.header == ("processor", "tilt, °", "tracker, m")
+    assert table.body == (("narrow", "0.25", "refused: overflow in the gain at step 812"),)
+
+
+def test_variants_say_which_are_refused() -> None:
+    ways = (Processor("first", BINARY32), Processor("second", BFLOAT16))
+    table = processor_tables.variants(ways, {"tilt": np.array([[0.5, 1.0], [math.inf, math.inf]])})
+    assert table.body == (("first", "0.5"), ("second", "refused"))
+
+
+def test_integrators_show_scatter_and_mean() -> None:
+    x = np.ones((4, 2))
+    table = processor_tables.integrators([Sum("half too much", lambda y: y.sum(axis=0) + 0.5)], x)
+    assert table.body == (("half too much", "0.5", "0.5"),)
+
+
+def test_formats_show_their_limits() -> None:
+    table = processor_tables.formats({"BINARY32": BINARY32, "IBM_HEX32": IBM_HEX32, "free": FloatFormat(3, 5)})
+    assert table.body[0] == ("BINARY32", "2", "24", "even", r"$1.2\times10^{-38}$", r"$3.4\times10^{38}$")
+    assert table.body[1][0] == "IBM HEX32"
+    assert table.body[2][-2:] == ("any", "any")
+
+
+def test_fixed_point_bounds_stand_beside_what_was_observed() -> None:
+    given = fixed_point.unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
+    z = np.random.default_rng(2).uniform(-1, 1, (60, 1))
+    ways = [("nearest", 12, {"rounding": Rounding.NEAREST}), ("floor", 12, {"rounding": Rounding.DOWN})]
+    table = processor_tables.fixed_point({"section": (given, z)}, ways)
+    for _, observed, bound in table.body:
+        assert 0 < float(observed) <= float(bound)
+    assert float(table.body[1][2]) > 1.9 * float(table.body[0][2])
+
+
+def test_figures_draw_every_finite_point() -> None:
+    fig, ax = plt.subplots()
+    figures.changes(["a", "b", "c"], {"tilt": [2.0, math.inf, 1.0]}, ax)
+    assert ax.lines[0].get_xdata().tolist() == [1.0, 0.5]  # type: ignore[union-attr]
+    fig.clear()
+    ax = fig.subplots()
+    figures.bands({"tilt": [(11, [1.0, 2.0, 3.0]), (12, [0.5, 1.0, 1.5])]}, ax)
+    middle, most = (line.get_ydata() for line in ax.lines[:2])
+    assert list(middle) == [2.0, 1.0]
+    assert list(most) == [3.0, 1.5]
+    plt.close(fig)
