@@ -6,9 +6,9 @@ contain one of them.
 
 from __future__ import annotations
 
+import argparse
 import csv
 import math
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -260,8 +260,16 @@ def bits_table() -> Table:
     return Table("bits that some filters need", header, tuple(body))
 
 
-def main(words: Sequence[str] = ()) -> int:
-    """Compute the rows whose names contain one of the words, or all, and store them."""
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute the rows whose names contain one of the words, or all, and write them to a folder."""
+    parser = argparse.ArgumentParser(
+        prog="python -m gpbnb.wordlength.guarantees", description="Guarantees of some filters, as a table."
+    )
+    parser.add_argument("words", nargs="*", help="only filters whose names contain one of them; the rest as stored")
+    parser.add_argument("--output", type=Path, default=Path(".cache/guarantees"), help="folder for guarantees.csv")
+    given = parser.parse_args(arguments)
+    words, file = given.words, given.output / FILE.name
+    given.output.mkdir(parents=True, exist_ok=True)
     rows = {row.name: row for row in load()} if words and FILE.exists() else {}
     for case in (CASES[0], CASES[-2]):  # what is compiled or loaded now does not count as time of a guarantee
         _found(case, case.make(), FORMAT)
@@ -271,7 +279,7 @@ def main(words: Sequence[str] = ()) -> int:
             rows[name] = compute(case)
             print(*rows[name], flush=True)
             order = [each.make().name for each in CASES]
-            with FILE.open("w", encoding="utf-8", newline="") as stream:
+            with file.open("w", encoding="utf-8", newline="") as stream:
                 writer = csv.writer(stream, lineterminator="\n")
                 writer.writerow(Row._fields)
                 writer.writerows(rows[each] for each in order if each in rows)
@@ -279,4 +287,4 @@ def main(words: Sequence[str] = ()) -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    raise SystemExit(main())
