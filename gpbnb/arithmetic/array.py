@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import entries, exact_ratio, single
+from gpbnb.arithmetic.functions import power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.text import decimal_text, in_columns
@@ -269,11 +270,10 @@ class FloatArray(NumPyProtocols):
         return _matmul(self.operand(other), self)
 
     def __pow__(self, other: Any) -> FloatArray:
-        raise TypeError(
-            "got x ** y of a FloatArray; needed + - * / @ or np.sqrt, each rounded once; write the products out: x * x"
-        )
+        return power(self, other)
 
-    __rpow__ = __pow__
+    def __rpow__(self, other: Any) -> FloatArray:
+        raise TypeError("got x ** y of a FloatArray as exponent; needed a whole number; see np.exp and np.log")
 
     def __neg__(self) -> FloatArray:
         return self._unary("negative")

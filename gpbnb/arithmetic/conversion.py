@@ -44,6 +44,8 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
             raise ValueError(_not_finite(value))
         p = int(Decimal((0, digits, 0)))
         return (-p if sign else p), 1, exponent
+    if (pair := _of_mpmath_or_flint(value)) is not None:
+        return pair
     # Python's and NumPy's floats, those of gmpy2 and sympy, and whatever else converts exactly
     if hasattr(value, "as_integer_ratio"):
         try:
@@ -52,6 +54,33 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
             raise ValueError(_not_finite(value)) from None
         return int(p), int(q), 0
     raise TypeError(f"got {value!r} of type {type(value).__name__}; needed {_ACCEPTED}")
+
+
+def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:
+    """A number of mpmath (``man_exp``) or python-flint (``man_exp()``, ``p`` and ``q``), or None for others.
+
+    Raises
+    ------
+    ValueError : NaN, infinity, or a ball that is not one number.
+    """
+    home = type(value).__module__.partition(".")[0]
+    if home not in ("mpmath", "flint"):
+        return None
+    if home == "flint" and hasattr(value, "p") and hasattr(value, "q"):
+        return int(value.p), int(value.q), 0
+    if home == "flint" and type(value).__name__ == "fmpz":
+        return int(value), 1, 0
+    if not hasattr(value, "man_exp"):
+        return None
+    if home == "flint" and not (value.is_finite() and value.is_exact()):
+        raise ValueError(f"got {value}; needed one finite number; take its midpoint: x.mid()")
+    if home == "mpmath" and value.man_exp[0] == 0 and not value == 0:
+        raise ValueError(_not_finite(value))
+    significand, exponent = value.man_exp if home == "mpmath" else value.man_exp()
+    if home == "mpmath" and value < 0 < significand:
+        significand = -significand
+    significand, exponent = int(significand), int(exponent)
+    return (significand << exponent, 1, 0) if exponent >= 0 else (significand, 1 << -exponent, 0)
 
 
 def _read(text: str) -> tuple[int, int, int]:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
 import operator
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
+
+from gpbnb.arithmetic import functions
 
 _JOINERS = frozenset(("concatenate", "hstack", "stack", "vstack"))
 
@@ -24,6 +28,74 @@ class NumPyProtocols:
     """What an array of a format needs so that NumPy's own functions take it."""
 
     __slots__ = ()
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        near = difflib.get_close_matches(name, [each for each in dir(type(self)) if not each.startswith("_")], 1)
+        hint = f"; the nearest is x.{near[0]}" if near else ""
+        raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}{hint}")
+
+    # -- methods of NumPy's arrays ------------------------------------------------------------------------
+
+    def mean(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.mean`."""
+        return functions.mean(self, axis, keepdims)
+
+    def max(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.largest`."""
+        return functions.largest(self, axis, keepdims)
+
+    def min(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.smallest`."""
+        return functions.smallest(self, axis, keepdims)
+
+    def clip(self, low: Any = None, high: Any = None) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.clip`."""
+        return functions.clip(self, low, high)
+
+    def cumsum(self, axis: int | None = None) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.cumsum`."""
+        return functions.cumsum(self, axis)
+
+    def trace(self) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.trace`."""
+        return functions.trace(self)
+
+    def dot(self, other: Any) -> Any:
+        """As ``np.dot``: entries of products are summed from left to right."""
+        return _dot(self, self, other)
+
+    def copy(self) -> Any:
+        """The same array: it does not change, and needs no copy."""
+        return self
+
+    def ravel(self) -> Any:
+        """The entries in one row."""
+        return self.moved(np.ravel)
+
+    def flatten(self) -> Any:
+        """The entries in one row."""
+        return self.moved(np.ravel)
+
+    def transpose(self, *axes: Any) -> Any:
+        """The axes in another order; by default in reverse."""
+        order = axes[0] if len(axes) == 1 and not isinstance(axes[0], int) else axes or None
+        return self.moved(lambda a: np.transpose(a, order))
+
+    @abstractmethod
+    def to_fractions(self) -> Any:
+        """The exact value of each entry."""
+
+    def tolist(self) -> Any:
+        """Exact Fractions in nested lists, or one Fraction."""
+        found = self.to_fractions()
+        return found.tolist() if isinstance(found, np.ndarray) else found
+
+    def item(self, *index: Any) -> Any:
+        """One entry as an exact Fraction."""
+        found = np.asarray(self.to_fractions(), dtype=object)
+        return found.item(*index)
 
     @abstractmethod
     def operand(self, other: Any) -> Any:
@@ -119,6 +191,8 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "less_equal": operator.le,
     "greater": operator.gt,
     "greater_equal": operator.ge,
+    "power": lambda a, b: functions.power(a, _exponent(b)),
+    **{name: partial(functions.elementary, name) for name in functions.ELEMENTARY},
 }
 
 _REDUCTIONS: dict[str, Callable[..., Any]] = {
@@ -151,14 +225,43 @@ def _where(x: NumPyProtocols, condition: Any, a: Any, b: Any) -> Any:
     return x.joined(lambda components: np.where(condition, *cast(Any, components)), [a, b])
 
 
+def _append(x: NumPyProtocols, a: Any, values: Any, axis: int | None) -> Any:
+    arrays = [x.operand(each) for each in (a, values)]
+    if axis is None:
+        arrays = [each.reshape(-1) for each in arrays]
+    return np.concatenate(arrays, axis=axis or 0)
+
+
+def _exponent(value: Any) -> Any:
+    """A plain exponent: NumPy hands it over as an array of a format."""
+    if not value.ndim and (exact := value.to_fractions()).denominator == 1:
+        return int(exact)
+    raise TypeError("got an exponent that is no single whole number; needed one, as in np.power(x, 3)")
+
+
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "array_equal": _array_equal,
     "dot": _dot,
     "ndim": lambda x, a: a.ndim,
     "outer": lambda x, a, b: x.operand(a).reshape(-1, 1) * x.operand(b).reshape(1, -1),
-    "prod": lambda x, a, axis=None: a.prod(axis),
+    "amax": lambda x, a, axis=None, keepdims=False: a.max(axis, keepdims),
+    "amin": lambda x, a, axis=None, keepdims=False: a.min(axis, keepdims),
+    "append": lambda x, arr, values, axis=None: _append(x, arr, values, axis),
+    "clip": lambda x, a, a_min=None, a_max=None: a.clip(a_min, a_max),
+    "cumsum": lambda x, a, axis=None: a.cumsum(axis),
+    "einsum": functions.einsum,
+    "kron": functions.kron,
+    "max": lambda x, a, axis=None, keepdims=False: a.max(axis, keepdims),
+    "mean": lambda x, a, axis=None, keepdims=False: a.mean(axis, keepdims),
+    "min": lambda x, a, axis=None, keepdims=False: a.min(axis, keepdims),
+    "norm": lambda x, a, ord=None, axis=None: functions.norm(a, ord, axis),
+    "ones_like": lambda x, a: a * 0 + 1,
+    "prod": lambda x, a, axis=None, keepdims=False: functions.kept(a, a.prod(axis), axis, keepdims),
+    "sort": lambda x, a, axis=-1: functions.sort(a, axis),
     "shape": lambda x, a: a.shape,
     "size": lambda x, a: a.size,
-    "sum": lambda x, a, axis=None: a.sum(axis),
+    "sum": lambda x, a, axis=None, keepdims=False: functions.kept(a, a.sum(axis), axis, keepdims),
+    "trace": lambda x, a: a.trace(),
     "where": _where,
+    "zeros_like": lambda x, a: a * 0,
 }

@@ -84,7 +84,7 @@ class BoundedRun(Run):
         if self.stopped or not len(z):
             return
         packed = self.as_packed(z)
-        values = double_doubles(self.exactly(packed))[:, :, np.newaxis]
+        values = (packed if self.fmt is None else double_doubles(self.exactly(packed)))[:, :, np.newaxis]
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         for begin in range(0, len(packed), _BLOCK):
             self._take_block(packed[begin : begin + _BLOCK], values[begin : begin + _BLOCK])

@@ -114,6 +114,8 @@ def emulate(
     """
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
+    if chosen and max(chosen) > len(measured):
+        raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
     run = Run(model, fmt, form, chosen, fused, sums, compensated)
     run.take(measured)
     if true is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -95,7 +95,7 @@ def _exceeds(kind: str, fmt: FloatFormat, seed: int) -> bool:
     run.take(np.zeros((1, model.m)))
     if run.stopped:
         return False
-    exact = exact_step(
+    exact: Any = exact_step(
         model.Phi[0], model.H[0], model.Q[0], model.R[0], model.x0, model.P0, np.full(model.m, Fraction(0), object)
     ).P
     bound = report_bounds.covariance_count(model.n, model.m) * fmt.unit_roundoff * abs(exact)

@@ -7,8 +7,31 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.model import LinearModel
+
+
+def real_numbers(values: Any) -> NDArray[Any]:
+    """Measurements as an array of real numbers: floats and whole numbers as they are, others as exact Fractions.
+
+    Raises
+    ------
+    ValueError, TypeError : an entry is no real number, or rows have different lengths.
+    """
+    try:
+        given = np.asarray(values)
+    except ValueError:
+        raise ValueError("got measurements in rows of different lengths; needed (steps, m) numbers") from None
+    if given.dtype.kind in "iuf":
+        return given
+    try:
+        return exact(values)
+    except TypeError as error:
+        raise TypeError(f"measurements: {error}") from None
+    except ValueError as error:
+        raise ValueError(f"measurements: {error}") from None
 
 
 def without_missing(model: LinearModel, z: Any) -> tuple[LinearModel, Any]:
@@ -25,7 +48,7 @@ def without_missing(model: LinearModel, z: Any) -> tuple[LinearModel, Any]:
     -------
     model, z : as they came if nothing is missing.
     """
-    given = np.ma.getdata(z) if isinstance(z, np.ma.MaskedArray) else np.asarray(z)
+    given = np.ma.getdata(z) if isinstance(z, np.ma.MaskedArray) else real_numbers(z)
     missing = np.array(np.ma.getmaskarray(z)) if isinstance(z, np.ma.MaskedArray) else np.zeros(given.shape, dtype=bool)
     if given.dtype.kind == "f":
         missing |= np.isnan(given)

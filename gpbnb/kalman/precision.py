@@ -27,6 +27,9 @@ from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, list
 from gpbnb.kalman.simulation import Simulation, fine_resolution
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
+MOST_SIMULATED = 10**8
+"""Largest number of steps that are simulated: a small model takes about a second for a million, in each precision."""
+
 
 def required_precision(
     model: LinearModel | LinearSystem,
@@ -82,6 +85,11 @@ def required_precision(
     for_ever = basis in ("guarantee", "probable")
     if for_ever and within is None:
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
+    if z is None and steps > MOST_SIMULATED:
+        raise ValueError(
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: they take hours; try fewer, and see "
+            "how the answer grows: gpbnb.wordlength.study.required_precision_by_steps"
+        )
     if z is None:
         z = Simulation(
             model, tuple(model.x0.astype(np.float64)), whole_number("seed", seed, 0), fine_resolution(model)

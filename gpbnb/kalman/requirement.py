@@ -106,8 +106,8 @@ def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: s
         )
     if not (tolerances > 0).all() or not np.isfinite(tolerances).any():
         raise ValueError(f"got tolerance {tolerance}; {needed}")
-    if basis not in get_args(Basis):
+    if not isinstance(basis, str) or basis not in get_args(Basis):
         raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
-    if isinstance(base, bool) or base not in LARGEST_PRECISION:
+    if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     return np.broadcast_to(tolerances, (count,))

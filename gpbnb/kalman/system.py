@@ -27,6 +27,7 @@ from gpbnb.kalman.guarantee.gains import pack, widened_array
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import advance
+from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import rounding_named, whole_number
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
 
@@ -201,7 +202,7 @@ def required_system_precision(
 
 
 def _inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
-    given = np.asarray(u)
+    given = real_numbers(u)
     if given.ndim != 2 or given.shape[1] != system.m or not len(given) or steps not in (None, len(given)):
         column = "; write u.reshape(-1, 1)" if given.ndim == system.m == 1 else ""
         raise ValueError(f"got inputs of shape {given.shape}; needed ({steps or 'steps'}, {system.m}){column}")

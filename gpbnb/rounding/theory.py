@@ -10,6 +10,7 @@ A bound of first order leaves out terms in β²; a strict one, made of
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import pairwise
@@ -72,11 +73,37 @@ def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
     ----------
     Higham 2002, Lemma 3.1, term by term.
     """
+    if (found := _strict_bound_of_floats(x, beta)) is not None:
+        return found
     terms = _vector(x)
     return sum(
         (gamma(w, beta) * abs(term) for w, term in zip(sum_weights(len(terms)), terms, strict=True)),
         start=Fraction(0),
     )
+
+
+MANY_TERMS = 1000
+"""Above as many float64 terms, the strict bound is itself computed in float64 and rounded up."""
+
+
+def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
+    """The strict bound of many float64 terms, at most 2**-45 of itself above; None for others, to be summed exactly.
+
+    The exact sum has a denominator of millions of digits. Here each factor and product is off by less than 2**-50,
+    their sum is correctly rounded, and the result is raised by more than all of that.
+    """
+    if not isinstance(x, np.ndarray) or x.dtype != np.float64 or x.ndim != 1 or len(x) <= MANY_TERMS:
+        return None
+    size = np.abs(x)
+    if not np.isfinite(size).all() or (size[size > 0] < 1e-250).any() or (size > 1e250).any():
+        return None
+    gamma(len(x) - 1, beta)  # refuses too many roundings
+    unit = float(beta)
+    if Fraction(unit) != beta or unit * len(x) > 0.5:
+        return None
+    weights = np.array(sum_weights(len(x)), dtype=np.float64)
+    total = math.fsum((weights * unit / (1 - weights * unit) * size).tolist())
+    return Fraction(total) * (1 + Fraction(1, 2**46))
 
 
 def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> float:

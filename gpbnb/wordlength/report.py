@@ -284,7 +284,7 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
         drawn.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
         drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
-        drawn.append(f'<text x="400" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
+        drawn.append(f'<text x="440" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
     return (
         '<svg viewBox="0 0 640 330" role="img" aria-label="Error over tolerance against precision, one line for each '
         f'form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'

@@ -229,6 +229,8 @@ def native(
     -------
     x : (steps, n), the estimate after each step; not finite where the range did not suffice.
     """
+    if not (isinstance(dtype, type) and issubclass(dtype, np.floating)):
+        raise TypeError(f"got dtype {dtype!r}; needed numpy.float16, numpy.float32 or numpy.float64")
     with np.errstate(all="ignore"):
         given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
         return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)

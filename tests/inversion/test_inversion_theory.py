@@ -408,14 +408,14 @@ def test_input_is_left_alone():
         ),
         (lambda: theory.residual([1, 2], [[1]]), r"a: got shape \(2,\); needed a matrix \(m, n\)"),
         (lambda: theory.residual([[np.nan]], [[1]]), "entry 0, 0: got nan; needed a finite number"),
-        (lambda: theory.trailing(np.array([[np.inf]]), 0), "a: got an entry that is NaN or infinite; needed numbers"),
+        (lambda: theory.trailing(np.array([[np.inf]]), 0), "a: got an entry that is NaN or infinite; needed finite"),
         (lambda: theory.lower_factor(STAGES[:2]), r"got 2 stages of sizes \[3, 3\]; needed n matrices \(n, n\)"),
         (lambda: theory.lower_factor([]), r"got 0 stages of sizes \[\]"),
         (lambda: theory.lower_factor([[[0, 1], [1, 0]]] * 2), "got a zero pivot in stage 0; .* interchange rows"),
         (lambda: theory.right_side_bounds(RIGHTS[:2], BETA), r"got 2 right sides of shapes \[\(3, 2\)\]; needed n"),
         (
             lambda: theory.strict_right_side_bounds(STAGES, [[[1]]], BETA),
-            "got 3 stages and 1 right sides; needed equally many",
+            "got 3 stages and 1 right sides; needed the same number of both",
         ),
         (
             lambda: theory.bound(Reduction(STAGES, RIGHTS, [[1]]), BETA),

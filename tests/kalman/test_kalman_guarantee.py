@@ -14,12 +14,12 @@ from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee import derivation
-from gpbnb.kalman.guarantee.adversary import attack
-from gpbnb.kalman.guarantee.bound import disturbances_of, from_schedule, guarantee, limits
+from gpbnb.kalman.guarantee.adversary import attack, random_errors
+from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
 from gpbnb.kalman.guarantee.gains import pack, schedule
 from gpbnb.kalman.guarantee.linear import biquad, controller, error_coefficients, peak_gain, state_space
-from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.guarantee.probable import probable_error, separate_roundings
 from gpbnb.kalman.guarantee.program import (
     advance,
     innovation_program,
@@ -258,7 +258,8 @@ def test_roundings_of_the_stored_loop_matter() -> None:
 
 def test_what_earlier_steps_carry_on_is_small_when_rows_go_far() -> None:
     found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
-    assert (found.parts[:, START] < 1e-5 * found.bound).all()
+    # Between two rows that are asked, the difference may add a thousandth of the bound.
+    assert (found.parts[:, START] < 1e-3 * found.bound).all()
     assert np.allclose(found.parts.sum(axis=1), found.bound, rtol=1e-8)
 
 
@@ -340,19 +341,28 @@ def test_the_smallest_precision_by_guarantee_and_by_probable_error() -> None:
 def test_the_probable_error_is_that_of_independent_roundings() -> None:
     """Against a simulation of the same noise: to four standard errors, with noise correlated over 20 steps."""
     found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
-    each, rng = disturbances_of(found), np.random.default_rng(6)
-    program = found.schedule.program
-    groups, count = len(program.roots), program.roundings
-    F, G, h = each.F[-1], each.G[-1, :, :groups], each.limits[-1, :groups]
+    each, rng = separate_roundings(found), np.random.default_rng(6)
+    count = len(found.schedule.program.operations)
+    F, G, h = each.F[-1], each.G[-1, :, :count], each.limits[-1, :count]
     e, total, steps = np.zeros((2, 200)), np.zeros(2), 400
     for k in range(2 * steps):
-        noise = sum(np.where(count[:, None] > i, rng.uniform(-1, 1, (groups, 200)), 0) for i in range(count.max()))
-        e = F @ e + G @ (h[:, None] / count[:, None] * noise)
+        e = F @ e + G @ (h[:, None] * rng.uniform(-1, 1, (count, 200)))
         total += (e**2).mean(axis=1) / steps if k >= steps else 0
     assert np.allclose(np.sqrt(total), probable_error(found), rtol=4 * np.sqrt(2 * 20 / (200 * steps)))
 
 
-@pytest.mark.parametrize("name", ["recursion", "telescope", "induction"])
+def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
+    """Near the limits, where roundings are as large as assumed; measured: 0.99 and 1.04 of it.
+
+    Errors are correlated over 20 steps, so that 10,000 steps give the scatter to 3 %; the test allows three times that.
+    """
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
+    scatter = random_errors(found, 20_000, [750, 0])[10_000:].std(axis=0)
+    assert (0.9 * probable_error(found) < scatter).all()
+    assert (scatter < 1.1 * probable_error(found)).all()
+
+
+@pytest.mark.parametrize("name", ["recursion", "telescope", "induction", "ellipsoid"])
 def test_the_algebra(name: str) -> None:
     for step in getattr(derivation, name)().steps:
         assert step.holds, step.name

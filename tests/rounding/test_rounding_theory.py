@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import time
 from fractions import Fraction
 from functools import cache
 
@@ -313,3 +314,16 @@ REFUSED = [
 def test_refused_with_what_came_and_what_was_needed(function, arguments, error, message):
     with pytest.raises(error, match=message):
         function(*arguments)
+
+
+def test_a_strict_bound_of_a_million_terms_takes_a_second_and_is_an_upper_one():
+    x = np.random.default_rng(5).standard_normal(10**6)
+    beta = Fraction(1, 2**53)
+    begin = time.process_time()
+    found = theory.strict_sum_bound(x, beta)
+    assert time.process_time() - begin < 1
+    assert theory.sum_bound(x[:2000], beta) < theory.strict_sum_bound(x[:2000], beta)
+    exactly = theory.strict_sum_bound(list(x[:1500]), Fraction(1, 2**24))
+    fast = theory.strict_sum_bound(x[:1500], Fraction(1, 2**24))
+    assert exactly <= fast <= exactly * (1 + Fraction(1, 2**44))
+    assert found > theory.strict_sum_bound(x[:-1000], beta)

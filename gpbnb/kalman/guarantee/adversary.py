@@ -235,6 +235,29 @@ def attack(
     return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, allowed)
 
 
+def random_errors(found: Guarantee, steps: int, center: Any = None, seed: int = 0) -> NDArray[np.float64]:
+    """Errors after each step, (steps, n), of one run with random measurements within the limits.
+
+    Parameters
+    ----------
+    center : as for :func:`attack`.
+
+    Raises
+    ------
+    ArithmeticError : the exact filter left its limits.
+    """
+    given, rng = found.schedule, np.random.default_rng([seed, 1])
+    n, m = given.program.n, given.program.m
+    by_range = not np.isfinite(found.limits.measurement).all()
+    share = 0.3 * found.limits.innovation if by_range else found.limits.measurement * (1 - 1e-6)
+    pool = share * rng.uniform(-1, 1, (steps, 1, m))
+    steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
+    outside, _, errors = run_against(found, np.zeros((steps, n)), pool, steer, by_range, steps / 4)
+    if outside:
+        raise ArithmeticError(f"got random measurements that leave the limits at {outside} steps; needed wider limits")
+    return errors
+
+
 def run_against(
     found: Guarantee,
     rows: NDArray[np.float64],

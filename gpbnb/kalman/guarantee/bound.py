@@ -34,11 +34,11 @@ from gpbnb.kalman.guarantee.envelope import (
     certify,
     disturbances,
     peaks,
-    transient,
     units,
 )
 from gpbnb.kalman.guarantee.gains import Schedule, schedule
 from gpbnb.kalman.guarantee.program import functionals
+from gpbnb.kalman.guarantee.reach import forward, nothing, onward
 from gpbnb.kalman.model import LinearModel
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
@@ -217,11 +217,10 @@ def _enough_lags(radius: float, period: int) -> int:
     return -(-lags // period) * period
 
 
-def _gap(given: Schedule, steps: int, lags: int) -> int:
-    """How far apart checkpoints are whose bounds go back all the way: at every step if that is cheap."""
-    n, columns = given.program.n, len(_parts_of(given))
-    cost = steps * min(steps, lags) * n * n * (n + columns)
-    return 1 if cost < 2e10 else 2 ** min(12, math.ceil(math.log2(cost / 2e10)))
+def _window(given: Schedule, columns: int, steps: int) -> int:
+    """For how many steps disturbances are kept apart: for all, if that is cheap."""
+    n = given.program.n
+    return int(np.clip(3e8 / (max(steps, 1) * (columns + n) * n * n), 8, max(steps, 1)))
 
 
 def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], float]:
@@ -238,19 +237,25 @@ def _sums(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """Bounds after each step, and their parts; the last rows are those of the period."""
     n, part = given.program.n, _parts_of(given)
-    arrays = (found.F, found.spread, found.G, found.limits, found.slack, part)
+    used = (np.abs(found.G).max(axis=1) * found.limits).max(axis=0) > 0
+    columns = np.ascontiguousarray(found.G[:, :, used]), np.ascontiguousarray(found.limits[:, used])
+    arrays = (found.F, found.spread, *columns, found.slack, part[used])
     scale, small = _scale(found, _radius(given) if for_ever else math.nan)
+    size = np.where(scale > 0, scale, 1.0)
+    window = _window(given, int(used.sum()), given.first if for_ever else steps)
     if not for_ever:
-        return transient(*arrays, given.first, steps, steps, _gap(given, steps, steps), scale, 0.0)
+        at = np.arange(steps)
+        at = np.where(at < given.steps, at, given.first + (at - given.first) % max(given.steps - given.first, 1))
+        each_step = [np.ascontiguousarray(each[at]) for each in arrays[:5]]
+        history, parts = forward(*each_step, nothing(window, part[used], n), 0, steps, np.zeros(n), size)
+        return np.where(np.isnan(history), math.inf, history), parts, steps
     period, sums = given.steps - given.first, []
-    lags = 1
     for phase in range(1, period + 1):
-        certificate = certify(*arrays, np.eye(n), phase, given.first, True, most, scale, small)
-        sums.append(certificate)
-        lags = max(lags, certificate.lags)
-    early = given.first + lags if given.first else 0  # without a beginning of its own, sums of fewer terms
-    history, parts, _ = transient(*arrays, given.first, early, most, _gap(given, early, lags), scale, small)
-    largest = np.maximum(b, history.max(axis=0, initial=0.0))
+        sums.append(certify(*arrays, np.eye(n), phase, given.first, True, most, scale, small))
+    lags = max(certificate.lags for certificate in sums)
+    reach = nothing(window, part[used], n)
+    begin, parts = forward(*arrays[:5], reach, 0, given.first, np.zeros(n), size)
+    largest = np.maximum(b, begin.max(axis=0, initial=0.0))
     rows, row_parts = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
     for _ in range(200):  # the error of the last steps is carried on: raise the bound until it bounds itself
         rows, row_parts = [], []
@@ -261,13 +266,17 @@ def _sums(
             row_parts.append(each)
             rows.append(each.sum(axis=1) * (1 + 2.0**-48))
         new = np.max(rows, axis=0)
+        if not (new <= largest).all():
+            largest = np.maximum(largest, new * (1 + 2.0**-40))
+            continue
+        if not given.first:  # without a beginning of its own, sums of fewer terms
+            return np.array(rows), np.array(row_parts), lags
+        after, after_parts = onward(*arrays, given.first, lags, reach, size, largest)
+        new = after.max(axis=0)
         if (new <= largest).all():
-            break
-        largest = np.maximum(largest, new * (1 + 2.0**-40))
-    else:
-        rows = [np.full(n, math.inf)]
-        row_parts = [np.full((n, 4), math.inf)]
-    return np.concatenate([history, np.array(rows)]), np.concatenate([parts, np.array(row_parts)]), lags
+            return np.concatenate([begin, after, rows]), np.concatenate([parts, after_parts, row_parts]), lags
+        largest = np.maximum(largest, new * (1 + 2.0**-30))
+    return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), lags
 
 
 def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: bool, steps: int) -> Limits:

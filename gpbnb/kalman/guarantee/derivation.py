@@ -66,3 +66,23 @@ def induction() -> Derivation:
             ),
         )
     )
+
+
+def ellipsoid() -> Derivation:
+    r"""An ellipsoid that takes in a segment: the inequality of Cauchy and Schwarz as a square.
+
+    Here u is the half-width of the ellipsoid in some direction, v that of the segment, and t and τ are any positive
+    numbers.
+    """
+    u, v = sp.symbols("u v", nonnegative=True)
+    t, tau = sp.symbols(r"t \tau", positive=True)
+    grown = (t + tau) * (u**2 / t + v**2 / tau)
+    return Derivation(
+        (
+            Step(
+                "squared half-width of the new ellipsoid, less that of the sum of both sets",
+                together(grown, -((u + v) ** 2)),
+                over((tau * u - t * v) ** 2, t * tau),
+            ),
+        )
+    )

@@ -380,48 +380,6 @@ def certify(
 
 
 @compiled
-def transient(
-    F: Any,
-    spread: Any,
-    G: Any,
-    limits: Any,
-    slack: Any,
-    part: Any,
-    first: int,
-    steps: int,
-    most: int,
-    gap: int,
-    scale: Any,
-    small: float,
-) -> Any:
-    """Bound the error after each of the first steps, (steps, n), and its parts, (steps, n, 4).
-
-    At every step but the multiples of `gap` (1 for all), the rows go back to the last multiple only.
-    """
-    n = F.shape[1]
-    bounds, parts, lags = np.zeros((steps, n)), np.zeros((steps, n, 4)), 0
-    largest, units = np.zeros(n), np.eye(n)
-    for k in range(1, steps + 1):
-        back = most if k % gap == 0 else min(most, k % gap)
-        found = certify(F, spread, G, limits, slack, part, units, k, first, False, back, scale, small)
-        # Rows that end at a checkpoint meet its bound; others, the largest so far.
-        at_checkpoint = k % gap != 0 and k > gap and found.lags == k % gap
-        lags = max(lags, found.lags)
-        for i in range(n):
-            for j in range(n):
-                ended = bounds[k - 1 - k % gap, j] if at_checkpoint else largest[j]
-                parts[k - 1, i, START] += found.residual[i, j] * largest[j] + found.tail[i, j] * ended
-            total = parts[k - 1, i, START]
-            for p in range(3):
-                parts[k - 1, i, p] = found.sums[i, p]
-                total += found.sums[i, p]
-            bounds[k - 1, i] = total * (1 + 16 * _U)
-        for j in range(n):
-            largest[j] = max(largest[j], bounds[k - 1, j])
-    return bounds, parts, lags
-
-
-@compiled
 def peaks(
     F: Any,
     spread: Any,

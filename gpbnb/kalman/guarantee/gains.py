@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat
@@ -172,11 +172,16 @@ def _emulated(stored: LinearModel, fmt: FloatFormat, form: Form, most: int) -> t
 
 
 def packed_coefficients(
-    run: Run, fmt: FloatFormat, form: Form, rows: NDArray[np.int64]
+    run: Run, fmt: FloatFormat, form: Form, rows: NDArray[np.int64], before: int = 0
 ) -> tuple[Program, NDArray[Any]]:
-    """The program of a form and its coefficients, row by row, as the run had them."""
+    """The program of a form and its coefficients, row by row, as the run had them.
+
+    Parameters
+    ----------
+    rows : which of the run's checkpoints; its first is for step `before` + 1.
+    """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H, identity = (pack(fmt, each) for each in (run.model.Phi, run.model.H, np.eye(n, dtype=np.int64)))
+    Phi, H, identity = run.matrices[0], run.matrices[2], run.matrices[9]
     K = np.ascontiguousarray(run.G[:last])
     tail = K.shape[3:]
 
@@ -184,9 +189,12 @@ def packed_coefficients(
         """Entries of the matrix of each step, a row a step."""
         return matrices[rows].reshape(len(rows), -1, *tail)
 
+    def of_cycle(matrices: NDArray[Any]) -> NDArray[Any]:
+        return matrices[(before + rows) % len(matrices)].reshape(len(rows), -1, *tail)
+
     if form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
         F = np.empty((last, n, n, *tail), K.dtype)
-        _stored_loops(run.tag, K, H, Phi, identity, F)
+        _stored_loops(run.tag, K, np.roll(H, -before, axis=0), np.roll(Phi, -before, axis=0), identity, F)
         return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
     if form == Form.UD:
         cycle = int(np.lcm(len(H), len(run.UR)))
@@ -195,9 +203,9 @@ def packed_coefficients(
         U = np.array(run.UR)
         for i in range(m):  # the diagonal holds variances, and ones are meant there
             U[:, i, : i + 1] = 0
-        parts = [_of_cycle(each, rows, tail) for each in (Phi, U, D)]
+        parts = [of_cycle(each) for each in (Phi, U, D)]
         return sequential_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
-    parts = [_of_cycle(each, rows, tail) for each in (Phi, H)]
+    parts = [of_cycle(each) for each in (Phi, H)]
     return innovation_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
 
 
@@ -207,10 +215,6 @@ def pack(fmt: FloatFormat, values: Any) -> NDArray[Any]:
     if not isinstance(array.backend, Compiled):
         raise OverflowError(f"got numbers beyond the range of the compiled loops of {fmt}; scale the states")
     return array.backend.pack(array.components)
-
-
-def _of_cycle(matrices: NDArray[Any], rows: NDArray[np.int64], tail: tuple[int, ...]) -> NDArray[Any]:
-    return matrices[rows % len(matrices)].reshape(len(rows), -1, *tail)
 
 
 def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
@@ -258,12 +262,13 @@ def _exact_gains(
             break
         steps = min(max(most, repeat + 2 * period), repeat + period * (2 + 2 * ((steps - repeat) // period)))
     for _ in range(6):
-        # The invariant distance, by trial.
+        # The invariant distance: found roughly by trial, then made as small as one more period shows it can be.
         for larger in (4.0, 1e3, 1e6, 1e9):
             closed = _closes(stored, run, first, period, larger, most)
             if closed is not None:
-                extended, dK = closed
-                return extended.G.reshape(-1, n, m, 2), dK, True, first + period
+                smaller = _closes(stored, run, first, period, closed.needed, most) if closed.needed < larger else None
+                extended = closed if smaller is None else smaller
+                return extended.run.G.reshape(-1, n, m, 2), extended.dK, True, first + period
         if steps + period > most:
             break
         steps = min(most, 2 * steps - repeat)
@@ -281,10 +286,16 @@ def _bounded_run(stored: LinearModel, steps: int) -> BoundedRun:
     return run
 
 
-def _closes(
-    stored: LinearModel, run: BoundedRun, first: int, period: int, larger: float, most: int
-) -> tuple[BoundedRun, NDArray[np.float64]] | None:
-    """Follow one more period from a distance that is to be invariant; the longer run and its bounds, or None."""
+class _Closed(NamedTuple):
+    """A run of one more period, the bound of its gain's error, and the factor that would have been enough."""
+
+    run: BoundedRun
+    dK: NDArray[np.float64]
+    needed: float
+
+
+def _closes(stored: LinearModel, run: BoundedRun, first: int, period: int, larger: float, most: int) -> _Closed | None:
+    """Follow one more period from a distance that is to be invariant, `larger` times what the last period moved."""
     steps = run.steps + period
     longer = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     longer.take(np.zeros((run.steps, stored.m)))
@@ -301,8 +312,12 @@ def _closes(
         return None
     turned = inverse * arb_mat([[arb(float(a)) for a in row] for row in end.L])
     kappa = _frobenius_to_identity(turned)
-    total = (1 + kappa) ** 2 * arb(float(end.zeta)) + arb(_distance(inverse, _symmetric(longer) - P_begin))
-    return (longer, longer.bounds[1]) if total <= arb(float(trial)) else None
+    moved = _distance(inverse, _symmetric(longer) - P_begin)
+    carried = (1 + kappa) ** 2 * arb(float(end.zeta))
+    if not carried + arb(moved) <= arb(float(trial)):
+        return None
+    shrinks = 1 - float(carried.mid()) / trial  # by this share a distance shrinks in a period
+    return _Closed(longer, longer.bounds[1], 1.1 * max(moved, wrap) / shrinks / max(begin.zeta, wrap))
 
 
 def _symmetric(run: BoundedRun) -> NDArray[Any]:

@@ -8,11 +8,26 @@ estimate, not a bound, and of chopped arithmetic, whose errors have a mean, it s
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_lyapunov
 
 from gpbnb.kalman.guarantee.bound import Guarantee, disturbances_of
+from gpbnb.kalman.guarantee.envelope import Disturbances
+
+
+def separate_roundings(found: Guarantee) -> Disturbances:
+    """Disturbances with a column for each operation, also for those with the same effect.
+
+    A bound adds up the limits of operations with the same effect. Their variances must be added one by one, because
+    the largest of them usually outweighs the others.
+    """
+    program = found.schedule.program
+    each = np.arange(len(program.operations))
+    alone = replace(program, groups=each, roots=each)
+    return disturbances_of(replace(found, schedule=replace(found.schedule, program=alone)))
 
 
 def probable_error(found: Guarantee) -> NDArray[np.float64]:
@@ -27,15 +42,10 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     given = found.schedule
     if not found.for_ever:
         raise ValueError(f"got a filter without a steady state: {found.why}; needed one with a bound for ever")
-    each = disturbances_of(found)
-    groups, first = len(given.program.roots), given.first
-    # The limit of a group is a sum over roundings; independent ones have the sum of squares. All alike: mean square.
-    count = np.maximum(given.program.roundings, 1)
-    variance = each.limits[first:, :groups] ** 2 / 3 / count
-    F, noise = (
-        each.F[first:],
-        np.einsum("kig,kg,kjg->kij", each.G[first:, :, :groups], variance, each.G[first:, :, :groups]),
-    )
+    each = separate_roundings(found)
+    count, first = len(given.program.operations), given.first
+    F, G, variance = each.F[first:], each.G[first:, :, :count], each.limits[first:, :count] ** 2 / 3
+    noise = np.einsum("kig,kg,kjg->kij", G, variance, G)
     whole, gathered = np.eye(given.program.n), np.zeros_like(noise[0])
     for loop, added in zip(F, noise, strict=True):
         whole, gathered = loop @ whole, loop @ gathered @ loop.T + added

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.model import LinearModel
@@ -38,6 +41,26 @@ def elaenia_gold() -> LinearModel:
         x0=exact(["990"]),
         P0=exact([["100"]]),
         name="elaenia, gold",
+    )
+
+
+def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
+    """Three constants and two nearly parallel measurements: Dyer and McReynolds, in the 'shootout' of Grewal & Andrews.
+
+    Parameters
+    ----------
+    d : how far the measurements are from parallel. The shootout takes eps^(2/3) 10^(10 - k); the default is near
+        k = 8 of binary32.
+    """
+    e = Fraction(d)
+    return LinearModel(
+        Phi=exact(np.eye(3, dtype=np.int64)),
+        H=exact([[1, 1, 1], [1, 1, 1 + e]]),
+        Q=exact(np.zeros((3, 3), dtype=np.int64)),
+        R=exact(np.eye(2, dtype=np.int64)) * e**2,
+        x0=exact(["1", "1", "-1"]),
+        P0=exact(np.eye(3, dtype=np.int64)),
+        name="Dyer and McReynolds",
     )
 
 

@@ -1,0 +1,261 @@
+"""A bound up to a stated step, in blocks, for a filter that takes too long to settle.
+
+Gravity Probe B's filter is one: its drift rates have a time constant of months. Gains and disturbances of a year would
+fill 10 GB, and this module keeps those of one cycle of the model at a time. Several limits share a pass: the two
+choices of state, drift or deviations from the predicted drift, have the same gains.
+
+``python -m gpbnb.kalman.guarantee.horizon`` computes ``horizon.csv``; if it is interrupted, what it has written holds
+for the steps done so far.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.display.tables import Table
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import YEAR
+from gpbnb.kalman.guarantee.bound import limits
+from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Disturbances, Limits, disturbances, units
+from gpbnb.kalman.guarantee.gains import packed_coefficients, widened_array
+from gpbnb.kalman.guarantee.reach import Reach, forward, nothing
+from gpbnb.kalman.kernels.step import NEXT_CHECKPOINT
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.year_cases import MODELS
+from gpbnb.kalman.year_cases import model as year_model
+
+FILE = Path(__file__).with_name("horizon.csv")
+
+
+@dataclass
+class _Carried:
+    """What is carried from block to block for one choice of limits."""
+
+    within: Limits
+    assumed: NDArray[np.float64]
+    last: NDArray[np.float64]
+    worst: NDArray[np.float64]
+    parts: NDArray[np.float64]
+    reach: Reach | None = None
+    used: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    size: NDArray[np.float64] = field(default_factory=lambda: np.ones(1))
+
+
+class Bounds(NamedTuple):
+    """Bounds of the error of each state at any step so far, (n,), for one choice of limits."""
+
+    worst: NDArray[np.float64]
+    last: NDArray[np.float64]
+    #: (n, 4), of the step where the bound was largest.
+    parts: NDArray[np.float64]
+
+
+def bounds_in_blocks(
+    model: LinearModel,
+    fmt: FloatFormat,
+    within: Sequence[Limits],
+    assumed: Sequence[Any],
+    steps: int,
+    form: Form = Form.INNOVATION,
+    block: int | None = None,
+    window: int = 8,
+) -> Iterator[tuple[int, list[Bounds]]]:
+    """Bound what rounding does to the estimates of the first steps, block by block.
+
+    Parameters
+    ----------
+    model, fmt, form : the filter, as for :func:`gpbnb.kalman.guarantee.bound.guarantee`.
+    within : limits on state and innovation, one for each bound that is wanted.
+    assumed : for each, (n,), an error that is not exceeded. It enters the size of the computed estimate; a bound above
+        it ends the iteration with an ``ArithmeticError``.
+    steps : how many. block : how many at a time; by default a cycle of the model.
+
+    Yields
+    ------
+    done, bounds : after each block.
+
+    Raises
+    ------
+    ArithmeticError : a bound exceeds what was assumed; the filter stopped or lost definiteness.
+    """
+    stored = model.rounded(fmt)
+    n, m, cycle = stored.n, stored.m, stored.cycle
+    block = cycle if block is None else block
+    run, true = (
+        Run(stored, fmt, form, range(1, block + 1)),
+        BoundedRun(stored, None, Form.INNOVATION, range(1, block + 1)),
+    )
+    products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
+    HPhi, Phi = double_doubles(products), double_doubles(stored.Phi)
+    none = np.zeros(n)
+    each = [
+        _Carried(w, np.asarray(a, dtype=np.float64), none, none, np.zeros((n, 4)))
+        for w, a in zip(within, assumed, strict=True)
+    ]
+    silence = ((run, fmt.array(np.zeros((block, m)))), (true, np.zeros((block, m))))
+    done = 0
+    while done < steps:
+        count = min(block, steps - done)
+        for filter_run, z in silence:
+            filter_run.checkpoint_steps = np.arange(done + 1, done + count + 1)
+            filter_run.notes[NEXT_CHECKPOINT] = 0
+            filter_run.take(z[:count])
+            if filter_run.stopped or filter_run.indefinite:
+                raise ArithmeticError(f"{model.name} in {fmt}: it stopped or lost definiteness by step {done + count}")
+        rows = np.arange(count)
+        at = (done + rows) % cycle
+        program, packed = packed_coefficients(run, fmt, form, rows, done)
+        arrays = (
+            widened_array(packed),
+            units(fmt),
+            np.ascontiguousarray(Phi[at % len(Phi)]),
+            np.ascontiguousarray(HPhi[at]),
+            np.ascontiguousarray(true.G[:count].reshape(count, n, m, 2)),
+            true.bounds[1][:count],
+        )
+        caps = np.full(len(program.operations), np.inf)
+        part = np.array([ROUNDING] * len(program.roots) + [LOOP] * n + [GAIN] * m)
+        for one in each:
+            found = Disturbances(
+                *disturbances(
+                    program.operations,
+                    program.outputs,
+                    program.groups,
+                    program.roots,
+                    *arrays,
+                    one.within,
+                    one.assumed,
+                    caps,
+                )
+            )
+            _follow(one, found, part, done, count, window)
+            if not (one.worst <= one.assumed).all():
+                raise ArithmeticError(f"the bound {one.worst} exceeds the assumed {one.assumed} by step {done + count}")
+        done += count
+        yield done, [Bounds(one.worst, one.last, one.parts) for one in each]
+
+
+def _follow(one: _Carried, found: Disturbances, part: NDArray[np.int64], done: int, count: int, window: int) -> None:
+    sizes = np.abs(found.G) * found.limits[:, None, :]
+    if one.reach is None:
+        one.used = sizes.max(axis=(0, 1)) > 0
+        one.size = np.maximum((sizes.sum(axis=2) + found.slack).max(axis=0), 1e-300)
+        one.reach = nothing(window, part[one.used], len(one.last))
+    slack = found.slack + sizes[:, :, ~one.used].sum(axis=2) * (1 + 2.0**-40)
+    columns = np.ascontiguousarray(found.G[:, :, one.used]), np.ascontiguousarray(found.limits[:, one.used])
+    bounds, parts = forward(found.F, found.spread, *columns, slack, one.reach, done, count, one.last, one.size)
+    bounds = np.where(np.isnan(bounds), np.inf, bounds)
+    at = bounds.argmax(axis=0)
+    for i, k in enumerate(at):
+        if bounds[k, i] > one.worst[i]:
+            one.parts[i] = parts[k, i]
+    one.worst, one.last = np.maximum(one.worst, bounds.max(axis=0)), bounds[-1].copy()
+
+
+# -- Gravity Probe B --------------------------------------------------------------------------------------------------
+
+ABSOLUTE = (7000.0, 500.0, 7000.0, 100.0, 200.0, 200.0, 200.0, 200.0, 200.0, 20.0)
+"""Limits of the states when they are the drift itself; units as in :data:`gpbnb.kalman.gravity_probe_b.STATES`."""
+
+DEVIATION = (500.0, 500.0, 100.0, 100.0, 200.0, 200.0, 200.0, 200.0, 200.0, 20.0)
+"""The same when they are deviations from the predicted drift, which otherwise reaches 6606 mas in the year."""
+
+INNOVATION = (1000.0, 200.0)
+"""Limits of the innovations, mas: 20 standard deviations of gyro and telescope noise, with room for the first steps."""
+
+
+class Row(NamedTuple):
+    """Bounds after some steps of the year for one choice of states."""
+
+    precision: int
+    steps: int
+    states: str
+    bounds: tuple[float, ...]
+    gain_parts: tuple[float, ...]
+
+
+def load(file: Path = FILE) -> tuple[Row, ...]:
+    """The stored rows."""
+    with file.open(encoding="utf-8", newline="") as stream:
+        lines = list(csv.reader(stream))[1:]
+    return tuple(
+        Row(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13])), tuple(map(float, line[13:])))
+        for line in lines
+    )
+
+
+def table() -> Table:
+    """Bounds of the drift and its rates for the longest time that was computed, for both choices of states."""
+    header = (
+        "states",
+        "days",
+        "drift φ2, mas",
+        "drift φ3, mas",
+        "drift rate 2, mas/yr",
+        "drift rate 3, mas/yr",
+        "bits",
+    )
+    last = {row.states: row for row in load()}
+    names = {"absolute": "drift itself", "deviation": "deviations from the predicted drift"}
+    body = [
+        (names[row.states], f"{row.steps / 8640:.0f}", *(f"{b:.2g}" for b in row.bounds[:4]), str(bits(row)))
+        for row in last.values()
+    ]
+    return Table("Gravity Probe B in binary64", header, tuple(body))
+
+
+def bits(row: Row, tolerance: float = 1.0) -> int:
+    """Bits for which the bound of each drift and rate, scaled with the unit roundoff, is within a tolerance.
+
+    The bounds are nearly proportional to the unit roundoff, so this extrapolates; it is not a guarantee by itself.
+    """
+    return math.ceil(row.precision + math.log2(max(row.bounds[:4]) / tolerance))
+
+
+def gravity_probe_b_bounds(precision: int, steps: int = YEAR) -> Iterator[tuple[int, list[Bounds]]]:
+    """Bounds of a year of Gravity Probe B in a binary format, absolute states first, then deviations."""
+    within = [limits(10, 2, state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
+    assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
+    return bounds_in_blocks(year_model(MODELS[0], 2), FloatFormat(2, precision), within, assumed, steps)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Follow a year of Gravity Probe B in a format, by default binary64; two lines of the file for each 1 % of it."""
+    precision = int(arguments[0]) if arguments else 53
+    header = [
+        "precision",
+        "steps",
+        "states",
+        *(f"bound {i}" for i in range(10)),
+        *(f"gain part {i}" for i in range(10)),
+    ]
+    every = 0
+    with FILE.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(header)
+        for done, found in gravity_probe_b_bounds(precision):
+            if done < every and done != YEAR:
+                continue
+            every = done + YEAR // 100
+            for name, each in zip(("absolute", "deviation"), found, strict=True):
+                bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
+                writer.writerow([precision, done, name, *bounds, *parts])
+            stream.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main(sys.argv[1:]))

@@ -1,0 +1,149 @@
+"""NumPy's functions of arrays of a format: their values against rounded Fractions, in the order that each states."""
+
+from __future__ import annotations
+
+import pickle
+from fractions import Fraction
+
+import flint
+import mpmath
+import numpy as np
+import pytest
+
+from gpbnb import FloatFormat, Rounding
+from gpbnb.arithmetic.functions import ELEMENTARY
+
+FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(2, 113), FloatFormat(2, 24, Rounding.CHOP)]
+
+
+@pytest.fixture(params=FORMATS, ids=str)
+def fmt(request):
+    return request.param
+
+
+def drawn(fmt, *shape):
+    return fmt.array(np.random.default_rng(sum(shape)).uniform(-4, 4, shape))
+
+
+def from_left(fmt, terms):
+    total = terms[0]
+    for term in terms[1:]:
+        total = fmt.round(total + term)
+    return total
+
+
+def test_means_cumulative_sums_and_traces_add_from_left_to_right(fmt):
+    x = drawn(fmt, 5, 5)
+    rows = x.to_fractions()
+    assert np.mean(x, axis=1).tolist() == [fmt.round(from_left(fmt, row) / 5) for row in rows]
+    assert x.mean().item() == fmt.round(from_left(fmt, rows.ravel()) / 25)
+    assert np.cumsum(x[0]).tolist() == [from_left(fmt, rows[0][: k + 1]) for k in range(5)]
+    assert np.cumsum(x, axis=1)[2].tolist() == np.cumsum(x[2]).tolist()
+    assert np.trace(x).item() == from_left(fmt, rows.diagonal()) == x.trace().item()
+
+
+def test_choosing_and_moving_rounds_nothing(fmt):
+    x = drawn(fmt, 3, 4)
+    rows = x.to_fractions()
+    assert np.max(x).item() == x.max().item() == rows.max()
+    assert np.min(x, axis=0).tolist() == rows.min(axis=0).tolist()
+    assert np.max(x, axis=1, keepdims=True).shape == (3, 1)
+    assert np.sort(x, axis=1).tolist() == np.sort(rows, axis=1).tolist()
+    assert np.clip(x, -1, 2).tolist() == np.clip(rows, -1, 2).tolist()
+    assert np.append(x, x, axis=0).shape == (6, 4)
+    assert np.append(x, 1).shape == (13,)
+    assert np.zeros_like(x).tolist() == [[0] * 4] * 3
+    assert np.ones_like(x).tolist() == [[1] * 4] * 3
+    assert x.ravel().shape == x.flatten().shape == (12,)
+    assert x.transpose().tolist() == x.T.tolist()
+    assert x.copy() is x
+    assert x[0, 0].item() == x.item(0) == rows[0, 0]
+    assert np.sum(x, axis=0, keepdims=True).shape == (1, 4)
+    assert pickle.loads(pickle.dumps(x)).tolist() == x.tolist()
+
+
+def test_products(fmt):
+    a, b = drawn(fmt, 2, 3), drawn(fmt, 3, 2)
+    assert np.einsum("ij,jk->ik", a, b).tolist() == (a @ b).tolist() == a.dot(b).tolist()
+    assert np.einsum("ij->ji", a).tolist() == a.T.tolist()
+    assert np.einsum("ij,ij", a, a).item() == (a * a).sum().item()
+    assert np.einsum("i,j->ij", a[0], b[:, 0]).tolist() == np.outer(a[0], b[:, 0]).tolist()
+    exact = np.kron(a.to_fractions(), b.to_fractions())
+    assert np.kron(a, b).tolist() == np.vectorize(fmt.round, otypes=[object])(exact).tolist()
+    assert np.linalg.norm(a).tolist() == np.sqrt((a * a).sum()).tolist()
+    assert np.linalg.norm(a, 1).tolist() == abs(a).sum(0).max().tolist()
+    assert np.linalg.norm(a[0], np.inf).tolist() == abs(a[0]).max().tolist()
+
+
+def test_whole_powers_multiply_from_left_to_right(fmt):
+    x = drawn(fmt, 4)
+    for value, cube in zip(x.to_fractions(), (x**3).to_fractions(), strict=True):
+        assert cube == fmt.round(fmt.round(value * value) * value)
+    assert np.power(x, 3).tolist() == (x**3).tolist()
+    assert (x**-1).tolist() == (1 / x).tolist()
+    assert (x**0).tolist() == [1] * 4
+    for exponent in (0.5, "2", True, x):
+        with pytest.raises(TypeError, match="exponent"):
+            x**exponent
+
+
+@pytest.mark.parametrize("name", ELEMENTARY)
+def test_elementary_functions_are_correctly_rounded(name, fmt):
+    inside = name in ("arcsin", "arccos")
+    x = fmt.array(np.random.default_rng(1).uniform(0.1, 0.9 if inside else 3, 5))
+    with mpmath.workprec(400):
+        for value, found in zip(x.to_fractions(), getattr(np, name)(x).to_fractions(), strict=True):
+            other = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}.get(name, name)
+            true = getattr(mpmath, other)(mpmath.mpf(value.numerator) / value.denominator)
+            significand, exponent = true.man_exp
+            sign = -1 if true < 0 else 1
+            assert found == fmt.round(sign * Fraction(int(significand)) * Fraction(2) ** int(exponent))
+
+
+def test_elementary_functions_at_exact_points_and_outside():
+    fmt = FloatFormat(2, 24)
+    assert np.exp(fmt.array(0)).item() == 1
+    assert np.log(fmt.array(1)).item() == 0
+    assert np.sin(fmt.array([0])).tolist() == [0]
+    for name, value in (("log", 0), ("log", -1), ("arcsin", 2)):
+        with pytest.raises(ValueError, match=f"got np.{name} of .*finite and real"):
+            getattr(np, name)(fmt.array(value))
+
+
+def test_numbers_of_mpmath_and_flint_are_read_exactly():
+    fmt = FloatFormat(2, 200)
+    with mpmath.workprec(150):
+        third = mpmath.mpf(1) / 3
+        assert fmt.array([third, -third]).tolist()[0] == -fmt.array([-third]).item() != Fraction(1, 3)
+        assert fmt.array(mpmath.mpf(-12)).item() == -12
+        assert fmt.array(mpmath.mpf(0)).item() == 0
+    assert fmt.array([flint.fmpz(7), flint.fmpq(-3, 4), flint.arb("0.5")]).tolist() == [7, Fraction(-3, 4), 0.5]
+    for bad in (mpmath.mpf("nan"), mpmath.inf, flint.arb("nan"), flint.arb("0.1")):
+        with pytest.raises((ValueError, TypeError), match="needed"):
+            fmt.array(bad)
+
+
+def test_unknown_names_give_the_nearest():
+    x = FloatFormat(2, 24).array([1, 2])
+    with pytest.raises(AttributeError, match=r"the nearest is x\.to_fractions"):
+        x.to_fraction  # noqa: B018
+    assert not hasattr(x, "nothing_like_it_at_all")
+
+
+@pytest.mark.parametrize(
+    ("call", "error"),
+    [
+        (lambda x: np.einsum("ii->i", x), ValueError),
+        (lambda x: np.einsum("ij...", x), ValueError),
+        (lambda x: np.einsum("ij,k->i", x, x), ValueError),
+        (lambda x: np.kron(x[0], x), ValueError),
+        (lambda x: np.linalg.norm(x, 3), ValueError),
+        (lambda x: np.mean(x[:0]), ValueError),
+        (lambda x: np.max(x[:0]), ValueError),
+        (lambda x: np.trace(x[0]), ValueError),
+        (lambda x: x**1001, ValueError),
+    ],
+)
+def test_what_is_refused(call, error):
+    with pytest.raises(error, match="needed"):
+        call(FloatFormat(2, 24).array([[1, 2], [3, 4]]))

@@ -1,0 +1,31 @@
+"""The figure of a guarantee shows the bound above both errors, and reruns measurements exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpbnb import FloatFormat
+from gpbnb.display.style import figure
+from gpbnb.kalman.guarantee.adversary import attack, random_errors
+from gpbnb.kalman.guarantee.bound import guarantee, limits
+from gpbnb.kalman.guarantee.figures import bound_of, draw_errors, errors_of
+from gpbnb.wordlength.examples import tracker
+
+
+def test_bound_and_errors_step_by_step() -> None:
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
+    outcome = attack(found, 900, 30, states=[0], center=[750, 0], plans=1)
+    chosen, random = errors_of(found, outcome.z), random_errors(found, 900, [750, 0])
+    assert np.abs(chosen).max(axis=0)[0] == outcome.errors[0]
+    for state in range(2):
+        bound = bound_of(found, state, 900)
+        assert (np.abs(chosen[:, state]) <= bound).all()
+        assert (np.abs(random[:, state]) <= bound).all()
+        assert bound.max() == found.bound[state] or bound.max() >= found.bound[state] * (1 - 1e-6)
+    _, (ax,) = figure()
+    draw_errors(ax, found, chosen, random, 0, "position, m")
+    drawn, adversary, noise = ax.get_lines()
+    assert np.array_equal(drawn.get_ydata(), bound_of(found, 0, 900))
+    assert np.array_equal(adversary.get_ydata(), np.abs(chosen[:, 0]))
+    assert np.array_equal(noise.get_ydata(), np.abs(random[:, 0]))
+    assert "m" in ax.get_ylabel()

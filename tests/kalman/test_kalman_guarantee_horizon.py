@@ -1,0 +1,73 @@
+"""A bound block by block, against the bound of the same steps at once; the stored bounds of Gravity Probe B."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from gpbnb import FloatFormat
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import YEAR
+from gpbnb.kalman.guarantee import horizon
+from gpbnb.kalman.guarantee.bound import guarantee, limits
+from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
+from gpbnb.kalman.model import LinearModel
+
+STEPS = 50
+
+
+def constants() -> LinearModel:
+    """Two constants without process noise, whose gain falls for ever, and a cycle of three measurements."""
+    return LinearModel(
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=np.array([exact([["1", "0.5"]]), exact([["0.3", "-1"]]), exact([["0", "1"]])]),
+        Q=exact([["0", "0"], ["0", "0"]]),
+        R=exact([["2"]]),
+        x0=exact(["0", "0"]),
+        P0=exact([["3", "1"], ["1", "2"]]),
+    )
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.HUNG])
+@pytest.mark.parametrize("block", [3, 7, STEPS])
+def test_blocks_give_the_bound_of_all_steps_at_once(block: int, form: Form) -> None:
+    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    found = guarantee(constants(), fmt, within, form, most=STEPS, horizon=STEPS)
+    assert found.steps == STEPS
+    blocks = list(bounds_in_blocks(constants(), fmt, [within], [found.bound], STEPS, form, block, window=STEPS))
+    done, (last,) = blocks[-1]
+    assert done == STEPS
+    assert np.allclose(last.worst, found.bound, rtol=1e-6)
+    assert np.allclose(last.parts.sum(axis=1), last.worst, rtol=1e-9)
+    worst = [bounds[0].worst for _, bounds in blocks]
+    assert all((a <= b).all() for a, b in pairwise(worst))
+
+
+def test_a_bound_above_the_assumed_error_ends_it() -> None:
+    fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
+    with pytest.raises(ArithmeticError, match="exceeds the assumed"):
+        list(bounds_in_blocks(constants(), fmt, [within], [[1e-9, 1e-9]], STEPS))
+
+
+def test_stored_bounds_of_gravity_probe_b() -> None:
+    rows = horizon.load()
+    assert {row.states for row in rows} == {"absolute", "deviation"}
+    for states in ("absolute", "deviation"):
+        each = [row for row in rows if row.states == states]
+        assert all(a.steps < b.steps <= YEAR for a, b in pairwise(each))
+        bounds = np.array([row.bounds for row in each])
+        assert (np.diff(bounds, axis=0) >= 0).all()
+    last = {row.states: np.array(row.bounds) for row in rows}
+    assert (last["deviation"] <= last["absolute"]).all()
+
+
+def test_the_first_cycle_of_gravity_probe_b_again() -> None:
+    first = {row.states: row for row in horizon.load()[:2]}
+    assert {row.steps for row in first.values()} == {2340}
+    done, found = next(horizon.gravity_probe_b_bounds(53))
+    assert done == 2340
+    for name, each in zip(("absolute", "deviation"), found, strict=True):
+        assert np.allclose(each.worst, first[name].bounds, rtol=1e-5)

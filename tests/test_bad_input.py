@@ -1,0 +1,133 @@
+"""Generated bad input: every public function refuses it with one of its documented exceptions, or gives a result."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, required_precision
+from gpbnb.budget import theory as budget
+from gpbnb.kalman.named import form_named, rounding_named, whole_number
+from gpbnb.kalman.requirement import Requirement
+from gpbnb.kalman.simulation import Simulation
+from gpbnb.rounding import theory
+from gpbnb.sweeps import plain_integer, plain_number
+from gpbnb.wordlength.models import read_model
+
+MANY = settings(derandomize=True, deadline=None, database=None, max_examples=400)
+DOCUMENTED = (ValueError, TypeError, OverflowError, ZeroDivisionError)
+
+numbers = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 1e308, 5e-324, 10**400, -1, 0, 1, 2, 3, 0.5]),
+    st.sampled_from(["", "nan", "1_0", "٣", "0.1", "1/0", "x", "1e999999", b"1"]),
+    st.sampled_from(
+        [1j, Decimal("NaN"), Decimal("0.1"), Fraction(1, 3), np.float32(2), np.int8(-1), np.datetime64(0, "s")]
+    ),
+    st.sampled_from([object(), {}, {1}, lambda: 1, np.bool_(True)]),
+)
+rows = st.lists(numbers, max_size=3)
+matrices = st.one_of(
+    numbers,
+    rows,
+    st.lists(rows, max_size=3),
+    st.sampled_from(
+        [np.zeros((0, 0)), np.zeros((2, 3)), np.zeros((1, 1, 1, 1)), np.full((2, 2), np.nan), np.eye(2, dtype=complex)]
+    ),
+)
+GOOD = {"Phi": [["0.5"]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]}
+MODEL = LinearModel(**GOOD)
+Z = np.ones((3, 1))
+
+
+def accepted(call, *arguments, **keywords):
+    """Whether a call gives a result; it may only fail with the documented exceptions, and with a message."""
+    message = refusal(lambda: call(*arguments, **keywords))
+    assert message != ""
+    return message is None
+
+
+def refusal(call):
+    """The message of a documented exception, or None."""
+    try:
+        call()
+    except DOCUMENTED as error:
+        return str(error)
+    return None
+
+
+@MANY
+@given(st.sampled_from(list(GOOD)), matrices)
+def test_models(letter, value):
+    accepted(LinearModel, **(GOOD | {letter: value}))
+
+
+@MANY
+@given(st.sampled_from(["A", "B", "C", "D", "x0"]), matrices)
+def test_linear_systems(letter, value):
+    accepted(LinearSystem, **({"A": [["0.5"]], "B": [[1]]} | {letter: value}))
+
+
+@MANY
+@given(st.sampled_from(["steps", "tolerance", "base", "rounding", "form", "basis", "z", "seed", "within"]), matrices)
+def test_questions(name, value):
+    """What is accepted gives an answer whose precisions were tried: no silent result."""
+    asked = {"model": MODEL, "steps": 3, "tolerance": 0.1, "z": None if name == "seed" else Z} | {name: value}
+    found = []
+    message = refusal(lambda: found.append(required_precision(**asked)))
+    if message is not None:
+        assert "needed" in message
+        return
+    (found,) = found
+    assert isinstance(found, Requirement)
+    assert found.tried
+    assert not isinstance(value, bool) or name not in ("steps", "tolerance", "base", "form")
+    assert found.fmt is None or dict(found.tried)[found.precision] <= 1
+
+
+@MANY
+@given(numbers, numbers)
+def test_formats_and_their_arrays(base, precision):
+    accepted(FloatFormat, base, precision)
+    accepted(FixedFormat, base, precision)
+    accepted(FloatFormat(2, 24).round, base)
+
+
+@MANY
+@given(matrices)
+def test_arrays(values):
+    accepted(FloatFormat(10, 8).array, values)
+    accepted(FloatFormat(2, 24, Rounding.CHOP).array, values)
+
+
+@MANY
+@given(numbers, matrices)
+def test_small_readers_and_bounds(number, values):
+    for call in (plain_number, plain_integer):
+        if isinstance(number, str):
+            accepted(call, number)
+    for call in (form_named, rounding_named, lambda each: whole_number("steps", each)):
+        assert not accepted(call, number) or not isinstance(number, bool)
+    if not isinstance(values, str):  # a path, and OSError is documented
+        accepted(read_model, values)
+    accepted(theory.strict_sum_bound, values, Fraction(1, 2**24))
+    accepted(Simulation, MODEL, (0.0,), 0, number)
+
+
+@MANY
+@given(st.text(max_size=60))
+def test_budgets(text):
+    accepted(budget.parse, text)
+    accepted(budget.parse, "name,kind,form,error_mas\n" + text)
+
+
+def test_too_many_steps_are_refused_before_they_are_simulated():
+    with pytest.raises(ValueError, match="got 1,000,000,000,000 steps to simulate; needed at most"):
+        required_precision(MODEL, 10**12, 0.1)
