@@ -41,6 +41,6 @@ def draw_errors(
     ax.plot(steps, np.abs(chosen[:, state]), color=COLOURS[0], lw=1, label="measurements chosen by the adversary")
     ax.plot(steps, np.abs(random[:, state]), color=REFERENCE, lw=0.6, label="random measurements")
     loglog(ax)
-    ax.set_ylim(bottom=1e-3 * found.bound[state])
+    ax.set_ylim(1e-3 * found.bound[state], 50 * found.bound[state])  # room for the legend
     label(ax, "step", f"rounding error of the {quantity}")
-    legend(ax, loc="center left")
+    legend(ax, loc="upper left")
