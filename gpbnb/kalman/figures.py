@@ -19,6 +19,7 @@ from gpbnb.display.style import (
     OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
+    VALID,
     colours,
     label,
     legend,
