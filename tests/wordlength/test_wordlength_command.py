@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html.parser
 import json
 import math
 from fractions import Fraction
@@ -10,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from markup import Elements
 from scipy import signal
 
 from gpbnb import __main__ as top
@@ -68,27 +68,7 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
     for outside in ("http://", "https://", "<script", "<link", "src="):
         assert outside not in text
     assert "--tolerance 0.01,inf" in text
-    _Balanced().feed(text)
-
-
-class _Balanced(html.parser.HTMLParser):
-    """Every element of the page ends where it should."""
-
-    EMPTY = ("meta", "line", "circle", "polyline")
-
-    def __init__(self):
-        super().__init__()
-        self.open = []
-
-    def handle_starttag(self, tag, attrs):
-        if tag not in self.EMPTY:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag, attrs):
-        pass
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
+    Elements(text)
 
 
 def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
