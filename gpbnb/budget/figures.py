@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from gpbnb.budget import theory
 from gpbnb.budget.experiment import Draws
 from gpbnb.budget.theory import Budget, ErrorForm
-from gpbnb.display.style import OBSERVED, OBSERVED_OTHERS, REFERENCE, STRICT, VALID, label, loglog, name
+from gpbnb.display.style import BLACK, OBSERVED, OBSERVED_OTHERS, REFERENCE, VALID, label, loglog, name
 
 
 def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes, most: int = 100) -> list[Artist]:
@@ -29,14 +29,14 @@ def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes
     for total, style in ((goal, "-"), (larger, "--")):
         artists += ax.plot(n, [theory.equal_error(total, int(k)) for k in n], style, color=VALID)
     artists += ax.plot(n, goal / n, "-.", color=REFERENCE)
-    artists += ax.plot(*printed, "o", mfc="none", mew=1.6, color=STRICT, ms=9)
+    artists += ax.plot(*printed, "o", mfc="none", mew=1.6, color=BLACK, ms=9)
     artists.append(
         name(ax, f"independent,\ntotal {larger:g} mas/yr", (9, theory.equal_error(larger, 9)), VALID, (7, 3))
     )
     last = (most, theory.equal_error(goal, most))
     artists.append(name(ax, f"independent,\ntotal {goal:g} mas/yr", last, VALID, (0, -6), ha="right"))
     artists.append(name(ax, f"all of the same sign,\ntotal {goal:g} mas/yr", (9, goal / 9), REFERENCE, (-6, -4)))
-    artists.append(name(ax, "printed example", printed, STRICT, (-7, -5)))
+    artists.append(name(ax, "printed example", printed, BLACK, (-7, -5)))
     loglog(ax)
     ax.set_xlim(1, 1.15 * most)
     ax.set_ylim(goal / most, 2 * larger)
@@ -53,7 +53,7 @@ def shares(budget: Budget, ax: Axes) -> list[Artist]:
     bars = ax.barh(places, parts, color=[colours[source.form] for source in ordered])
     artists: list[Artist] = list(bars)
     for place, part, source in zip(places, parts, ordered, strict=True):
-        artists.append(name(ax, f"{part:.0f} %, {source.form.value}", (max(part, 0), float(place)), STRICT, (5, 0)))
+        artists.append(name(ax, f"{part:.0f} %, {source.form.value}", (max(part, 0), float(place)), BLACK, (5, 0)))
     ax.set_yticks(places, [source.name for source in ordered])
     ax.set_xlim(min(0, *parts), 1.45 * max(parts))
     ax.grid(False, axis="y")
@@ -73,7 +73,7 @@ def distribution(result: Draws, ax: Axes) -> list[Artist]:
         (theory.GOAL, ":", 1.08, "goal"),
         (worst, "--", 0.7, "sum of all"),
     ):
-        colour = REFERENCE if text == "goal" else STRICT
+        colour = REFERENCE if text == "goal" else BLACK
         artists.append(ax.vlines((-value, value), 0, height * top, color=colour, ls=style, lw=1.4))
         artists.append(name(ax, text, (value, height * top), colour, (4, -1)))
     artists.append(name(ax, "random draws", (0, top), OBSERVED, (0, 3)))

@@ -26,9 +26,7 @@ VALID = "#007D5F"
 """Colour of bounds and formulas that hold."""
 REFUTED = "#C44E00"
 """Colour of printed formulas that fail."""
-BOUND = VALID
-"""Another name of :data:`VALID`; draw a bound that fails in :data:`REFUTED`."""
-STRICT = "#000000"
+BLACK = "#000000"
 REFERENCE = "#6B6B6B"
 MARKERS = "osD^v"
 

@@ -12,12 +12,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from gpbnb.display.style import (
+    BLACK,
     MARKERS,
     OBSERVED,
     OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
-    STRICT,
     VALID,
     label,
     loglog,
@@ -29,7 +29,7 @@ from gpbnb.measurement import ARCSEC, MAS, deroll, roll, rotation, theta_of
 
 Frames = Mapping[str, NDArray[np.float64]]
 FRAME_COLOURS = dict(
-    zip(("a", "i", "φ", "t", "r", "g"), (REFERENCE, STRICT, OBSERVED, *OBSERVED_OTHERS[1:]), strict=True)
+    zip(("a", "i", "φ", "t", "r", "g"), (REFERENCE, BLACK, OBSERVED, *OBSERVED_OTHERS[1:]), strict=True)
 )
 FRAME_NAMES = {
     "a": "absolute",
@@ -143,8 +143,8 @@ def deroll_of_a_roll(
     for k, sign, index, marker, fill in ((0, -1, "3", "o", colour), (1, 1, "2", "s", "none")):
         true = sign * truth[k] / ARCSEC
         artists += ax.plot(turns, sign * back[:, k] / ARCSEC, marker, color=colour, mfc=fill)
-        artists.append(ax.axhline(true, color=STRICT, lw=1))
-        artists.append(write(ax, rf"true $\alpha_{index}$", (1.03, true), STRICT, (2, 5)))
+        artists.append(ax.axhline(true, color=BLACK, lw=1))
+        artists.append(write(ax, rf"true $\alpha_{index}$", (1.03, true), BLACK, (2, 5)))
     formula = "equation (8)" if printed else "equation (5)"
     ax.set_xlim(-0.03, 1.2)
     largest = float(np.hypot(*readings[0])) / ARCSEC
@@ -183,12 +183,12 @@ def first_rolls(still: Year, rolled: Year, ax: Axes) -> list[Artist]:
     artists: list[Artist] = [
         *ax.plot(minutes, samples, ".-", lw=0.6, color=OBSERVED_OTHERS[0]),
         *ax.plot(middle, means, "D", color=OBSERVED),
-        *ax.plot(still.step / 60 * np.arange(len(without)), without, color=STRICT, ls="--"),
+        *ax.plot(still.step / 60 * np.arange(len(without)), without, color=BLACK, ls="--"),
     ]
     end = float(minutes[-1])
     artists.append(write(ax, "rolling", (end, float(samples[-1])), OBSERVED, (6, 0)))
     artists.append(write(ax, "mean over\na roll", (end, float(means[-1])), OBSERVED, (6, 0)))
-    artists.append(write(ax, "no roll", (end, float(without[-1])), STRICT, (6, 0)))
+    artists.append(write(ax, "no roll", (end, float(without[-1])), BLACK, (6, 0)))
     ax.set_xlim(-0.02 * end, 1.28 * end)
     label(ax, "time (minutes)", r"measured $\varphi_2$ (arcsec)")
     return artists
@@ -228,7 +228,7 @@ def precessions(ax: Any, declination: float) -> list[Artist]:
     gyro = np.array([np.cos(1.1), 0.0, np.sin(1.1)])
     tip = gyro + 0.8 * star
     arrows = (
-        ((0, 0, -0.8), (0, 0, 1.6), STRICT, "Earth's axis", (-0.42, 0, 0.78)),
+        ((0, 0, -0.8), (0, 0, 1.6), BLACK, "Earth's axis", (-0.42, 0, 0.78)),
         (gyro, 0.8 * star, REFERENCE, "spin axis, to the star", gyro + 0.36 * star + np.array([0.1, 0, 0.27])),
         (tip, 0.5 * geodetic, OBSERVED, "geodetic", tip + 0.62 * geodetic),
         (tip, 0.6 * motional, OBSERVED_OTHERS[1], "frame dragging", tip + 0.62 * motional + np.array([0.0, 0, 0.06])),

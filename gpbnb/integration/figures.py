@@ -13,11 +13,11 @@ from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.style import (
+    BLACK,
     OBSERVED,
     OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
-    STRICT,
     TEXT,
     VALID,
     colours,
@@ -47,11 +47,11 @@ def block_diagram(ax: Axes) -> list[Artist]:
 
     def arrow(*points: tuple[float, float]) -> None:
         for start, end in pairwise(points[:-1]):
-            artists.extend(ax.plot(*zip(start, end, strict=True), color=STRICT, lw=1.1))
+            artists.extend(ax.plot(*zip(start, end, strict=True), color=BLACK, lw=1.1))
         style: dict[str, Any] = {
             "arrowstyle": "-|>",
             "mutation_scale": 12,
-            "color": STRICT,
+            "color": BLACK,
             "lw": 1.1,
             "shrinkA": 0,
             "shrinkB": 0,
@@ -59,7 +59,7 @@ def block_diagram(ax: Axes) -> list[Artist]:
         artists.append(ax.add_patch(FancyArrowPatch(points[-2], points[-1], **style)))
 
     def sign(x: float, y: float) -> None:
-        artists.append(ax.add_patch(Circle((x, y), 0.26, fill=False, ec=STRICT, lw=1.1)))
+        artists.append(ax.add_patch(Circle((x, y), 0.26, fill=False, ec=BLACK, lw=1.1)))
 
     def text(x: float, y: float, words: str) -> None:
         artists.append(ax.text(x, y, words, ha="center", va="center", fontsize=TEXT))
@@ -202,7 +202,7 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
         artists.append(write(ax, run.rule.name.split(",")[0], (run.n[0], observed[0]), colour, (8, 21 * up), ha="left"))
     artists += ax.plot(n, np.sqrt(theory.error_variance(n, mu)), color=VALID, label="exact, trapezoidal")
     artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=VALID, ls=":", label="rectangular")
-    artists += ax.plot(n, np.sqrt(walk), color=STRICT, ls="--", lw=1, label="random walk (35)")
+    artists += ax.plot(n, np.sqrt(walk), color=BLACK, ls="--", lw=1, label="random walk (35)")
     loglog(ax)
     low = float(min(np.sqrt(run.variance).min() for run in runs)) / unit
     ax.set_ylim(low / 3, 10 ** np.ceil(np.log10(np.sqrt(walk[-1])) + 0.3))
@@ -223,8 +223,8 @@ def rules_first_order(rules: Sequence[str], ax: Axes) -> list[Artist]:
         artists.append(write(ax, rule, (mu[15 * k], 1.45), colour, (0, 0), ha="left"))
     best = [theory.best_possible_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
     bound = np.sqrt(np.array(best) / least)
-    artists += ax.plot(mu, bound, color=STRICT, ls=":", label="scaled samples (bound)")
-    artists.append(write(ax, "scaled samples", (mu[45], bound[45]), STRICT, (-6, -4)))
+    artists += ax.plot(mu, bound, color=BLACK, ls=":", label="scaled samples (bound)")
+    artists.append(write(ax, "scaled samples", (mu[45], bound[45]), BLACK, (-6, -4)))
     ax.set_xscale("log")
     ax.set_ylim(0, 1.6)
     label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "random walk relative\nto trapezoidal", "first-order input")
@@ -262,11 +262,11 @@ def errors_over_rate(result: RateSweep, ax: Axes) -> list[Artist]:
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
     last = float(result.rates[-1])
     artists: list[Artist] = []
-    artists += ax.plot(result.rates, result.discretization[0], "x", color=STRICT, label="discretization")
+    artists += ax.plot(result.rates, result.discretization[0], "x", color=BLACK, label="discretization")
     artists += ax.plot(rates, result.theory(result.formats[0], rates)[0], color=VALID, lw=1)
     ends = np.log10([float(result.discretization[0][-1]), *(line[-1] for line in result.rounding)])
     heights = [10**height for height in _apart(ends.tolist(), 0.6)]
-    artists.append(write(ax, "discretization", (last, heights[0]), STRICT, (8, 0)))
+    artists.append(write(ax, "discretization", (last, heights[0]), BLACK, (8, 0)))
     for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
         artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {arithmetic(fmt)}")
         artists += ax.plot(rates, result.theory(fmt, rates)[1], color=VALID, lw=1)

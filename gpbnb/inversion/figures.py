@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import MaxNLocator
 
-from gpbnb.display.style import OBSERVED, REFERENCE, REFUTED, STRICT, TEXT, VALID, label, legend, name, name_ends
+from gpbnb.display.style import BLACK, OBSERVED, REFERENCE, REFUTED, TEXT, VALID, label, legend, name, name_ends
 from gpbnb.inversion.example import PLACES, PRINTED, Column
 from gpbnb.inversion.experiment import Frozen, Trial
 from gpbnb.inversion.tables import in_math
@@ -88,7 +88,7 @@ def table1(bounds: Sequence[Column], errors: Sequence[Column], ax: Axes) -> list
         artists += ax.plot(x, y, "_", ms=11, color=colour, alpha=0.25)
         values = [float(value) for value in PRINTED[printed]]
         marker = "s" if printed == "bound" else "o"
-        artists += ax.plot(np.arange(len(PLACES)) + shift, values, marker, ms=8, mfc="none", mec=STRICT, mew=1.6)
+        artists += ax.plot(np.arange(len(PLACES)) + shift, values, marker, ms=8, mfc="none", mec=BLACK, mew=1.6)
         side = 1 if shift > 0 else -1
         top = max(one.values[0] for one in columns)
         name(
@@ -99,7 +99,7 @@ def table1(bounds: Sequence[Column], errors: Sequence[Column], ax: Axes) -> list
             (11 * side, 14 if shift < 0 else -1),
             va="center",
         )
-        name(ax, f"{printed} as\nprinted", (shift, values[0]), STRICT, (11 * side, 0))
+        name(ax, f"{printed} as\nprinted", (shift, values[0]), BLACK, (11 * side, 0))
     ax.set_yscale("log")
     ax.set_xticks(range(len(PLACES)), [str(p) for p in PLACES])
     ax.set_xlim(-1.0, len(PLACES) - 0.5)

@@ -13,12 +13,13 @@ from matplotlib.lines import Line2D
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.style import (
-    BOUND,
+    BLACK,
     COLOURS,
     OBSERVED,
     OBSERVED_OTHERS,
     REFERENCE,
-    STRICT,
+    REFUTED,
+    VALID,
     colours,
     label,
     legend,
@@ -58,7 +59,7 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
     if quantity not in _QUANTITIES:
         raise ValueError(f"got quantity {quantity!r}; needed one of {', '.join(_QUANTITIES)}")
     artists: list[Artist] = []
-    for run, colour in zip(runs, colours(len(runs), (*COLOURS, STRICT, REFERENCE)), strict=True):
+    for run, colour in zip(runs, colours(len(runs), (*COLOURS, BLACK, REFERENCE)), strict=True):
         values = np.abs(getattr(run, quantity))
         if values.ndim > 1:
             values = values.max(axis=1)
@@ -76,18 +77,18 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
 
 
 def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Axes) -> list[Artist]:
-    """Draw bounds against the step: name, steps and values of each. The last one is black, the others are printed."""
+    """Draw bounds against the step: name, steps and values of each. The last one holds, the others do not."""
     artists: list[Artist] = []
     for number, (name, steps, values) in enumerate(curves):
         last = number == len(curves) - 1
         style = "-" if last else ("-", "--", "-.")[number % 3]
-        artists += ax.plot(steps, values, color=STRICT if last else BOUND, ls=style, label=name)
+        artists += ax.plot(steps, values, color=VALID if last else REFUTED, ls=style, label=name)
     return artists
 
 
 def level(name: str, value: float, ax: Axes) -> Artist:
-    """Draw a bound that is the same at each step."""
-    return ax.axhline(value, color=BOUND, label=name)
+    """Draw a printed bound, which the errors exceed, that is the same at each step."""
+    return ax.axhline(value, color=REFUTED, label=name)
 
 
 def _name(run: Year) -> str:
@@ -125,12 +126,12 @@ def year_end(
         artists += bound_by_digits(ax, corrected, ls=style, label=name)
     artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
     for (name, places), marker in zip(answers[:-1], "os^", strict=False):
-        colour = BOUND if marker == "o" else STRICT
+        colour = REFUTED if marker == "o" else BLACK
         height = [float(report_bounds.YEAR_SIZE)] * len(places)
         artists += ax.plot(list(places), height, marker, mfc="none", mec=colour, ms=9, label=name)
     for name, places in answers[-1:]:
         artists += ax.plot(
-            list(places), [tolerance] * len(places), "|", color=STRICT, ms=26, mew=2, ls="none", label=name
+            list(places), [tolerance] * len(places), "|", color=BLACK, ms=26, mew=2, ls="none", label=name
         )
     ax.set_yscale("log")
     legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -168,14 +169,14 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
         x, y = np.asarray(line.get_xdata())[12], np.asarray(line.get_ydata())[12]
-        artists += [line, _beside(ax, word, (x, y), (6, 6), BOUND)]
+        artists += [line, _beside(ax, word, (x, y), (6, 6), REFUTED)]
     artists.append(ax.axhline(found.tolerance, color=REFERENCE, ls=":"))
     artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
     size = float(report_bounds.YEAR_SIZE)
     artists.append(ax.axhline(size, color=REFERENCE, ls=":"))
     artists.append(_beside(ax, "as large as the drift of a year", (3.5, size), (0, 4), REFERENCE))
-    artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=BOUND, ms=11, mew=1.5)
-    artists += [_beside(ax, f"{place} printed", (place, size), (6, 13), BOUND) for place in found.printed]
+    artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=REFUTED, ms=11, mew=1.5)
+    artists += [_beside(ax, f"{place} printed", (place, size), (6, 13), REFUTED) for place in found.printed]
     ax.set_yscale("log")
     ax.set_ylim(1e-11, 1e23)
     ax.set_yticks(10.0 ** np.arange(-8, 20, 4))
@@ -194,7 +195,7 @@ def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[
     """Bound (125) at the end of a year against the decimal digits, in mas."""
     betas = [Fraction(0.5 * 10.0 ** (1 - digits)) for digits in _DIGITS.tolist()]
     heights = [report_bounds.gravity_probe_b_bound(beta, report_bounds.EXAMPLE[0], **faults) for beta in betas]
-    return ax.plot(_DIGITS, heights, color=BOUND, **style)
+    return ax.plot(_DIGITS, heights, color=REFUTED, **style)
 
 
 def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
@@ -213,7 +214,7 @@ def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[
     steps, error = found.history.steps, np.abs(found.history.state[:, state])
     seen = error > 0
     artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
-    artists += ax.plot(steps, found.state[:, state], color=BOUND, label="contraction bound")
+    artists += ax.plot(steps, found.state[:, state], color=VALID, label="contraction bound")
     loglog(ax)
     legend(ax)
     label(ax, "step $k$", f"error of {name}")

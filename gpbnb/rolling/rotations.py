@@ -161,9 +161,14 @@ def digits_needed_observed(
     rotate = {"recursion": recursion, "direct": direct}[method]
     enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
     most = min(LARGEST_PRECISION[base], enough)
-    found = smallest_precision(
-        lambda fmt: rotate(fmt, period, steps).drift_error(drift) <= error, base, least=2, largest=most
-    )
+
+    def within(fmt: FloatFormat) -> bool:
+        try:
+            return rotate(fmt, period, steps).drift_error(drift) <= error
+        except OverflowError:  # with few digits the rotation grows without limit
+            return False
+
+    found = smallest_precision(within, base, least=2, largest=most)
     if found is None:
         raise ValueError(f"got an error of {error:g} mas; needed one that base {base} reaches within {most} digits")
     return found.precision

@@ -10,15 +10,15 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.display.style import BOUND, OBSERVED, REFERENCE, REFUTED, STRICT, label, legend, line_styles
+from gpbnb.display.style import BLACK, OBSERVED, REFERENCE, REFUTED, VALID, label, legend, line_styles
 from gpbnb.wordlength.examples import STANDARD
 
 #: The looks of each kind of answer, as an emulation observes and a bound bounds. Open markers, in the colour of refuted
 #: formulas, are of (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
-    "bound": ("|", BOUND, BOUND),
-    "theory": ("D", STRICT, STRICT),
+    "bound": ("|", VALID, VALID),
+    "theory": ("D", BLACK, BLACK),
     "printed": ("o", REFUTED, "none"),
     "corrected": ("s", REFUTED, "none"),
 }
@@ -66,7 +66,7 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
     for (name, curve), (marker, colour) in zip(points.items(), line_styles(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
     for (name, curve), style in zip(lines.items(), ("-", "--", "-.", ":"), strict=False):
-        colour = REFUTED if name.startswith("(125)") else BOUND
+        colour = REFUTED if name.startswith("(125)") else VALID
         artists += ax.plot(*zip(*curve, strict=True), style, color=colour, label=name)
     ax.set_xscale("log")
     artists += standards(ax, upright=False)

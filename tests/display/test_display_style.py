@@ -101,7 +101,7 @@ def test_the_legend_has_no_frame():
 
 
 def test_no_two_colours_are_alike_and_all_stand_out_from_white():
-    colours = [style.OBSERVED, *style.OBSERVED_OTHERS, style.VALID, style.REFUTED, style.STRICT, style.REFERENCE]
+    colours = [style.OBSERVED, *style.OBSERVED_OTHERS, style.VALID, style.REFUTED, style.BLACK, style.REFERENCE]
     rgb = np.array([to_rgb(colour) for colour in colours])
     distance = np.abs(rgb[:, None] - rgb).sum(axis=2)[np.triu_indices(len(rgb), 1)]
     assert distance.min() > 0.25

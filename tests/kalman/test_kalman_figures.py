@@ -68,7 +68,7 @@ def test_lines_and_levels(ax):
     curves = [("a", [1, 2], [3, 4]), ("b", [1, 2], [5, 6]), ("c", [1, 2], [7, 8])]
     artists = figures.lines(curves, ax)
     assert [(a.get_label(), list(a.get_ydata())) for a in artists] == [(name, y) for name, _, y in curves]
-    assert [colour(a) for a in artists] == [style.BOUND, style.BOUND, style.STRICT]
+    assert [colour(a) for a in artists] == [style.REFUTED, style.REFUTED, style.VALID]
     assert artists[0].get_linestyle() != artists[1].get_linestyle()
     assert list(figures.level("d", 9.0, ax).get_ydata()) == [9, 9]
 
@@ -84,7 +84,7 @@ def test_year_end(ax, runs):
     assert list(rounded.get_ydata()) == ends[:2]
     assert list(chopped.get_ydata()) == ends[2:]
     assert colour(rounded) == style.OBSERVED != colour(chopped)
-    assert colour(line) == style.BOUND
+    assert colour(line) == style.REFUTED
     size = report_bounds.YEAR_SIZE
     crossing = float(np.interp(-np.log10(float(size)), -np.log10(line.get_ydata()), line.get_xdata()))
     counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
@@ -110,7 +110,7 @@ def test_contraction(ax):
     assert list(points.get_ydata()) == [e for e in error if e > 0]
     assert np.array_equal(line.get_ydata(), found.state[:, 0])
     assert points.get_linestyle() == "None"
-    assert (colour(points), colour(line)) == (style.OBSERVED, style.BOUND)
+    assert (colour(points), colour(line)) == (style.OBSERVED, style.VALID)
     assert ax.get_ylabel() == "error of x (m)"
 
 

@@ -91,6 +91,14 @@ def test_a_peak_gain_of_a_filter_in_companion_form_is_found():
     assert gain.high[0, 0] == pytest.approx(np.abs(response).sum(), rel=1e-6)
 
 
+def test_small_entries_of_a_peak_gain_are_as_exact_as_large_ones():
+    half = [["1/2", 0], [0, "1/2"]]
+    gain = peak_gain(exact(half), exact([[1], [1]]), exact([[2**40, 0], [0, 1], [0, 0]]))
+    assert gain.low[:, 0] == pytest.approx([2**41, 2, 0], rel=2**-40)
+    assert (gain.low <= [[2**41], [2], [0]]).all()
+    assert (gain.high >= [[2**41], [2], [0]]).all()
+
+
 def vars_of(system):
     return system.A, system.B, system.C, system.D
 

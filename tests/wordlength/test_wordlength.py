@@ -484,7 +484,7 @@ def test_growth(ax):
     points, line, *rest = figures.growth({"run": [(10, 9), (1000, 24)]}, {"bound": [(10, 20), (1000, 60)]}, ax)
     assert points.get_xydata().tolist() == [[10, 9], [1000, 24]]
     assert line.get_xydata().tolist() == [[10, 20], [1000, 60]]
-    assert line.get_color() == style.BOUND
+    assert line.get_color() == style.VALID
     assert [text.get_text() for text in rest[1::2]] == ["binary16", "binary32", "binary64"]
     assert ax.get_xscale() == "log"
 

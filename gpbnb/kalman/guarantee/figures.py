@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from gpbnb.display.style import BOUND, COLOURS, REFERENCE, label, legend, loglog
+from gpbnb.display.style import COLOURS, REFERENCE, VALID, label, legend, loglog
 from gpbnb.kalman.guarantee.adversary import run_against
 from gpbnb.kalman.guarantee.bound import Guarantee
 
@@ -37,7 +37,7 @@ def draw_errors(
     state : which state. quantity : its name and unit, for the axis.
     """
     steps = np.arange(1, len(chosen) + 1)
-    ax.plot(steps, bound_of(found, state, len(steps)), color=BOUND, label="bound for every measurement sequence")
+    ax.plot(steps, bound_of(found, state, len(steps)), color=VALID, label="bound for every measurement sequence")
     ax.plot(steps, np.abs(chosen[:, state]), color=COLOURS[0], lw=1, label="measurements chosen by the adversary")
     ax.plot(steps, np.abs(random[:, state]), color=REFERENCE, lw=0.6, label="random measurements")
     loglog(ax)

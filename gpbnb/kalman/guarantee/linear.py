@@ -134,7 +134,7 @@ def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
 
 
 def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> tuple[Enclosure | None, float]:
-    r"""The sum in balls of some bits, until what is left is below 2**-60 of it, and what is negligible.
+    r"""The sum in balls of some bits, until what is left is below 2**-50 of each entry, and what is negligible.
 
     There is none if the balls have grown too large.
 
@@ -164,8 +164,9 @@ def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> tuple[Enclosure | N
         row, steps, first = c, 0, _row_norm(c) * left * within
         while True:
             tail = _row_norm(row) * left * within
-            enough = arb(2) ** -60 * _largest(s for line in sums for s in line)
-            if tail < enough or not tail > arb(2) ** -160 * first:
+            if all(tail < arb(2) ** -50 * s or s + tail < arb(2) ** -100 * first for line in sums for s in line):
+                break
+            if not tail > arb(2) ** -160 * first:
                 break
             if not tail < most * first or steps > 2**20:
                 return None, 0.0
