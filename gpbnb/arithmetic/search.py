@@ -11,7 +11,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 
 CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
-"""Precisions that a run is always tried in above the answer: those of binary32 and binary64, and their like."""
+"""Precisions, those of binary32 and binary64 and their like, that are always tried when they are above the answer."""
 
 
 def smallest_precision(

@@ -38,7 +38,7 @@ class ErrorForm(Enum):
 
 
 METHODS = ("roll", "orbit", "filter")
-"""Ways to reduce an error: averaging over rolls, averaging over orbits, and filtering."""
+"""The three ways to reduce an error are averaging over rolls, averaging over orbits, and filtering."""
 
 _BY_KIND: dict[Kind, set[str]] = {
     Kind.DETERMINISTIC: set(),

@@ -30,7 +30,7 @@ from gpbnb.integration import theory
 from gpbnb.integration.experiment import Accuracy, RateSweep, Simulation, Sweep
 
 SERIES = (OBSERVED, OBSERVED_OTHERS[1], OBSERVED_OTHERS[3], OBSERVED_OTHERS[2])
-"""Colours of several series whose names are written in the same colour: dark ones, which can be read as text."""
+"""Colours of series whose names are written in the same colour. They are dark enough to be read as text."""
 
 
 def block_diagram(ax: Axes) -> list[Artist]:

@@ -57,7 +57,7 @@ class Price:
     digits: str
 
 
-#: For each bound: its name in :func:`gpbnb.inversion.experiment.trial`, its operations, and the digits it needs.
+#: For each bound, its name in :func:`gpbnb.inversion.experiment.trial`, its operations, and the digits it needs.
 KNOWN: dict[str, tuple[str, Callable[[int], int], str]] = {
     "Wilkinson": ("Wilkinson", lambda n: 2 * n * n, "53 bits"),
     "Higham": ("Higham", lambda n: 3 * product(n), "53 bits"),

@@ -26,7 +26,7 @@ class Box(NamedTuple):
     follows: tuple[str, ...]
 
 
-#: The boxes of Figure III-1: the computation on the left, the bounds of its errors on the right.
+#: The boxes of Figure III-1, with the computation on the left and the bounds of its errors on the right.
 CHART: Mapping[str, Box] = {
     "given": Box(0.25, 0.98, "Given matrix $A$", ("triangularize",)),
     "triangularize": Box(0.25, 0.83, "Triangularize $A$ into $A_T$", ("transform", "errors of A_T")),

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 REPAIR_TOLERANCE = 2.0**-26
-"""Largest repair, relative to the variances: half the digits of float64."""
+"""The largest repair, relative to the variances. It is half the digits of float64."""
 
 LEAST_SHIFT = 2.0**-58
 """Where the search for the least δ begins."""

@@ -28,7 +28,7 @@ from gpbnb.kalman.simulation import Simulation, fine_resolution
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 MOST_SIMULATED = 10**8
-"""Largest number of steps that are simulated: a small model takes about a second for a million, in each precision."""
+"""Largest number of steps that are simulated. A small model takes about a second for a million of them."""
 
 
 def required_precision(
@@ -143,7 +143,7 @@ def survey(
 
     Returns
     -------
-    tried : precision, and largest error or bound over tolerance, as in :class:`Requirement`.
+    tried : precision, and largest error or bound over tolerance, as in :class:`gpbnb.kalman.requirement.Requirement`.
 
     Raises
     ------

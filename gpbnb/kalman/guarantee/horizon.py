@@ -174,7 +174,7 @@ DEVIATION = (500.0, 500.0, 100.0, 100.0, 200.0, 200.0, 200.0, 200.0, 200.0, 20.0
 """The same when they are deviations from the predicted drift, which otherwise reaches 6606 mas in the year."""
 
 INNOVATION = (1000.0, 200.0)
-"""Limits of the innovations, mas: 20 standard deviations of gyro and telescope noise, with room for the first steps."""
+"""Limits of the innovations in mas. They are 20 standard deviations of gyro and telescope noise, with some room."""
 
 
 class Row(NamedTuple):
