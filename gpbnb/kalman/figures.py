@@ -163,23 +163,23 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     ):
         group = [run for run in found.runs if run.case.rounding is rounding]
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
-    for word, faults, style in (
-        ("(125) as printed", {}, "-"),
-        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"], "--"),
+    for word, faults, style, place, away in (
+        ("(125) as printed", {}, "-", 0, (2, -38)),
+        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"], "--", 12, (6, 6)),
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
-        x, y = np.asarray(line.get_xdata())[12], np.asarray(line.get_ydata())[12]
-        artists += [line, _beside(ax, word, (x, y), (6, 6), REFUTED)]
+        x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]
+        artists += [line, _beside(ax, word, (x, y), away, REFUTED)]
     artists.append(ax.axhline(found.tolerance, color=REFERENCE, ls=":"))
     artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
     size = float(report_bounds.YEAR_SIZE)
     artists.append(ax.axhline(size, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "as large as the drift of a year", (3.5, size), (0, 4), REFERENCE))
+    artists.append(_beside(ax, "as large as the drift of a year", (16.9, size), (0, -13), REFERENCE, ha="right"))
     artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=REFUTED, ms=11, mew=1.5)
-    artists += [_beside(ax, f"{place} printed", (place, size), (6, 13), REFUTED) for place in found.printed]
+    artists += [_beside(ax, f"{place} printed", (place, size), (9, 3), REFUTED) for place in found.printed]
     ax.set_yscale("log")
     ax.set_ylim(1e-11, 1e23)
-    ax.set_yticks(10.0 ** np.arange(-8, 20, 4))
+    ax.set_yticks(10.0 ** np.arange(-8, 24, 8))
     ax.set_xticks(range(4, 24, 2))
     legend(ax, loc="lower left")
     label(ax, "decimal digits that the computer carries", "largest error in a year (mas, mas/yr)")
