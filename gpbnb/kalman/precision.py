@@ -179,7 +179,7 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
     if measured.ndim != 2 or measured.shape[1] != model.m or not len(measured) or steps not in (None, len(measured)):
         count = f"{steps} steps" if steps else "steps, at least one"
         column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
-        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else repr(z)
+        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else str(z)
         raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]

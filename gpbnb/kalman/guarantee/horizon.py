@@ -10,9 +10,9 @@ for the steps done so far.
 
 from __future__ import annotations
 
+import argparse
 import csv
 import math
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -232,9 +232,16 @@ def gravity_probe_b_bounds(precision: int, steps: int = YEAR) -> Iterator[tuple[
     return bounds_in_blocks(year_model(MODELS[0], 2), FloatFormat(2, precision), within, assumed, steps)
 
 
-def main(arguments: Sequence[str]) -> int:
-    """Follow a year of Gravity Probe B in a format, by default binary64; two lines of the file for each 1 % of it."""
-    precision = int(arguments[0]) if arguments else 53
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Follow a year of Gravity Probe B in a format; two lines of the file for each 1 % of it."""
+    parser = argparse.ArgumentParser(
+        prog="python -m gpbnb.kalman.guarantee.horizon",
+        description="Bounds for a year of Gravity Probe B.",
+    )
+    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the format")
+    parser.add_argument("--output", type=Path, default=Path(".cache/horizon"), help=f"folder for {FILE.name}")
+    given = parser.parse_args(arguments)
+    given.output.mkdir(parents=True, exist_ok=True)
     header = [
         "precision",
         "steps",
@@ -243,19 +250,19 @@ def main(arguments: Sequence[str]) -> int:
         *(f"gain part {i}" for i in range(10)),
     ]
     every = 0
-    with FILE.open("w", encoding="utf-8", newline="") as stream:
+    with (given.output / FILE.name).open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(header)
-        for done, found in gravity_probe_b_bounds(precision):
+        for done, found in gravity_probe_b_bounds(given.precision):
             if done < every and done != YEAR:
                 continue
             every = done + YEAR // 100
             for name, each in zip(("absolute", "deviation"), found, strict=True):
                 bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
-                writer.writerow([precision, done, name, *bounds, *parts])
+                writer.writerow([given.precision, done, name, *bounds, *parts])
             stream.flush()
     return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main(sys.argv[1:]))
+    raise SystemExit(main())
