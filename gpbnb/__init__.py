@@ -68,4 +68,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *NAMED_FORMATS})
+    return sorted({*__all__, *NAMED_FORMATS})
