@@ -30,7 +30,18 @@ ROOT = Path(__file__).resolve().parents[1]
 BOOK = ROOT / "book"
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # The longest first, so that none is left over at the end; others follow.
-LONGEST = ("kalman", "wordlength", "rolling", "rounding", "integration", "geometry", "inversion", "budget", "index")
+LONGEST = (
+    "kalman",
+    "processors",
+    "wordlength",
+    "guarantee",
+    "rolling",
+    "rounding",
+    "integration",
+    "mission",
+    "geometry",
+    "inversion",
+)
 LEDGER = "the ledger"
 LEDGER_COMMAND = [sys.executable, "-m", "gpbnb.ledger"]
 TIMEOUT = 900  # seconds a cell
