@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64, TF32
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation
@@ -24,16 +25,16 @@ STANDARD = {
     "binary64": FloatFormat(2, 53),
 }
 
-#: Formats of accelerators, with the exponents of binary32. Sums are usually kept in binary32 there.
-ACCELERATORS = {"bfloat16": FloatFormat(2, 8), "TF32": FloatFormat(2, 11)}
-
-#: Least and largest powers of two of their normal numbers; IEEE 754-2019, table 3.5, for the standard ones.
+#: Least and largest powers of two of the normal numbers of processors, by the name of the format.
 NORMAL_RANGE = {
-    "binary16": (-14, 15),
-    "binary32": (-126, 127),
-    "binary64": (-1022, 1023),
-    "bfloat16": (-126, 127),
-    "TF32": (-126, 127),
+    name: cast(tuple[int, int], (fmt.emin, fmt.emax))
+    for name, fmt in {
+        "binary16": BINARY16,
+        "binary32": BINARY32,
+        "binary64": BINARY64,
+        "bfloat16": BFLOAT16,
+        "TF32": TF32,
+    }.items()
 }
 
 

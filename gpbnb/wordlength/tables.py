@@ -8,7 +8,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display.tables import Table, arithmetic, digits, short
 from gpbnb.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.kalman.requirement import Requirement
-from gpbnb.wordlength.examples import ACCELERATORS, NORMAL_RANGE, STANDARD
+from gpbnb.wordlength.examples import NORMAL_RANGE
 from gpbnb.wordlength.study import BinaryRange, InversePrecision, UpdateStagnation
 
 
@@ -48,17 +48,6 @@ def binary_ranges(found: Sequence[BinaryRange]) -> Table:
         suitable = [name for name, (low, high) in NORMAL_RANGE.items() if low <= each.least and each.largest <= high]
         body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(suitable) or "none"))
     return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "held by"), tuple(body))
-
-
-def processors() -> Table:
-    """Formats of processors: what they are here, and the range that they have and the emulation has not."""
-    body = []
-    for name, fmt in (STANDARD | ACCELERATORS).items():
-        low, high = NORMAL_RANGE[name]
-        call = f"FloatFormat({fmt.base}, {fmt.precision})"
-        body.append((name, call, short(float(fmt.unit_roundoff)), f"$2^{{{low}}}$", f"$2^{{{high + 1}}}$"))
-    header = ("format", "here", "unit roundoff", "normal from", "and below")
-    return Table(f"{len(body)} formats of processors", header, tuple(body))
 
 
 def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
