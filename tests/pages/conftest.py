@@ -42,7 +42,11 @@ def open_page():
             page.on("console", lambda m: faults.append(f"console: {m.text}") if m.type == "error" else None)
             page.on("pageerror", lambda error: faults.append(f"script: {error}"))
             page.on("request", lambda r: None if r.url.startswith((base, "data:", "blob:")) else faults.append(r.url))
-            page.on("requestfailed", lambda r: faults.append(f"failed: {r.url} {r.failure}"))
+            # Whoever leaves a page aborts what it still loads: no fault of the page.
+            page.on(
+                "requestfailed",
+                lambda r: None if r.failure == "net::ERR_ABORTED" else faults.append(f"failed: {r.url} {r.failure}"),
+            )
             page.on("response", lambda r: faults.append(f"{r.status}: {r.url}") if r.status >= 400 else None)
             page.goto(base + address, wait_until="load")
             if address:
