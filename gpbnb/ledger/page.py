@@ -83,8 +83,8 @@ _REPLICATION = {
 }
 
 
-_COLLAPSED = (Verdict.VERIFIED.value, Verdict.GIVEN.value)
-"""Verdicts whose evidence the ledger collapses: most readers look for the other ones."""
+_SHOWN = {Verdict.VERIFIED.value: 1, Verdict.GIVEN.value: 1, Verdict.MISPRINT.value: 2}
+"""How many texts of its evidence a verdict shows; others are collapsed, as most readers look for other verdicts."""
 
 
 def topics() -> dict[str, str]:
@@ -188,17 +188,18 @@ def printed_table(rows: Iterable[Row], title: str) -> Html:
 
 
 def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
-    """Tabulate some rows in reading order: place, verdict, printed text, recomputation and note.
+    """Tabulate some rows in reading order: place, verdict, note, and the printed text collapsed.
 
     Parameters
     ----------
     rows : which.
-    left_undone : label the texts as what the documents leave undone and what is answered here.
+    left_undone : show all texts, labelled as what the documents leave undone and what is answered here.
     """
     rows = in_reading_order(rows)
     owner = topics()
     lines = [
-        f'<tr><th scope="row">{_link(row)}</th><td>{badge(row.outcome)}</td>{_evidence(row, owner)}</tr>'
+        f'<tr><th scope="row">{_link(row)}{_chapter(row, owner)}</th><td>{badge(row.outcome)}</td>'
+        f"{_evidence(row, note_first=not left_undone)}</tr>"
         for row in rows
     ]
     classes = "ledger-undone" if left_undone else ""
@@ -274,24 +275,33 @@ def _entry(row: Row, owner: dict[str, str]) -> str:
     return (
         f'<tr id="{escape(statement.id)}" data-kind="{statement.kind}" data-verdict="{outcome}" '
         f'data-chapter="{owner.get(statement.id, "")}"><th scope="row"><a href="#{escape(statement.id)}">'
-        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}</th>"
+        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}{_chapter(row, owner)}</th>"
         f"<td>{badge(outcome_name(row.outcome))}</td>"
-        f"{_evidence(row, owner)}</tr>"
+        f"{_evidence(row)}</tr>"
     )
 
 
-def _evidence(row: Row, owner: dict[str, str]) -> str:
+def _chapter(row: Row, owner: dict[str, str]) -> str:
+    topic = owner.get(row.statement.id, "")
+    return f"<br>{chapter_link(topic)}" if topic in CHAPTERS else ""
+
+
+def _evidence(row: Row, note_first: bool = False) -> str:
     found, note, root = "", "", ""
     if row.finding:
         found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
-    topic = owner.get(row.statement.id, "")
-    link = chapter_link(topic) if topic in CHAPTERS else ""
-    named = (("printed", typeset(row.statement.printed)), ("recomputed", found), ("note", note), ("see", link))
-    texts = [f'<p class="{name}">{text}</p>' for name, text in named if text]
-    shown = 1 if row.outcome in _COLLAPSED else len(texts)
-    hidden = "".join(texts[shown:])
+    named = [("printed", typeset(row.statement.printed)), ("recomputed", found), ("note", note)]
+    shown = _SHOWN.get(row.outcome, len(named))
+    if note_first and note:
+        named.insert(0, named.pop())
+        shown = 1
+    hidden = _paragraphs(named[shown:])
     evidence = f"<details><summary>Evidence</summary>{hidden}</details>" if hidden else ""
-    return f"<td>{''.join(texts[:shown])}{root}{evidence}</td>"
+    return f"<td>{_paragraphs(named[:shown])}{root}{evidence}</td>"
+
+
+def _paragraphs(named: Iterable[tuple[str, str]]) -> str:
+    return "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
 
 
 def _root(finding: Finding) -> str:
