@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.formats import FloatFormat
 
 
+class NegativeRootError(ValueError):
+    """The square root of a negative number."""
+
+
 class FloatArray(NumPyProtocols):
     """An immutable n-dimensional array of numbers of one format; make one with ``fmt.array``.
 
@@ -240,7 +244,7 @@ class FloatArray(NumPyProtocols):
     def _unary(self, name: str) -> FloatArray:
         if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
             at = f" at {_place(negative)}" if negative else ""
-            raise ValueError(
+            raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
         components = self.backend.apply(name, self.components)

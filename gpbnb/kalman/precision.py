@@ -26,6 +26,7 @@ from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
+from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
@@ -34,7 +35,7 @@ MOST_SIMULATED = 10**8
 
 
 def required_precision(
-    model: LinearModel | LinearSystem,
+    model: LinearModel | LinearSystem | Recursion,
     steps: int,
     tolerance: float | Sequence[float],
     base: int = 2,
@@ -56,7 +57,8 @@ def required_precision(
     Parameters
     ----------
     model : a Kalman filter; with repaired covariances, the answer lists the repairs. Or a linear system, whose inputs
-        are `z`; see :func:`gpbnb.kalman.system.required_system_precision`.
+        are `z`; see :func:`gpbnb.kalman.system.required_system_precision`. Or a function of a format and `z`, written
+        with arrays of the format; see :func:`gpbnb.kalman.recursion.required_recursion_precision`.
     tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
         accuracy does not matter an infinite tolerance. For a linear system, of each output.
     base : 2, 10 or 16.
@@ -82,6 +84,13 @@ def required_precision(
         them.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    if not isinstance(model, LinearModel) and form is not Form.INNOVATION:
+        raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+    if callable(model):
+        if within is not None:
+            raise ValueError("got limits for a function; needed none: they are for models")
+        steps = whole_number("steps", steps)
+        return required_recursion_precision(model, steps, tolerance, z, base, rounding, basis, progress)
     if isinstance(model, LinearSystem):
         return required_system_precision(model, steps, tolerance, z, base, rounding, basis, within, progress)
     tolerances = _checked(model, tolerance, base, basis)
@@ -142,7 +151,7 @@ def _better_form(
 
 
 def survey(
-    model: LinearModel,
+    model: LinearModel | Recursion,
     z: Any,
     tolerance: float | Sequence[float],
     precisions: Sequence[int],
@@ -162,20 +171,31 @@ def survey(
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    if not isinstance(model, LinearModel) and callable(model):
+        if form is not Form.INNOVATION:
+            raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+        return survey_recursion(model, z, tolerance, _formats(base, precisions, rounding), basis)
     tolerances = _checked(model, tolerance, base, basis)
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
-    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
-    if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION[base]]:
-        raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION[base]}")
+    formats = _formats(base, precisions, rounding)
     checkpoint_steps = log_spaced(len(measured), 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
     return tuple(
         (fmt.precision, _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)[0])
         for fmt in formats
     )
+
+
+def _formats(base: int, precisions: Sequence[int], rounding: Rounding) -> list[FloatFormat]:
+    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
+    if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION.get(base, 0)]:
+        raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION.get(base, 0)}")
+    if not formats:
+        raise ValueError("got no precisions; needed at least one")
+    return formats
 
 
 def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
