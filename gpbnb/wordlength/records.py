@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb import __version__
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.array_forms import AnyForm
 from gpbnb.kalman.forms import Form
@@ -105,7 +104,7 @@ def survey_records(
     --------
     >>> from gpbnb import FloatFormat, LinearModel
     >>> walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-    >>> found = survey_records(walk, 3, 0.01, [FloatFormat(2, 8), FloatFormat(2, 24)], steps=20)
+    >>> found = survey_records(walk, 3, 0.01, [FloatFormat(2, 4), FloatFormat(2, 24)], steps=20)
     >>> found.shares
     (0.0, 1.0)
     """
@@ -134,7 +133,7 @@ def survey_records(
         rows=lambda cell, ratios: [(str(cell.record), " ".join(f"{ratio:.6g}" for ratio in ratios))],
         command="gpbnb.wordlength.records.survey_records(...)",
         seed=0,
-        version=__version__,
+        version="1",
     )
     if directory is None:
         with tempfile.TemporaryDirectory() as folder:
