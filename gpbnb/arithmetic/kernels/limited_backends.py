@@ -201,7 +201,8 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     base, precision, rounding, limits, seed = rules
     random = rounding is Rounding.STOCHASTIC
     longest = 53 - DRAW_BITS if random else 52 if base == 2 else 13
-    hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)  # float64 has no bit for the digit
+    # The one digit has no bit in float64 that would be even or odd.
+    hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
     digits = tags.Two() if base == 2 else tags.Sixteen()
     mode = _random(seed) if random else _MODES[rounding]()
     if limits is None:
