@@ -185,9 +185,8 @@ def summary(rows: Sequence[Mapping[str, str]]) -> None:
     """Print the counts and the survivors."""
     survivors = [row for row in rows if row["outcome"] in ("survived", "no test")]
     for row in survivors:
-        print(
-            f"{row['module']}:{row['line']} {row['operator']}: {row['outcome']}\n  - {row['before']}\n  + {row['after']}"
-        )
+        print(f"{row['module']}:{row['line']} {row['operator']}: {row['outcome']}")
+        print(f"  - {row['before']}\n  + {row['after']}")
     caught = sum(row["outcome"] in ("caught", "timeout") for row in rows)
     print(f"{len(rows)} mutants in {len({row['module'] for row in rows})} files, {caught} caught, {len(survivors)} not")
 
