@@ -134,7 +134,7 @@ def year_end(
             list(places), [tolerance] * len(places), "|", color=BLACK, ms=26, mew=2, ls="none", label=name
         )
     ax.set_yscale("log")
-    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), markerscale=0.6)
     label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
     return artists
 
@@ -165,13 +165,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style, place, away in (
         ("(125) as printed", {}, "-", 0, (2, -38)),
-        (
-            "(125) with its faults corrected",
-            report_bounds.ALL_CORRECTED,
-            "--",
-            12,
-            (6, 6),
-        ),
+        ("(125) with its faults corrected", report_bounds.ALL_CORRECTED, "--", 12, (6, 6)),
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
         x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]

@@ -261,7 +261,7 @@ def _error(group: Sequence[Row]) -> str:
     for row in group:
         link = f'<a href="{address(row.statement)}">{typeset(row.statement.item)}</a>'
         places.setdefault(row.statement.document, []).append(link)
-    affected = "".join(f"<p>{document}: {', '.join(links)}</p>" for document, links in places.items())
+    affected = "".join(f"<p>{document[-4:]}: {', '.join(links)}</p>" for document, links in places.items())
     badges = " ".join(
         badge(outcome) for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
     )
