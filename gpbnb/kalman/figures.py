@@ -232,10 +232,10 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
             group = [summary for summary in summaries if summary.form == form]
             shares.append(100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group))
         artists += ax.bar(np.arange(len(forms)) + 0.27 * (number - 1), shares, 0.25, color=colour, label=name).patches
-    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]) for form in forms])
+    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]).replace(", ", ",\n") for form in forms])
     ax.set_ylim(0, 118)
     legend(ax, ncols=3, loc="upper right")
-    label(ax, "form of the filter", "filters that violate it (%)")
+    label(ax, "form of the filter", "filters that violate the bound (%)")
     return artists
 
 
