@@ -80,6 +80,8 @@ class Guarantee:
         numbers = ", ".join(f"{b:.3g}" for b in self.bound)
         if self.steps is None:
             at = f"; its gain repeats from step {self.schedule.repeat}" if self.schedule.repeat is not None else ""
+            if self.schedule.enclosed is not None:
+                at = f"; its gain is enclosed from step {self.schedule.enclosed}"
             return f"within {numbers} for ever ({self.schedule.fmt}{at})"
         return f"within {numbers} for {self.steps} steps only, for {self.why} ({self.schedule.fmt})"
 
@@ -172,6 +174,7 @@ def _disturbances(
             program.groups,
             program.roots,
             given.coefficients,
+            given.offsets,
             units(given.fmt),
             given.Phi,
             given.HPhi,

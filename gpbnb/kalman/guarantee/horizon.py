@@ -4,8 +4,8 @@ Gravity Probe B's filter is one: its drift rates have a time constant of months.
 fill 10 GB, and this module keeps those of one cycle of the model at a time. Several limits share a pass: the two
 choices of state, drift or deviations from the predicted drift, have the same gains.
 
-``python -m gpbnb.kalman.guarantee.horizon`` computes ``horizon.csv`` and resumes where it was interrupted. The rows that
-it has written hold for the steps done so far.
+``python -m gpbnb.kalman.guarantee.horizon`` computes ``horizon.csv`` and resumes where it was interrupted. The rows
+that it has written hold for the steps done so far.
 """
 
 from __future__ import annotations
@@ -136,8 +136,10 @@ def bounds_in_blocks(
         rows = np.arange(count)
         at = (done + rows) % cycle
         program, packed = packed_coefficients(run, fmt, form, rows, done)
+        coefficients = widened_array(packed)
         arrays = (
-            widened_array(packed),
+            coefficients,
+            np.zeros(coefficients.shape[:2]),
             units(fmt),
             np.ascontiguousarray(Phi[at % len(Phi)]),
             np.ascontiguousarray(HPhi[at]),
