@@ -39,7 +39,7 @@ SETTINGS = {
 
 RECORDS = 30
 SHOWN = 300
-"""Records of the candidate formats: if 299 of them pass, they show a probability of 99 %."""
+"""Records of the candidate formats. If 299 records all pass, they show a probability of 99 %."""
 SEED = 2004
 _HERE = Path(__file__).parent
 

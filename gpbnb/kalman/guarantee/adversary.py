@@ -150,7 +150,6 @@ def greedy(
     violations = 0
     for k in range(steps):
         at = k if k < count else first + (k - first) % (count - first)
-        then = k + 1 if k + 1 < count else first + (k + 1 - first) % (count - first)
         _times(Phi[at], x_exact, predicted)
         _times(HPhi[at], x_exact, seen)
         if by_range:
@@ -185,6 +184,7 @@ def greedy(
                 score = _worth(fmt, rows[k], trial, following)
             else:
                 tried[:] = z
+                then = k + 1 if k + 1 < count else first + (k + 1 - first) % (count - first)
                 _times(Phi[then], following, beyond)
                 _times(HPhi[then], following, nu)
                 for r in range(m):

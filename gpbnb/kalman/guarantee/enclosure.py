@@ -336,7 +336,8 @@ def _settled(stored: LinearModel, steps: int, unit: float) -> int | None:
         run.take(np.zeros((start, stored.m)))
         if len(run.C) > 1:
             P, last = (run.C[i][..., 0] for i in (1, 0))
-            if (np.abs(P - last) <= 1e-3 * unit * np.sqrt(np.outer(P.diagonal(), P.diagonal()))).all():
+            size = np.sqrt(np.abs(P.diagonal()))
+            if (np.abs(P - last) <= 1e-3 * unit * np.outer(size, size)).all():
                 return start
         start *= 2
     return None
