@@ -45,7 +45,8 @@ PAGES = (
         "ledger-1984-1", "Report of 1984: rounding and inversion in general", "hung1984", r"I|II\.([1-9]|9\..*|10)"
     ),
     LedgerPage("ledger-1984-2", "Report of 1984: inversion by elimination", "hung1984", r"II\.11.*"),
-    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter, roll and deroll", "hung1984", r"II\.1[234]|III.*"),
+    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter", "hung1984", r"II\.1[234]"),
+    LedgerPage("ledger-1984-4", "Report of 1984: roll and deroll", "hung1984", r"III.*"),
     LedgerPage("ledger-1982-1", "Report of 1982: budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"),
     LedgerPage("ledger-1982-2", "Report of 1982: inversion by elimination", "hung1982", r"III\.11.*"),
     LedgerPage("ledger-1982-3", "Report of 1982: Kalman filter, geometry", "hung1982", r"III\.1[23]|IV"),
