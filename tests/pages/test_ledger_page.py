@@ -107,7 +107,7 @@ def test_enter_in_the_search_box_stays_on_the_page(page):
     before = page.url
     words.press("Enter")
     assert page.url == before
-    assert words.input_value() == "roll"
+    assert words.input_value() == "gain"
 
 
 def test_a_link_to_a_hidden_entry_shows_it(page):
