@@ -166,12 +166,12 @@ def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
 def error_table(rows: Iterable[Row]) -> Html:
     """Tabulate the errors behind the statements that disagree, the most serious first, with the statements affected.
 
-    Statements with the same root error share a row; their notes are collapsed.
+    Statements with the same root error share a row, in which their notes are collapsed; so do those with the same note.
     """
     found = [row for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS]
     groups: dict[str, list[Row]] = {}
     for row in found:
-        groups.setdefault((row.finding and row.finding.root) or row.statement.id, []).append(row)
+        groups.setdefault((row.finding and (row.finding.root or row.finding.note)) or row.statement.id, []).append(row)
     ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
     header = ("Error", "Verdict", "Statements affected")
     table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
