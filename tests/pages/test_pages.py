@@ -120,6 +120,7 @@ def test_nothing_is_cut_on_paper(page):
     if page.viewport_size != tools.SIZES["desktop"]:
         pytest.skip("paper is as wide for all")
     try:
+        page.evaluate("window.collapsed = [...document.querySelectorAll('details:not([open])')]")
         page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
         page.set_viewport_size({"width": 688, "height": 974})  # A4 without margins, at 96 dots an inch
         page.emulate_media(media="print")
@@ -128,6 +129,7 @@ def test_nothing_is_cut_on_paper(page):
     finally:
         page.emulate_media(media="screen")
         page.set_viewport_size(tools.SIZES["desktop"])
+        page.evaluate("for (const each of window.collapsed) each.open = false")
 
 
 EMPTY = (
