@@ -155,9 +155,9 @@ def kalman_bound() -> Definitions:
 
 @cache
 def across() -> sp.Expr:
-    """Return the drift across a drift of 1 that a least-squares fit finds, of the phase error at the end.
+    r"""Return the drift across a drift of 1 that a least-squares fit finds, of the phase error at the end.
 
-    It is the step of the chapter, with :math:`\\sin\\Delta t` for its first order :math:`\\Delta t`.
+    It is the step of the chapter, with :math:`\sin\Delta t` for its first order :math:`\Delta t`.
     """
     fit = step(rolling.fits(), "off-tuned").left
     (k,) = (each for each in fit.function.free_symbols if each.name == "k")

@@ -1,6 +1,6 @@
-"""The algebra of savage2016, derived again from (1) and (2); and what each slip of the print would have led to.
+r"""The algebra of savage2016, derived again from (1) and (2); and what each slip of the print would have led to.
 
-Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\\infty} = \\sigma_x^2`.
+Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\infty} = \sigma_x^2`.
 """
 
 from __future__ import annotations

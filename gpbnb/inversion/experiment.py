@@ -50,9 +50,9 @@ MAY_BE_ABSENT = BETTER[1:]
 
 @dataclass(frozen=True)
 class Trial(BoundedError):
-    """One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
+    r"""One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
 
-    A bound that proves nothing is absent from `bounds`. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
+    A bound that proves nothing is absent from `bounds`. `condition` is :math:`\|A\|\|A^{-1}\|`.
     """
 
     family: str

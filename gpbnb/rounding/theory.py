@@ -1,11 +1,11 @@
-"""Theory: bounds on the errors of sums, products, inner products and matrix products.
+r"""Theory: bounds on the errors of sums, products, inner products and matrix products.
 
 Bounds named ``printed_…`` are those of the documents; the others are derived in
 :mod:`gpbnb.rounding.derivation`. ``beta`` is the unit roundoff β, ``FloatFormat.unit_roundoff``.
 All values are exact: entries are Fractions, and so are the bounds.
 
 A bound of first order leaves out terms in β²; a strict one, made of
-:math:`\\gamma_n = n\\beta/(1-n\\beta)`, leaves out nothing.
+:math:`\gamma_n = n\beta/(1-n\beta)`, leaves out nothing.
 """
 
 from __future__ import annotations
