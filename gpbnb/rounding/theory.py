@@ -83,27 +83,46 @@ def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
 
 
 MANY_TERMS = 1000
-"""Above as many float64 terms, the strict bound is itself computed in float64 and rounded up."""
+"""Above as many terms, the strict bound is itself computed in float64 and rounded up."""
 
 
 def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
-    """The strict bound of many float64 terms, at most 2**-45 of itself above; None for others, to be summed exactly.
+    """The strict bound of many terms, at most 2**-45 of itself above; None for others, to be summed exactly.
 
-    The exact sum has a denominator of millions of digits. Here each factor and product is off by less than 2**-50,
-    their sum is correctly rounded, and the result is raised by more than all of that.
+    The exact sum has a denominator of millions of digits. Here the unit roundoff, each term, factor and product is off
+    by at most some roundings, together less than 2**-49, as no denominator is below one half. Their sum is correctly
+    rounded, and the result is raised by more than all of that.
     """
-    if not isinstance(x, np.ndarray) or x.dtype != np.float64 or x.ndim != 1 or len(x) <= MANY_TERMS:
+    if (size := _sizes(x)) is None:
         return None
-    size = np.abs(x)
     if not np.isfinite(size).all() or (size[size > 0] < 1e-250).any() or (size > 1e250).any():
         return None
-    gamma(len(x) - 1, beta)  # refuses too many roundings
+    gamma(len(size) - 1, beta)  # refuses too many roundings
     unit = float(beta)
-    if Fraction(unit) != beta or unit * len(x) > 0.5:
+    if unit < 1e-250 or unit * len(size) > 0.5:
         return None
-    weights = np.array(sum_weights(len(x)), dtype=np.float64)
+    weights = np.arange(len(size), 0, -1, dtype=np.float64)  # sum_weights
+    weights[0] -= 1
     total = math.fsum((weights * unit / (1 - weights * unit) * size).tolist())
     return Fraction(total) * (1 + Fraction(1, 2**46))
+
+
+def _sizes(x: Any) -> NDArray[np.float64] | None:
+    """Absolute values of many real terms, each the nearest float64 or exact; None for others."""
+    if hasattr(x, "to_fractions"):  # an array of a format
+        if x.ndim != 1 or len(x) <= MANY_TERMS:
+            return None
+        try:
+            return np.abs(np.asarray(x.to_float()))
+        except OverflowError:
+            return None
+    if isinstance(x, (list, tuple)):
+        if len(x) <= MANY_TERMS or not set(map(type, x)) <= {int, float}:
+            return None
+        x = np.asarray(x)
+    if not isinstance(x, np.ndarray) or x.dtype.kind not in "iuf" or x.dtype.itemsize > 8 or x.ndim != 1:
+        return None
+    return np.abs(x.astype(np.float64)) if len(x) > MANY_TERMS else None
 
 
 def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> float:
