@@ -59,7 +59,7 @@ def form(calculator: Calculator) -> str:
         "</div>",
         f'<figure class="calculator-figure"><div class="calculator-drawing" role="img" aria-label=""></div>'
         f'<ul class="calculator-legend"></ul><figcaption>{escape(calculator.figure.title)}; '
-        "circles are at your numbers.</figcaption></figure>",
+        "circles mark your numbers.</figcaption></figure>",
         "</form>",
         f'<div class="calculator-scroll">{_examples(calculator)}</div>',
         f"<script>\n{script(calculator)}\n</script>",

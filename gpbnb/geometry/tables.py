@@ -63,8 +63,10 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
         for name, parts in results.items()
     )
     readings = next(iter(results.values()), {})
-    header = ("angle", *readings, "fate")
-    return Table(f"{len(body)} angles, errors in milliarcseconds: mean; turning with the roll", header, body)
+    header = ("angle", *readings, "outcome")
+    return Table(
+        f"{len(body)} angles, errors in milliarcseconds: mean; oscillation at the roll frequency", header, body
+    )
 
 
 def fate(parts: Mapping[str, Part]) -> str:
@@ -86,7 +88,7 @@ def fate(parts: Mapping[str, Part]) -> str:
 def reach(rows: Iterable[tuple[str, float]], allowed: float) -> Table:
     """Tabulate how large each angle may be before its small-angle form causes an error of `allowed` radians."""
     body = tuple((_symbols(name), _two(size / ARCSEC), f"{math.degrees(size):.2g}") for name, size in rows)
-    return Table(f"angles that cost {allowed / MAS:g} milliarcsecond", ("angle", "in arcseconds", "in degrees"), body)
+    return Table(f"angles that cause an error of {allowed / MAS:g} mas", ("angle", "in arcseconds", "in degrees"), body)
 
 
 def number(radians: float) -> str:

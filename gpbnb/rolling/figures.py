@@ -65,7 +65,7 @@ def residual(spectrum: Spectrum, level: float, interval: float, ax: Axes) -> lis
     artists: list[Drawn] = [
         ax.errorbar(spectrum.frequency, ratio, 2 * spectrum.error, fmt="o", color=OBSERVED, label="measured")
     ]
-    artists.append(ax.axhline(1, color=VALID, label="expected of samples"))
+    artists.append(ax.axhline(1, color=VALID, label="expected for the samples"))
     ax.set_xscale("log")
     label(ax, "frequency (Hz)", "measured / expected\n(no unit)")
     return artists

@@ -56,7 +56,7 @@ def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes
     ax.set_yscale("log")
     artists += standards(ax)
     legend(ax, fontsize=8.5)
-    label(ax, "bits", "error or bound, over the tolerance")
+    label(ax, "bits", "error or bound / tolerance")
     return artists
 
 
@@ -71,7 +71,7 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
     ax.set_xscale("log")
     artists += standards(ax, upright=False)
     legend(ax, fontsize=8.5)
-    label(ax, "steps $k$", "bits for the tolerance")
+    label(ax, "steps $k$", "bits needed for the tolerance")
     return artists
 
 
@@ -110,7 +110,7 @@ def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
 
 
 def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axes) -> list[Artist]:
-    """Errors of several ways to compute over that of the first way, a line a way; a refused one is not drawn."""
+    """Draw the error for each way of computing, divided by the error of the first, Hung's arithmetic; skip refused ones."""
     artists: list[Artist] = []
     for (label_, values), (marker, colour) in zip(errors.items(), line_styles(len(errors), "osD^"), strict=True):
         points = [(value / values[0], y) for y, value in enumerate(values) if math.isfinite(value)]
@@ -119,7 +119,7 @@ def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axe
     ax.set_xscale("log")
     ax.set_yticks(range(len(names)), names)
     ax.invert_yaxis()
-    ax.set_xlabel("error over that of the first way")
+    ax.set_xlabel("error / error with Hung's arithmetic")
     legend(ax, loc="upper center", bbox_to_anchor=(0.3, -0.18), ncols=2)
     return artists
 
@@ -140,5 +140,5 @@ def bands(found: Mapping[str, Sequence[tuple[int, Sequence[float]]]], ax: Axes, 
     ax.annotate("tolerance", (1, 1), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=REFERENCE)
     ax.set_yscale("log")
     legend(ax, loc="lower left")
-    label(ax, "bits", "largest error over the tolerance")
+    label(ax, "bits", "largest error / tolerance")
     return artists

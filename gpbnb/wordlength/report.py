@@ -207,7 +207,7 @@ def page(report: Report) -> str:
         "within the tolerance.</p>",
         f"<p>{html.escape(report.text)}.</p>",
         limiting,
-        "<h2>What the answer rests on</h2>",
+        "<h2>Basis of the answer</h2>",
         _table(
             ("question", "value"),
             [
@@ -219,7 +219,7 @@ def page(report: Report) -> str:
         ),
         "<p>An emulation holds for these measurements. A bound holds for the arithmetic of this run, whatever its "
         "roundings. Neither limits the exponent range: see the ranges below.</p>",
-        "<h2>Forms and bases side by side</h2>",
+        "<h2>Forms and bases compared</h2>",
         _table(("form and basis", unit, "answer"), rows),
         "<h2>Error against precision</h2>",
         _curves(report.answers, unit),
@@ -286,8 +286,8 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
         drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
         drawn.append(f'<text x="440" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
     return (
-        '<svg viewBox="0 0 640 330" role="img" aria-label="Error over tolerance against precision, one line for each '
+        '<svg viewBox="0 0 640 330" role="img" aria-label="Error divided by tolerance, against precision, one line for each '
         f'form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
         f'<text x="340" y="320" text-anchor="middle">{html.escape(unit)}</text></svg>'
-        "<p>Error or bound over the tolerance; the dashed line is the tolerance.</p>"
+        "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance.</p>"
     )

@@ -28,7 +28,7 @@ def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
     if len(questions) != 1:
         raise ValueError(f"got lines of {len(questions)} kinds; needed the same questions in each")
     body = tuple((name, *(bits(answer) for _, answer in line)) for name, line in found.items())
-    return Table(f"{len(body)} lines of answers", ("bits by", *questions.pop()), body)
+    return Table(f"{len(body)} lines of answers", ("form", *questions.pop()), body)
 
 
 def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
@@ -47,7 +47,7 @@ def binary_ranges(found: Sequence[BinaryRange]) -> Table:
     for each in found:
         suitable = [name for name, (low, high) in NORMAL_RANGE.items() if low <= each.least and each.largest <= high]
         body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(suitable) or "none"))
-    return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "held by"), tuple(body))
+    return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "normal in"), tuple(body))
 
 
 def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
@@ -58,7 +58,13 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
         rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
         body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
     kind = digits(fmt)
-    header = ("duration", "bits, rounded", "bits, chopped", f"best rate of {kind}, Hz", "its additions lost at, Hz")
+    header = (
+        "duration",
+        "bits, rounded",
+        "bits, chopped",
+        f"best rate for {kind}, Hz",
+        "rate at which increments are lost, Hz",
+    )
     return Table(f"{len(body)} durations", header, tuple(body))
 
 
