@@ -19,7 +19,7 @@ def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes
 
     Parameters
     ----------
-    printed : number of sources and error of each that the report states; milliarcseconds per year.
+    printed : number of sources and error of each source in the report; milliarcseconds per year.
     totals : two root-sum-squares, in milliarcseconds per year; the first is the goal.
     most : largest number of sources.
     """

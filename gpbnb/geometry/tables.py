@@ -15,11 +15,11 @@ from gpbnb.measurement import ARCSEC, MAS
 
 
 def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
-    """Tabulate the effect of each misalignment in milliarcseconds: from the theory, and the drift also from simulation.
+    """Tabulate the effect of each misalignment in milliarcseconds, from theory; for the drift, also from simulation.
 
     Parameters
     ----------
-    results : from :func:`gpbnb.geometry.experiment.years`: without and with roll, by angle.
+    results : for each angle, the results of :func:`gpbnb.geometry.experiment.years` without and with roll.
     """
     body = []
     for name, (still, rolled) in results.items():
@@ -52,7 +52,7 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
 
     Parameters
     ----------
-    results : from :func:`gpbnb.geometry.experiment.parts`, by angle.
+    results : for each angle, the result of :func:`gpbnb.geometry.experiment.parts`.
     """
     body = tuple(
         (
@@ -70,7 +70,7 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
 
 
 def fate(parts: Mapping[str, Part]) -> str:
-    """Say whether an error stays, averages out, cancels, or is measured; errors below 0.001 mas count as 0."""
+    """State whether an error stays, averages out, cancels, or is measured; errors below 0.001 mas count as 0."""
 
     def seen(radians: float) -> bool:
         return number(radians) != "0"
@@ -106,7 +106,7 @@ def pair(angles: Sequence[float]) -> str:
 
 
 def _two(value: float) -> str:
-    """Format with two digits; the expansion has no more correct digits at the largest angles."""
+    """Format with two digits, because the expansion has no more correct digits at the largest angles."""
     return f"{float(f'{value:.2g}'):,.0f}"
 
 

@@ -110,7 +110,7 @@ def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
 
 
 def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axes) -> list[Artist]:
-    """Draw the error for each way of computing, divided by the error of the first, Hung's arithmetic; skip refused ones."""
+    """Draw the error for each way of computing over that for Hung's arithmetic, the first; skip rejected ones."""
     artists: list[Artist] = []
     for (label_, values), (marker, colour) in zip(errors.items(), line_styles(len(errors), "osD^"), strict=True):
         points = [(value / values[0], y) for y, value in enumerate(values) if math.isfinite(value)]

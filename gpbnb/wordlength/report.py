@@ -286,8 +286,8 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
         drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
         drawn.append(f'<text x="440" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
     return (
-        '<svg viewBox="0 0 640 330" role="img" aria-label="Error divided by tolerance, against precision, one line for each '
-        f'form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
+        '<svg viewBox="0 0 640 330" role="img" aria-label="Error divided by tolerance, against precision; one line '
+        f'for each form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
         f'<text x="340" y="320" text-anchor="middle">{html.escape(unit)}</text></svg>'
         "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance.</p>"
     )
