@@ -41,7 +41,7 @@ _IMPORT = re.compile(
 def cache_folder(name: str) -> Path | None:
     """Find a writable folder, and create it if necessary.
 
-    The first writable one is used:  ``$GPBNB_CACHE_DIR``, ``.cache/gpbnb`` in a checkout, the user's folder for caches,
+    The first writable one is used: ``$GPBNB_CACHE_DIR``, ``.cache/gpbnb`` in a checkout, the user's folder for caches,
     or the system's folder for temporary files.
 
     Parameters

@@ -338,7 +338,7 @@ def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequ
 
 
 def needed_bits(omega_bw: float, durations: Mapping[str, float], rates: Sequence[float], ax: Axes) -> list[Artist]:
-    """Draw the bits for which rounding is a tenth of the discretization error, against the rate, for durations in s."""
+    """Draw the bits at which the rounding error is a tenth of the discretization error, for durations in s."""
     ends: list[float] = []
     artists: list[Artist] = []
     for (duration, seconds), colour in zip(durations.items(), colours(len(durations), SERIES), strict=True):

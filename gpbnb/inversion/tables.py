@@ -33,7 +33,7 @@ def table1(readings: Sequence[tuple[Column, Column]]) -> Table:
 
 
 def searches(found: Sequence[Search]) -> Table:
-    """Count the numbers of all readings that agree with the print, and show the reading that comes closest."""
+    """Count the numbers of all readings that agree with the printed ones, and show the closest reading."""
     header = (
         "column",
         "readings",
@@ -104,7 +104,7 @@ def summary(result: Frozen, bounds: Sequence[str]) -> Table:
 
 
 def prices(found: Sequence[Price], sizes: Sequence[int]) -> Table:
-    """Show what each bound achieves and costs: median of bound over error by number of rows, operations, digits."""
+    """Tabulate sharpness and cost of each bound: median of bound / error by number of rows, operations, digits."""
     body = [
         (one.bound, *(short(ratio, 3) for ratio in one.ratios), f"{one.operations:.2g}", one.digits) for one in found
     ]

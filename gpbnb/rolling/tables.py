@@ -38,7 +38,7 @@ def _cells(error: float) -> tuple[str, ...]:
 
 
 def _small(value: float) -> str:
-    # What is left of a zero by rounding differs from machine to machine.
+    # The rounding error of a zero differs from machine to machine.
     return f"{value:.2g}" if value > 1e-9 else "0"
 
 
@@ -78,7 +78,7 @@ def drift_errors(study: experiment.DriftStudy) -> Table:
 def filters(
     named: Mapping[str, object], drift: float, level: float, period: float, samples: int, interval: float
 ) -> Table:
-    """Filters beside each other: lag, noise in the band, slow noise let through, and the image of one dimension."""
+    """Compare filters: lag, noise in the band, slow noise that passes, total noise, and the image in one dimension."""
     density = float(theory.flicker_density(level, 1 / period, interval))
     body = []
     for name, weights in named.items():
