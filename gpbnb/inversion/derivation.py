@@ -92,7 +92,7 @@ def first_approach_norms() -> Derivation:
 
 
 class Entry(NamedTuple):
-    """An entry before and after an elimination step, the exact product of multiplier and pivot row, and three errors."""
+    """An entry before and after an elimination step, the exact product that is subtracted, and three errors."""
 
     old: sp.Symbol
     new: sp.Symbol

@@ -217,7 +217,7 @@ def resultant_errors(first: Perturbation, second: Perturbation) -> Perturbation:
 
 
 def bracket(errors: Perturbation, solution: Any, signed: bool = True) -> NDArray[Any]:
-    r"""Columns of E in (95), :math:`\delta b_j-\delta A\hat x_j`, or of sizes, :math:`|\delta b_j|+|\delta A||\hat x_j|`."""
+    r"""E of (95), :math:`\delta b_j-\delta A\hat x_j`, or of sizes :math:`|\delta b_j|+|\delta A||\hat x_j|`."""
     x = _plain(solution)
     e = errors.right - errors.matrix @ x if signed else abs(errors.right) + abs(errors.matrix) @ abs(x)
     return np.asarray(e)

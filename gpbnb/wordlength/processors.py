@@ -137,6 +137,7 @@ def by_arrays(
     -------
     estimates : (steps, n), exact Fractions.
     """
+    model.refuse_inputs("this emulation")
     fmt, n = processor.fmt, model.n
     Phi, H, Q, R = ([fmt.array(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R))
     increments = [fmt.array(each - np.eye(n, dtype=int)) for each in model.Phi]

@@ -127,6 +127,7 @@ def guarantee(
     ------
     ValueError : a format without compiled loops, or in which a covariance is not definite.
     """
+    model.refuse_inputs("a guarantee")
     return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon)
 
 
