@@ -67,7 +67,7 @@ def test_violations():
 def test_the_order():
     assert cells(tables.order()) == [
         ["first", "(100) → (99) → (101) → (98)"],
-        ["second", "none: (99) waits for (101), and (101) for (99)"],
+        ["second", "none: (99) needs the result of (101), and (101) that of (99)"],
     ]
 
 
@@ -215,5 +215,5 @@ def test_what_a_bound_costs():
     rows = cells(tables.bound_costs([(fmt, found)], terms, reference, 8.2))
     beta = float(fmt.unit_roundoff)
     assert rows[0] == ["(125), least $B$", "a formula", "none", f"{beta * (7 * first + 5 * second) / 0.5:.3g}"]
-    assert rows[1] == ["running bound", "8 times the run", "106 bits for each step again", "8"]
+    assert rows[1] == ["running bound", "8 times the run", "106 bits, to repeat each step", "8"]
     assert rows[2] == ["companion bound", "8 times the run", "106 bits for a second run", "1.25"]
