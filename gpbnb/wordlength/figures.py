@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from gpbnb.display.style import BLACK, OBSERVED, REFERENCE, REFUTED, VALID, label, legend, line_styles
 from gpbnb.wordlength.examples import STANDARD
 
-#: The looks of each kind of answer, as an emulation observes and a bound bounds. Open markers, in the colour of refuted
-#: formulas, are of (125).
+#: Marker, edge colour and face colour for each kind of answer. Open markers in the colour of refuted formulas belong
+#: to (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
     "bound": ("|", VALID, VALID),
@@ -26,14 +26,14 @@ Curve = Sequence[tuple[int, float]]
 
 
 def standards(ax: Axes, upright: bool = True) -> list[Artist]:
-    """Lines at the precisions of IEEE's formats that lie within the axis; named at its end."""
+    """Draw lines at the precisions of the IEEE formats within the axis, and label them at its end."""
     artists: list[Artist] = []
     low, high = ax.get_xlim() if upright else ax.get_ylim()
     for name, fmt in STANDARD.items():
         if low <= fmt.precision <= high:
             draw = ax.axvline if upright else ax.axhline
             artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
-            above = 1.035 if name == "binary32" else 1.0  # beside binary16, whose name would touch it
+            above = 1.035 if name == "binary32" else 1.0  # binary16 is close, and the names would touch
             x, y = (fmt.precision, above) if upright else (1.0, fmt.precision)
             transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
             side: Any = "center" if upright else "right"
@@ -44,7 +44,7 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
 
 
 def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
-    """Error (points) and bound (lines) over the tolerance against the bits, one colour per form, finite values only."""
+    """Draw finite errors (points) and bounds (lines) over the tolerance against the bits, one colour for each form."""
     artists: list[Artist] = []
     for (name, curve), (marker, colour) in zip(emulated.items(), line_styles(len(emulated), "os^Dv"), strict=True):
         points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]
@@ -61,7 +61,7 @@ def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes
 
 
 def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) -> list[Artist]:
-    """Bits (points: observed; lines: bounds and formulas) against the number of steps."""
+    """Draw bits against the number of steps: observed (points), bounds and formulas (lines)."""
     artists: list[Artist] = []
     for (name, curve), (marker, colour) in zip(points.items(), line_styles(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
@@ -76,11 +76,11 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
 
 
 def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
-    """Bits of many problems, a line a problem, by kind of answer.
+    """Draw the bits that many problems need, one row for each problem, by kind of answer.
 
     Parameters
     ----------
-    found : by problem, then by kind, one of :data:`KINDS`.
+    found : bits by problem, then by kind of answer, one of :data:`KINDS`.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axe
 
 
 def bands(found: Mapping[str, Sequence[tuple[int, Sequence[float]]]], ax: Axes, share: float = 0.9) -> list[Artist]:
-    """Median, a central share and the largest of many records' errors over the tolerance, against the bits."""
+    """Draw median, central share and largest error / tolerance of many records, against the bits."""
     artists: list[Artist] = []
     low, high = (1 - share) / 2, (1 + share) / 2
     for (name, points), (_, colour) in zip(found.items(), line_styles(len(found)), strict=True):

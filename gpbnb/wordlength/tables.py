@@ -13,16 +13,16 @@ from gpbnb.wordlength.study import BinaryRange, InversePrecision, UpdateStagnati
 
 
 def bits(answer: Requirement) -> str:
-    """The precision of an answer in a cell, or that there is none."""
+    """Return the precision of an answer for a cell, or "none"."""
     return str(answer.fmt.precision) if answer.fmt else "none"
 
 
 def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
-    """Answers side by side: a line a name, a column a question.
+    """Compare answers, with one row for each name and one column for each question.
 
     Raises
     ------
-    ValueError : lines that do not answer the same questions.
+    ValueError : rows that do not answer the same questions.
     """
     questions = {tuple(question for question, _ in line) for line in found.values()}
     if len(questions) != 1:
@@ -32,7 +32,7 @@ def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
 
 
 def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
-    """Effect of few digits on a state that hardly changes."""
+    """Tabulate the effect of few digits on a state that hardly changes."""
     body = tuple(
         (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.unchanged:.0f} %", short(each.error / tolerance))
         for each in found
@@ -42,7 +42,7 @@ def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Ta
 
 
 def binary_ranges(found: Sequence[BinaryRange]) -> Table:
-    """Powers of two of a filter's numbers, and which standard formats hold them as normal numbers."""
+    """Tabulate the ranges of a filter's numbers, and the standard formats in which they are normal."""
     body = []
     for each in found:
         suitable = [name for name, (low, high) in NORMAL_RANGE.items() if low <= each.least and each.largest <= high]
@@ -51,7 +51,7 @@ def binary_ranges(found: Sequence[BinaryRange]) -> Table:
 
 
 def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
-    """Bits with which rounding is a tenth of the discretization error, and the rates that a format allows."""
+    """Tabulate bits at which rounding is a tenth of the discretization error, and the rates that a format allows."""
     body = []
     for name, duration in durations.items():
         needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding.documented()]
@@ -63,7 +63,7 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
 
 
 def inverse_precisions(found: Sequence[InversePrecision]) -> Table:
-    """Bits that inverses need, by the rule of thumb and proved."""
+    """Tabulate the bits that inverses need, by the rule of thumb and proved."""
     body = tuple(
         (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found
     )
