@@ -1,4 +1,4 @@
-"""What each calculator asks and shows; and the functions of the chapters that compute the same in Python."""
+"""Inputs and results of each calculator, and the chapters' functions that compute the same results in Python."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Input:
-    """A number that is asked.
+    """A number that the reader enters.
 
     Parameters
     ----------
-    name : in the formulas.
-    label : what a reader calls it, letter and unit included.
-    least, most : what is taken.
-    slider : the same for the slider, which may reach less far; if `log`, it moves in decades.
+    name : its name in the formulas.
+    label : its name for the reader, including letter and unit.
+    least, most : accepted range.
+    slider : range of the slider, which may be smaller; if `log`, the slider moves in decades.
     whole : whether it must be a whole number.
-    choices : names of 0, 1, …, if these are all there is.
-    cure : what to do instead, at the end of the message that refuses a number.
+    choices : names for 0, 1, …, if only these values are accepted.
+    cure : advice at the end of the message that rejects a number.
     """
 
     name: str
@@ -63,13 +63,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: results against one input.
+    """A figure of results against one input.
 
     Parameters
     ----------
     sweep : name of the input.
-    title, axis : of the whole, and of the vertical axis, unit included.
-    curves : names of results and what to call them; vertical axis and that of a `log` input are logarithmic.
+    title, axis : title of the figure, and label of the vertical axis with its unit.
+    curves : names of results and their labels. The vertical axis and the axis of a `log` input are logarithmic.
     """
 
     sweep: str
@@ -80,22 +80,22 @@ class Figure:
 
 @dataclass(frozen=True)
 class Calculator:
-    """A calculator; notebooks show it as HTML.
+    """A calculator, which notebooks display as HTML.
 
     Parameters
     ----------
-    id : unique, of small letters.
-    title : of the form.
-    inputs : their names are those of the definitions.
-    definitions : from :mod:`gpbnb.calculators.derivation`, when needed.
-    columns, lines : of the results; one header more than a line has names.
-    sentence : the result in words, names in braces.
-    figure : what is drawn.
-    examples : label → value of each input as typed; the first is what the form begins with.
+    id : unique name in lower-case letters.
+    title : title of the form.
+    inputs : inputs, with the names that the definitions use.
+    definitions : function that returns the definitions from :mod:`gpbnb.calculators.derivation`.
+    columns, lines : headers and rows of the results; there is one header more than a row has names.
+    sentence : the result in words, with names in braces.
+    figure : the figure.
+    examples : label → value of each input as typed; the form starts with the first example.
     shown : names in the table of examples, and their headers.
-    reference : the same from the chapters' functions in Python.
-    formulas : names whose formulas a reader sees; `letters` has their TeX, and that of what they are made of.
-    missing : name → why there may be no such result.
+    reference : function that computes the results with the chapters' Python functions.
+    formulas : names whose formulas are displayed; `letters` holds the TeX of these names and of the symbols in them.
+    missing : name → why this result may not exist.
     """
 
     id: str

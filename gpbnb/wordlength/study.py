@@ -171,7 +171,7 @@ def update_stagnation(
 
 
 def bits_hiding_process_noise(model: LinearModel, z: NDArray[Any], state: int) -> float:
-    r"""Return :math:`\log_2 P_{ii}/Q_{ii}` after the last step; with fewer bits than this, adding Q has no effect.
+    r"""Return :math:`\log_2 P_{ii}/Q_{ii}` after the last step; with roughly fewer bits, adding Q has no effect.
 
     The value is infinite if the state has no process noise.
 
