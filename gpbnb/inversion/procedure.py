@@ -149,7 +149,7 @@ NORMS: dict[str, Norm] = {
     "spectral": lambda a: np.linalg.norm(np.asarray(a, dtype=np.float64), 2),
 }
 
-#: Quantities whose norm is taken: the matrix of (95), as in the last box; factors of (96); terms of (61), (62).
+#: Quantities whose norm is taken, the matrix of (95) as in the last box, factors of (96), or terms of (61), (62).
 FORMS = ("chart", "(96)", "norms throughout")
 
 
