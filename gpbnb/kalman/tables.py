@@ -308,24 +308,27 @@ def sensitivity(moved: Sequence[Moved]) -> Table:
 
 
 def needed_precisions(found: Sequence[Share]) -> Table:
-    """Smallest precisions that meet the tolerance with a probability of 99 %, a line for each kind of formats."""
+    """Smallest precisions that meet the tolerance with a probability of 99 %, and the records behind each answer.
+
+    A line for each kind of formats. The counts and the 95 % limits are those of the smallest precision at which 99 %
+    of the records stay within the tolerance.
+    """
     groups: dict[tuple[str, ...], list[Share]] = {}
     for each in found:
         fmt = each.fmt
-        unit = "bits" if fmt.base == 2 else "decimal digits"
+        unit = "bits" if fmt.base == 2 else "digits"
         groups.setdefault((each.setting, each.states, each.form, fmt.rounding.value, unit), []).append(each)
     rows = []
     for (setting, states, form, rounding, unit), group in groups.items():
         answer = probability.needed(group)
-        cells = ("none" if each is None else f"{each} {unit}" for each in answer)
-        rows.append((f"{setting}, {states}", f"{form}, {rounding}", *cells))
+        observed, lognormal, shown = ("none" if each is None else f"{each} {unit}" for each in answer)
+        at = next((each for each in group if each.fmt.precision == answer.observed), None)
+        passed, limits = (f"{at.within} of {at.records}", f"{at.low:.3f} to {at.high:.3f}") if at else ("–", "–")
+        rows.append((f"{setting}, {states}", f"{form}, {rounding}", observed, passed, limits, lognormal, shown))
     head = (
-        "model and states",
-        "form and rounding",
-        "99 % of the records",
-        "99 %, lognormal",
+        "model and states", "form and rounding", "99 % of the records", "passed", "probability", "99 %, lognormal",
         "99 %, proved with 95 % confidence",
-    )
+    )  # fmt: skip
     return Table("smallest precision that stays within a milliarcsecond", head, tuple(rows))
 
 

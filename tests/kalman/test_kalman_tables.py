@@ -190,9 +190,11 @@ def share(precision, within, records, **changes):
 
 def test_needed_precisions():
     found = [share(32, 9, 10), share(33, 300, 300), share(27, 5, 5, states="deviation")]
+    chopped = share(36, 1, 30)._replace(fmt=FloatFormat(2, 36, Rounding.CHOP))
+    assert cells(tables.needed_precisions([chopped]))[0][2:5] == ["none", "–", "–"]
     assert cells(tables.needed_precisions(found)) == [
-        ["simple, absolute", "hung, nearest", "33 bits", "32 bits", "33 bits"],
-        ["simple, deviation", "hung, nearest", "27 bits", "27 bits", "none"],
+        ["simple, absolute", "hung, nearest", "33 bits", "300 of 300", "0.990 to 1.000", "32 bits", "33 bits"],
+        ["simple, deviation", "hung, nearest", "27 bits", "5 of 5", "0.549 to 1.000", "27 bits", "none"],
     ]
 
 

@@ -11,6 +11,7 @@ import argparse
 import csv
 import json
 import math
+import os
 import random
 import re
 import shutil
@@ -227,7 +228,7 @@ def main() -> None:
         found_file = CACHE / f"{commit}-{chosen.seed}-{chosen.lines}.csv"
     rows = read(found_file)
     done = {key(row) for row in rows}
-    tree = CACHE / "tree"
+    tree = CACHE / f"tree-{os.getpid()}"
     copy_tree(tree)
     load_libraries()
     judges = Judges(tree, chosen.budget)
@@ -248,6 +249,7 @@ def main() -> None:
         write(found_file, rows)
         where = f"{name}:{mutant.line} {mutant.operator}"
         print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
+    shutil.rmtree(tree)
     summary([row for row in rows if row["outcome"] != "no change"])
     if chosen.store:
         new = {key(row): row for row in rows if row["outcome"] != "no change"}
