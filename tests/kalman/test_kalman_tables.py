@@ -110,7 +110,7 @@ def run(**changes):
 
 def test_year_ends():
     table = tables.year_ends([run(), run(indefinite=2)])
-    assert table.header[:4] == ("arithmetic", "form", "drift (mas)", "rate (mas/yr)")
+    assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
     rows = cells(table)
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5; first non-positive variance at step 2"
@@ -218,4 +218,4 @@ def test_what_a_bound_costs():
     beta = float(fmt.unit_roundoff)
     assert rows[0] == ["(125), least $B$", "a formula", "none", f"{beta * (7 * first + 5 * second) / 0.5:.3g}"]
     assert rows[1] == ["running bound", "8 times the run", "106 bits, to repeat each step", "8"]
-    assert rows[2] == ["companion bound", "8 times the run", "106 bits for a second run", "1.25"]
+    assert rows[2] == ["companion bound", "8 times the run", "106 bits, for a second run", "1.25"]
