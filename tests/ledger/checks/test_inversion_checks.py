@@ -214,7 +214,7 @@ def test_first_order_arithmetic_is_that_of_polynomials():
     unit = FirstOrder(np.array([[Fraction(1), Fraction(0)], [Fraction(0), Fraction(1)]], dtype=object))
     assert a * a.inv() == unit
     assert (a * a).T == a.T * a.T
-    with pytest.raises(ValueError, match="needed an exact one"):
+    with pytest.raises(ValueError, match="needed an exact quantity"):
         abs(x)
 
 

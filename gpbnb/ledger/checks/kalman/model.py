@@ -61,7 +61,7 @@ def gains(printed: Statement) -> Finding:
     cyclic = report_bounds.order(second=True) is None
     return compare(
         holds_exactly(printed),
-        f"the equation gives the same gain; {_EXACT}; with the second form "
+        f"the equation gives the same gain; {_EXACT}; with the second form, "
         + ("(99) needs (101) and (101) needs (99)" if cyclic else "an order of the four equations exists"),
         note="analysis (106) uses the second form, while (104) uses a gain without error; no program can do both",
     )
