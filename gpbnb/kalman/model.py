@@ -71,11 +71,12 @@ class LinearModel:
             entries.flags.writeable = False
             object.__setattr__(self, letter, entries)
         if self.x0.ndim != 1 or not self.x0.size:
-            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number a state")
+            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number per state")
         n = self.x0.size
         if self.H.ndim != 3 or 0 in self.H.shape or self.H.shape[2] != n:
             raise ValueError(
-                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), a row a measurement and a column a state of x0"
+                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), one row per measurement and "
+                "one column per state of x0"
             )
         m = self.H.shape[1]
         for letter, size in (("Phi", n), ("Q", n), ("R", m)):

@@ -87,8 +87,9 @@ def required_precision(
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
     if z is None and steps > MOST_SIMULATED:
         raise ValueError(
-            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: they take hours; try fewer, and see "
-            "how the answer grows: gpbnb.wordlength.study.required_precision_by_steps"
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; "
+            "try fewer, and see how the answer grows with "
+            "gpbnb.wordlength.study.required_precision_by_steps"
         )
     if z is None:
         z = Simulation(
@@ -154,7 +155,7 @@ def survey(
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
-        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
+        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
     if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION[base]]:
         raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION[base]}")
@@ -180,7 +181,7 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
         count = f"{steps} steps" if steps else "steps, at least one"
         column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
         length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else str(z)
-        raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
+        raise ValueError(f"got {length}; needed one measurement for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
         raise ValueError(

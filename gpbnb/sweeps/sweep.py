@@ -228,8 +228,9 @@ class Sweep(Generic[C]):
                         raise
                     if tries[number] >= ATTEMPTS:
                         raise RuntimeError(
-                            f"{self.name}: got {ATTEMPTS} workers that died under one chunk of {len(chunks[number])} "
-                            "cells; needed one that lives; give workers more memory, or send smaller chunks"
+                            f"{self.name}: got {ATTEMPTS} workers that died under one chunk of "
+                            f"{len(chunks[number])} cells; needed workers that survive; give them "
+                            "more memory, or send smaller chunks"
                         ) from error
                     tries[number] += 1
                     pending[executor.submit(_some, self.compute, chunks[number], directory)] = number

@@ -114,7 +114,10 @@ def bounds_in_blocks(
             filter_run.notes[NEXT_CHECKPOINT] = 0
             filter_run.take(z[:count])
             if filter_run.stopped or filter_run.indefinite:
-                raise ArithmeticError(f"{model.name} in {fmt}: it stopped or lost definiteness by step {done + count}")
+                raise ArithmeticError(
+                    f"{model.name} in {fmt}: the filter stopped or its covariance lost definiteness by "
+                    f"step {done + count}"
+                )
         rows = np.arange(count)
         at = (done + rows) % cycle
         program, packed = packed_coefficients(run, fmt, form, rows, done)
@@ -236,9 +239,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Follow a year of Gravity Probe B in a format; two lines of the file for each 1 % of it."""
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb.kalman.guarantee.horizon",
-        description="Bounds for a year of Gravity Probe B.",
+        description="Compute error bounds for a year of Gravity Probe B.",
     )
-    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the format")
+    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the significand")
     parser.add_argument("--output", type=Path, default=Path(".cache/horizon"), help=f"folder for {FILE.name}")
     given = parser.parse_args(arguments)
     given.output.mkdir(parents=True, exist_ok=True)
