@@ -390,6 +390,7 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     parser = argparse.ArgumentParser(prog=COMMAND, description="Survey thousands of random filters.")
     parser.add_argument("--repeats", type=int, default=REPEATS, help="number of trials for each kind, format and form")
     parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="folder for the two files")

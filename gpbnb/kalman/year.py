@@ -236,6 +236,7 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     parser = argparse.ArgumentParser(prog=_COMMAND, description="Run the filters for a year in many formats and forms.")
     parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="folder for saved progress")
     parser.add_argument("--steps", type=int, default=YEAR, help="number of steps; use fewer for a trial")

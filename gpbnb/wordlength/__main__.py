@@ -13,13 +13,14 @@ from gpbnb.wordlength.models import read_measurements, read_model
 from gpbnb.wordlength.report import study
 
 EPILOG = """
-The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. Numbers are read as decimals.
+The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. A filter may have known inputs
+B and u (or --inputs) and known offsets b of the states and d of the measurements. Numbers are read as decimals.
 Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.
 """
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb.wordlength",
         description="Find how many digits a filter needs, so that rounding stays within a tolerance.",
@@ -33,11 +34,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--measurements", type=Path, help="CSV file with one row per step; default: simulated measurements"
     )
+    parser.add_argument("--inputs", type=Path, help="CSV file with the known inputs u of the filter, one row per step")
     parser.add_argument("--steps", type=int, help="number of steps to simulate; default: 1000")
     parser.add_argument("--base", type=int, default=2, help="2, 10 or 16; default: 2")
     parser.add_argument("--rounding", default="nearest", help='rounding rule, such as "nearest" or "chop"')
     parser.add_argument(
-        "--form", default="innovation", help='form of the covariance update, such as "innovation", "Joseph" or "UD"'
+        "--form",
+        default="innovation",
+        help='form of the covariance update, such as "innovation", "Joseph", "UD" or "Cholesky"',
     )
     parser.add_argument(
         "--basis",
@@ -51,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         tolerance = [float(each) for each in given.tolerance.split(",")]
         form_named(given.form), rounding_named(given.rounding)
-        model = read_model(given.model)
+        model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
         z = read_measurements(given.measurements) if given.measurements else None
         report = study(
             model,

@@ -1,4 +1,4 @@
-"""Read a model: a TOML file, or an object of SciPy, python-control or FilterPy, none of which is imported here."""
+"""Read a model from a TOML file or from an object of SciPy, python-control or FilterPy, without importing these."""
 
 from __future__ import annotations
 
@@ -17,24 +17,28 @@ from gpbnb.kalman.system import LinearSystem
 from gpbnb.sweeps import plain_number
 
 KALMAN = ("Phi", "H", "Q", "R", "x0", "P0")
-"""Keys of a Kalman filter in a TOML file; ``name`` is optional."""
+"""Keys of a Kalman filter in a TOML file."""
+
+INPUTS = ("B", "u", "b", "d", "steps")
+"""Further keys of a Kalman filter, for known inputs and offsets; see :class:`gpbnb.kalman.model.LinearModel`."""
 
 SYSTEM = ("A", "B")
-"""Keys of a linear system in a TOML file; ``C``, ``D``, ``x0`` and ``name`` are optional."""
+"""Keys of a linear system in a TOML file; ``C``, ``D`` and ``x0`` are optional. Each model may have a ``name``."""
 
 
-def read_model(source: Any) -> LinearModel | LinearSystem:
-    """A model from a TOML file, a mapping of its matrices, or an object of another library.
+def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
+    """Read a model from a TOML file, a mapping of its matrices, or an object of another library.
 
     Parameters
     ----------
     source : a path to a TOML file with :data:`KALMAN` or :data:`SYSTEM`; a mapping with the same keys; a discrete
         ``scipy.signal.dlti``, ``scipy.signal.StateSpace`` or ``control.StateSpace``, read as a linear system; a
-        ``filterpy`` Kalman filter (``F, H, Q, R, x, P``), read with its present estimate as the first.
+        ``filterpy`` Kalman filter (``F, H, Q, R, x, P``), whose current estimate becomes the initial one.
+    u : known inputs of a Kalman filter, (steps, p), in place of those in `source`, which must have B.
 
     Raises
     ------
-    ValueError : a key that is missing or unknown; a continuous system; as the classes.
+    ValueError : a key is missing or unknown; a system is continuous; or the class of the model rejects a matrix.
     TypeError : an object of another kind.
     OSError : the file cannot be read.
 
@@ -44,12 +48,14 @@ def read_model(source: Any) -> LinearModel | LinearSystem:
     >>> model.name, model.n
     ('halves', 1)
     """
+    if isinstance(source, (str, Path)):
+        return _from_toml(Path(source), u)
+    if isinstance(source, Mapping):
+        return _from_mapping(source, "the mapping", u)
+    if u is not None:
+        raise ValueError(f"got inputs for a {type(source).__name__}; needed a TOML file or a mapping with B")
     if isinstance(source, (LinearModel, LinearSystem)):
         return source
-    if isinstance(source, (str, Path)):
-        return _from_toml(Path(source))
-    if isinstance(source, Mapping):
-        return _from_mapping(source, "the mapping")
     if all(hasattr(source, letter) for letter in ("F", "H", "Q", "R", "x", "P")):
         x = np.asarray(source.x, dtype=np.float64).reshape(-1)
         name = type(source).__name__
@@ -71,18 +77,20 @@ def read_model(source: Any) -> LinearModel | LinearSystem:
     )
 
 
-def _from_toml(path: Path) -> LinearModel | LinearSystem:
+def _from_toml(path: Path, u: Any) -> LinearModel | LinearSystem:
     try:
         found = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path.name} is not TOML: {error}") from None
-    return _from_mapping(found, path.name)
+    return _from_mapping(found, path.name, u)
 
 
-def _from_mapping(given: Mapping[str, Any], where: str) -> LinearModel | LinearSystem:
+def _from_mapping(given: Mapping[str, Any], where: str, u: Any) -> LinearModel | LinearSystem:
+    if u is not None:
+        given = {**given, "u": u}
     kalman = any(key in given for key in ("Phi", "H", "Q", "R", "P0"))
     needed = KALMAN if kalman else SYSTEM
-    allowed = {*needed, "name", "repair"} if kalman else {*needed, "C", "D", "x0", "name"}
+    allowed = {*needed, *INPUTS, "name", "repair"} if kalman else {*needed, "C", "D", "x0", "name"}
     missing, unknown = [key for key in needed if key not in given], sorted(set(given) - allowed)
     if missing or unknown:
         problems = [f"{', '.join(missing)} missing"] if missing else []
@@ -102,13 +110,13 @@ def _from_mapping(given: Mapping[str, Any], where: str) -> LinearModel | LinearS
 
 
 def read_measurements(path: str | Path) -> NDArray[np.float64]:
-    """Measurements from a CSV file: a row a step, a column a measurement; (steps, m).
+    """Read measurements (steps, m) from a CSV file with a row for each step and a column for each measurement.
 
-    Lines of names before the first numbers are headers. An empty cell or ``nan`` is a missing measurement.
+    Lines of text before the first numbers are headers. An empty cell or ``nan`` is a missing measurement.
 
     Raises
     ------
-    ValueError : a cell that is no number, or rows of different lengths; the message has file and line.
+    ValueError : a cell is not a number, or rows differ in length; the message has file and line.
     OSError : the file cannot be read.
     """
     path, rows = Path(path), list[list[float]]()
