@@ -178,7 +178,8 @@ class LinearModel:
             object.__setattr__(self, letter, entries)
         if self.B is not None and self.B.shape[2] != self.u.shape[-1]:
             raise ValueError(
-                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers a step; needed as many"
+                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers per "
+                "step; needed equal numbers"
             )
 
     @property

@@ -107,7 +107,7 @@ def random_variables(printed: Statement) -> Finding:
         f"of a constant that rolls with the spacecraft, a fraction {rolls:g} remains after 52560 "
         f"whole rolls, and {orbits:.1g} if the last roll is incomplete; a constant that does not roll "
         "remains",
-        note=CHAPTER,
+        note=f"see the {CHAPTER}",
     )
 
 

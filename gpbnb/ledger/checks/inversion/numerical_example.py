@@ -104,7 +104,7 @@ def _proposed(printed: Statement) -> tuple[bool, str]:
     values = [search.closest.values[example.PLACES.index(places)] for places in _numbers(printed, "proposed")]
     return found > 0, (
         f"the procedure can be read in {count} ways, and {found or 'none'} of them gives all printed "
-        f"digits; the closest values, {', '.join(f'{v:.3e}' for v in values)}, are off by "
+        f"digits; the closest result, {', '.join(f'{v:.3e}' for v in values)}, is off by "
         f"{search.closest.distance - 1:.1%} ({search.closest.wordlength}; {search.closest.detail})"
     )
 

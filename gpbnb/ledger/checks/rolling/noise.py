@@ -81,7 +81,7 @@ def spread(printed: Statement) -> Finding:
 
 @CHECKS.add(entry("s5.figure-iii-3-a"), entry("s5.figure-iii-3-b"))
 def pictures() -> Finding:
-    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; {CHAPTER}")
+    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; see the {CHAPTER}")
 
 
 @CHECKS.add(entry("s5.inphase-noise"))

@@ -163,7 +163,7 @@ def much_less(printed: Statement) -> Finding:
 
 @CHECKS.add(entry("s1.figure-iii-1-a"), entry("s1.figure-iii-1-b"), entry("s1.figure-iii-2"))
 def pictures() -> Finding:
-    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; {CHAPTER}")
+    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; see the {CHAPTER}")
 
 
 @CHECKS.add(entry("s1.equivalent-modulation"))
