@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
@@ -98,6 +99,8 @@ def emulate(
     fused: bool = False,
     sums: FloatFormat | FixedFormat | None = None,
     compensated: bool = False,
+    order: Order = "left",
+    block: int = 32,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
 
@@ -110,13 +113,13 @@ def emulate(
     true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
         errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
     fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
-    sums, compensated : as of :class:`~gpbnb.kalman.filter_run.Run`.
+    sums, compensated, order, block : as of :class:`~gpbnb.kalman.filter_run.Run`.
     """
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
-    run = Run(model, fmt, form, chosen, fused, sums, compensated)
+    run = Run(model, fmt, form, chosen, fused, sums, compensated, order, block)
     run.take(measured)
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)
