@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.conversion import entries, exact_ratio, single
+from gpbnb.arithmetic.conversion import entries, exact_ratio
 from gpbnb.arithmetic.functions import power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.formats import FloatFormat
 
 
+class NegativeRootError(ValueError):
+    """The square root of a negative number."""
+
+
 class FloatArray(NumPyProtocols):
     """An immutable n-dimensional array of numbers of one format; make one with ``fmt.array``.
 
@@ -30,12 +34,23 @@ class FloatArray(NumPyProtocols):
     may be a plain number or array if each entry is a number of the format: nothing is rounded
     unseen. Indexing with NumPy's rules gives a FloatArray; comparing gives booleans, exact.
 
+    Leaving the format is explicit. ``x.to_float()`` gives the nearest float64, ``x.to_fractions()`` the
+    exact value. Whatever asks for an array or a float by itself, as ``np.asarray(x)``, ``float(x[0])``,
+    ``math.sqrt(x[0])``, ``np.save`` or ``scipy.linalg.solve``, gets float64 if that is exact, or else an error.
+
     Raises
     ------
     ValueError : the operands have different formats, or shapes that do not broadcast; a plain
         operand is not a number of the format; the square root of a negative number.
     ZeroDivisionError : a divisor is zero; the message gives the place.
     TypeError : an operand is not a number; an entry is assigned to.
+
+    Examples
+    --------
+    >>> from gpbnb.arithmetic.formats import FloatFormat
+    >>> x = FloatFormat(10, 4).array(["0.1", "0.5"])
+    >>> float(x[1]), x.to_float()
+    (0.5, array([0.1, 0.5]))
 
     References
     ----------
@@ -229,7 +244,7 @@ class FloatArray(NumPyProtocols):
     def _unary(self, name: str) -> FloatArray:
         if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
             at = f" at {_place(negative)}" if negative else ""
-            raise ValueError(
+            raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
         components = self.backend.apply(name, self.components)
@@ -387,34 +402,6 @@ class FloatArray(NumPyProtocols):
         to_fraction = np.frompyfunc(self.format.kernel.to_fraction, 2, 1)
         return np.asarray(to_fraction(*self.to_pairs()), dtype=object)[()]
 
-    def __float__(self) -> float:
-        if self.size != 1:
-            raise TypeError(f"got float() of a FloatArray of shape {self.shape}; needed one number; use x.to_float()")
-        return float(self.reshape(()).to_float())
-
-    def astype(self, dtype: Any) -> NDArray[Any]:
-        """A NumPy array of dtype float64, the nearest, or object, the exact Fractions.
-
-        Raises
-        ------
-        TypeError : another dtype.
-        OverflowError : as :meth:`to_float`.
-        """
-        dtype = np.dtype(dtype)
-        if dtype == np.float64:
-            return np.asarray(self.to_float(), dtype=np.float64)
-        if dtype == np.dtype(object):
-            return single(self.to_fractions()) if not self.ndim else self.to_fractions()
-        raise TypeError(
-            f"got a conversion to dtype {dtype}; needed float64 (nearest) or object (exact Fractions); "
-            "use x.to_float().astype(...)"
-        )
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        if copy is False:
-            raise ValueError("got copy=False; needed True or None: a FloatArray becomes an array by conversion only")
-        return self.astype(np.float64 if dtype is None else dtype)
-
     # -- text ----------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
@@ -425,9 +412,6 @@ class FloatArray(NumPyProtocols):
 
     def __str__(self) -> str:
         return self._text(quote="", separator=" ", prefix="")
-
-    def __format__(self, spec: str) -> str:
-        return format(float(self), spec) if spec else str(self)
 
     def _text(self, quote: str, separator: str, prefix: str) -> str:
         """Decimal digits from which ``fmt.array`` makes the same numbers again, in columns."""

@@ -121,9 +121,9 @@ CORRECTED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
     (name, sp.factor(kalman.count_start(c, g)), sp.factor(kalman.second_coefficient(c, d, g, sign)))
     for name, (c, d), g, sign in (
         ("as printed", kalman.TWICE, sp.S.Zero, -1),
-        ("counted once", kalman.ONCE, sp.S.Zero, -1),
-        ("and signs free", kalman.ONCE, sp.S.Zero, 1),
-        ("and errors carried on", kalman.ONCE, kalman.GROWTH, 1),
+        ("roundings counted once", kalman.ONCE, sp.S.Zero, -1),
+        ("and errors of either sign", kalman.ONCE, sp.S.Zero, 1),
+        ("and covariance errors carried on", kalman.ONCE, kalman.GROWTH, 1),
     )
 )
 """The name in ``gpbnb.kalman.report_bounds.CORRECTIONS``, then the coefficients of ‖x‖ and of B."""

@@ -225,7 +225,7 @@ KALMAN = Calculator(
         _BASE,
         _PLACES,
         _RULE,
-        Input("goal", "Error granted, unit of the state", 1e-30, 1e30, (1e-6, 1e6), log=True),
+        Input("goal", "Allowed error, unit of the state", 1e-30, 1e30, (1e-6, 1e6), log=True),
     ),
     definitions=derivation.kalman_bound,
     columns=("(125)", "times β‖xₖ‖", "times β‖u‖", "error", "digits needed"),
@@ -238,7 +238,7 @@ KALMAN = Calculator(
         "k",
         "Bound against steps",
         "error, unit of the state",
-        (*((f"bound{i}", name) for i, name in enumerate(_KALMAN_NAMES, 1)), ("goal", "error granted")),
+        (*((f"bound{i}", name) for i, name in enumerate(_KALMAN_NAMES, 1)), ("goal", "allowed error")),
     ),
     examples={
         "the closing example": {
@@ -259,7 +259,7 @@ KALMAN = Calculator(
         },
     },
     shown={
-        "k": "k", "n": "n", "m": "m", "x": "‖xₖ‖", "u": "‖u‖", "f": "‖F‖", "b": "b", "t": "t", "goal": "granted",
+        "k": "k", "n": "n", "m": "m", "x": "‖xₖ‖", "u": "‖u‖", "f": "‖F‖", "b": "b", "t": "t", "goal": "allowed",
         "bound1": "as printed", "digits1": "digits", "bound4": "corrected", "digits4": "digits",
         "bound5": "forgotten", "digits5": "digits",
     },

@@ -12,24 +12,16 @@ from gpbnb.inversion.existence import Possible
 from gpbnb.inversion.experiment import Frozen, Trial
 
 
-def table1(readings: Sequence[tuple[Column, Column]]) -> Table:
-    """Tabulate the six numbers of Table 1 in some readings, each with its ratio to the printed one."""
-    header = ("wordlength", "reading", *(f"{name}, {p}" for name in ("bound", "error") for p in PLACES))
-    values = (float(value) for name in ("bound", "error") for value in PRINTED[name])
-    printed = ("as printed", "", *(scientific(value, 4) for value in values))
-    body = [
-        (
-            str(bound.wordlength),
-            in_math(bound.detail),
-            *(
-                f"{scientific(value, 4)} ({ratio:.3g})"
-                for column in (bound, error)
-                for value, ratio in zip(column.values, column.ratios, strict=True)
-            ),
-        )
-        for bound, error in readings
-    ]
-    return Table(f"Table 1 in {len(body)} readings", header, (printed, *body))
+def table1(found: Sequence[Search]) -> Table:
+    """Show the six numbers of Table 1 as printed, and beside each the number of the reading that comes closest."""
+    names = {"bound": "By proposed method", "error": "Actual value"}
+    header = ["places after decimal point"]
+    columns = []
+    for one in found:
+        header += [f"{names[one.column]}, printed", f"{names[one.column]}, closest reading"]
+        columns += [[float(value) for value in PRINTED[one.column]], one.closest.values]
+    body = [(str(places), *(scientific(column[i], 4) for column in columns)) for i, places in enumerate(PLACES)]
+    return Table("Table 1 as printed and as computed", tuple(header), tuple(body))
 
 
 def searches(found: Sequence[Search]) -> Table:

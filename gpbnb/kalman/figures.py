@@ -143,7 +143,7 @@ def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
     """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
     lines: dict[str, Mapping[str, bool]] = {
         "(125), printed formula": {},
-        "(125), all faults corrected": report_bounds.CORRECTIONS["and errors carried on"],
+        "(125), all faults corrected": report_bounds.ALL_CORRECTED,
     }
     marked: list[tuple[str, Sequence[float]]] = [
         ("printed answers", found.printed),
@@ -165,7 +165,13 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style, place, away in (
         ("(125) as printed", {}, "-", 0, (2, -38)),
-        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"], "--", 12, (6, 6)),
+        (
+            "(125) with its faults corrected",
+            report_bounds.ALL_CORRECTED,
+            "--",
+            12,
+            (6, 6),
+        ),
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
         x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]

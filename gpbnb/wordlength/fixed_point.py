@@ -92,6 +92,7 @@ def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilt
     ------
     ValueError : a model whose matrices change.
     """
+    model.refuse_inputs("fixed point")
     if model.cycle != 1:
         raise ValueError(f"got {model.name} with a cycle of {model.cycle} steps; needed constant matrices")
     measured = np.asarray(z)

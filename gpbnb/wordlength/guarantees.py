@@ -7,7 +7,6 @@ contain one of them.
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -22,8 +21,9 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.display.tables import Table
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.adversary import attack, random_errors
-from gpbnb.kalman.guarantee.bound import Guarantee, from_schedule, guarantee, limits
+from gpbnb.kalman.guarantee.bound import BUDGET, Guarantee, from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.linear import LinearFilter, biquad, controller, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.published import (
@@ -31,6 +31,7 @@ from gpbnb.kalman.guarantee.published import (
     dynamax_tracking,
     elaenia_gold,
     filterpy_fusion,
+    filterpy_velocity,
     fixif_longitudinal,
     nile_local_level,
     px4_landing_target,
@@ -38,9 +39,11 @@ from gpbnb.kalman.guarantee.published import (
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import Basis
+from gpbnb.sweeps import Column, machine, read, write
 from gpbnb.wordlength.examples import altimeter, tilt, tracker
 
 FILE = Path(__file__).with_name("guarantees.csv")
+COMMAND = "python -m gpbnb.wordlength.guarantees"
 FORMAT = FloatFormat(2, 24)
 SHARE = 1e-4
 """Tolerance of each state, as a share of its limit."""
@@ -59,7 +62,9 @@ class Case:
     state, innovation : limits, for a Kalman filter. measurement : limit, for a linear filter.
     center : where the adversary keeps the state.
     steps : of the adversary's runs. candidates : among how many measurements it chooses at each step.
+    aims : the states whose errors it tries to make large; all if empty.
     horizon : for filters without process noise, the number of steps that the bound is for.
+    form : of a Kalman filter. budget : of the guarantee in binary32, for filters that take long to settle.
     """
 
     make: Callable[[], LinearModel | LinearFilter]
@@ -69,7 +74,10 @@ class Case:
     center: tuple[float, ...] = ()
     steps: int = 2_000
     candidates: int = 200
+    aims: tuple[int, ...] = ()
     horizon: int | None = None
+    form: Form = Form.INNOVATION
+    budget: float = BUDGET
 
 
 def _longitudinal() -> LinearFilter:
@@ -79,13 +87,14 @@ def _longitudinal() -> LinearFilter:
 
 CASES = (
     Case(nile_local_level, (1500,), 1200, center=(1000,)),
-    Case(elaenia_gold, (1200,), 60, center=(1000,), steps=10, horizon=10),
+    Case(elaenia_gold, (1200,), 60, center=(1150,), steps=10, horizon=10),
     Case(tracker, (1000, 30), 8, center=(750, 0)),
     Case(filterpy_fusion, (1000, 30), 8, center=(750, 0)),
+    Case(filterpy_velocity, (2000, 150), 150, center=(1500, 0), form=Form.JOSEPH),
     Case(px4_landing_target, (10, 3), 1, center=(9, 0)),
     Case(dyer_mcreynolds, (10, 10, 10), 0.02, steps=1, horizon=1),
     Case(dynamax_tracking, (100, 100, 10, 10), 8, center=(80, 80, 0, 0)),
-    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000),
+    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000, budget=2e9),
     Case(tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000),
     Case(lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), measurement=1.0),
     Case(lambda: controller("0.999", "0.01", "2", "5"), measurement=1.0),
@@ -113,6 +122,16 @@ class Row(NamedTuple):
     seconds: str
 
 
+_WHOLE = {"n", "m", "repeat", "period", "guarantee", "contraction", "three_sigma", "emulation"}
+COLUMNS = tuple(
+    Column(name, "text")
+    if name == "name"
+    else Column(name, "integer" if name in _WHOLE else "number", 0, optional=True)
+    for name in Row._fields
+)
+"""Columns of the stored table."""
+
+
 def compute(case: Case) -> Row:
     """Guarantee in binary32, an attack on it, and the precision that each basis asks for."""
     made = case.make()
@@ -123,8 +142,9 @@ def compute(case: Case) -> Row:
     worst = int((found.bound / sizes).argmax())
     center = case.center or None
     ramp = min(case.steps / 2, 1_000)
+    plans = 6 if case.measurement < math.inf else 3
     outcome = attack(
-        found, case.steps, case.candidates, center=center, plans=6 if case.measurement < math.inf else 3, ramp=ramp
+        found, case.steps, case.candidates, states=case.aims or None, center=center, plans=plans, ramp=ramp
     )
     if not outcome.admissible or outcome.ratio > 1:
         raise RuntimeError(f"{made.name}: {outcome}")
@@ -159,8 +179,9 @@ def _found(case: Case, made: LinearModel | LinearFilter, fmt: FloatFormat) -> Gu
     if isinstance(made, LinearModel):
         within = limits(made.n, made.m, state=case.state, innovation=case.innovation)
         if case.horizon is not None:
-            return guarantee(made, fmt, within, most=case.horizon, horizon=case.horizon)
-        return guarantee(made, fmt, within, most=100_000, horizon=1)
+            return guarantee(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
+        budget = case.budget if fmt == FORMAT else BUDGET
+        return guarantee(made, fmt, within, case.form, most=100_000, horizon=1, budget=budget)
     schedule = made.schedule(fmt)
     return from_schedule(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
 
@@ -177,7 +198,7 @@ def _bits(
     if basis == "bound" or (basis == "emulation" and isinstance(made, LinearModel)):
         if not isinstance(made, LinearModel):
             return ""
-        answer = required_precision(made, case.horizon or RECORD, list(tolerance), basis=basis)
+        answer = required_precision(made, case.horizon or RECORD, list(tolerance), basis=basis, form=case.form)
         return str(answer.fmt.precision) if answer.fmt else ""
     if basis == "probable" and finite:
         return ""
@@ -224,8 +245,7 @@ def fixed_and_floating_bits() -> tuple[int, int]:
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
     """The stored rows."""
-    with file.open(encoding="utf-8", newline="") as stream:
-        return tuple(Row(**line) for line in csv.DictReader(stream))
+    return tuple(Row(**line) for line in read(file, COLUMNS, COMMAND).records())
 
 
 def table() -> Table:
@@ -262,9 +282,7 @@ def bits_table() -> Table:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compute the rows whose names contain one of the words, or all, and write them to a folder."""
-    parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.wordlength.guarantees", description="Guarantees of some filters, as a table."
-    )
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Guarantees of some filters, as a table.")
     parser.add_argument("words", nargs="*", help="only filters whose names contain one of them; the rest as stored")
     parser.add_argument("--output", type=Path, default=Path(".cache/guarantees"), help="folder for guarantees.csv")
     given = parser.parse_args(arguments)
@@ -279,10 +297,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             rows[name] = compute(case)
             print(*rows[name], flush=True)
             order = [each.make().name for each in CASES]
-            with file.open("w", encoding="utf-8", newline="") as stream:
-                writer = csv.writer(stream, lineterminator="\n")
-                writer.writerow(Row._fields)
-                writer.writerows(rows[each] for each in order if each in rows)
+            found = [tuple(rows[each]) for each in order if each in rows]
+            write(file, COLUMNS, found, {"command": COMMAND, **machine()})
     return 0
 
 

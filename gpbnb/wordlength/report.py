@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from gpbnb.kalman.array_forms import AnyForm
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import log_spaced, reference
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import Basis, Requirement
-from gpbnb.kalman.simulation import Simulation, fine_resolution
 from gpbnb.kalman.system import LinearSystem
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.study import binary_ranges
@@ -113,13 +114,13 @@ def study(
     """
     count = steps if steps is not None else 1000 if z is None else len(z)
     if isinstance(model, LinearSystem):
-        questions: list[tuple[str, Basis, Form | None]] = [(basis, basis, None) for basis in bases]
+        questions: list[tuple[str, Basis, AnyForm | None]] = [(basis, basis, None) for basis in bases]
     else:
         first = form_named(form)
         forms = [first, *(each for each in SIDE_BY_SIDE if each is not first)]
         questions = [(f"{each}, {basis}", basis, each) for each in forms for basis in bases]
         if z is None:
-            z = Simulation(model, tuple(map(float, model.x0)), 0, fine_resolution(model)).measurements(count)
+            z = simulated_measurements(model, count)
     found: list[tuple[str, Requirement]] = []
     for label, basis, chosen in questions:
         tell(f"{label} …")
@@ -155,7 +156,7 @@ def study(
 
 
 def _errors(
-    model: LinearModel, z: Any, answer: Requirement, form: Form, tolerances: np.ndarray
+    model: LinearModel, z: Any, answer: Requirement, form: AnyForm, tolerances: np.ndarray
 ) -> tuple[float | None, ...]:
     """Largest error over tolerance of each state at the answer."""
     if answer.fmt is None:

@@ -72,8 +72,11 @@ def required_precision_by_steps(
 
 def _first(model: LinearModel, steps: int) -> LinearModel:
     """The same for so many steps, without what a longer cycle has later, which would be rounded and checked in vain."""
-    cut = {letter: getattr(model, letter)[:steps] for letter in ("Phi", "H", "Q", "R")}
-    return replace(model, **cut)
+    given = [letter for letter in ("Phi", "H", "Q", "R", "B", "b", "d") if getattr(model, letter) is not None]
+    cut = {letter: getattr(model, letter)[:steps] for letter in given}
+    if model.u is not None and model.u.ndim == 2:
+        cut["u"] = model.u[:steps]
+    return replace(model, **cut, steps=None if model.steps is None else steps)
 
 
 def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int, int], ...]:
@@ -231,6 +234,7 @@ def native(
     """
     if not (isinstance(dtype, type) and issubclass(dtype, np.floating)):
         raise TypeError(f"got dtype {dtype!r}; needed numpy.float16, numpy.float32 or numpy.float64")
+    model.refuse_inputs("NumPy's own types")
     with np.errstate(all="ignore"):
         given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
         return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
@@ -359,4 +363,6 @@ def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
         Q=model.Q * square,
         x0=model.x0 * given,
         P0=model.P0 * square,
+        B=None if model.B is None else model.B * given[:, np.newaxis],
+        b=None if model.b is None else model.b * given,
     )

@@ -58,7 +58,7 @@ def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt:
         rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
         body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
     kind = digits(fmt)
-    header = ("duration", "bits, rounded", "bits, chopped", f"best rate of {kind}, Hz", "its additions lost at, Hz")
+    header = ("duration", "bits, rounded", "bits, chopped", f"best rate with {kind}, Hz", "increments vanish at, Hz")
     return Table(f"{len(body)} durations", header, tuple(body))
 
 
