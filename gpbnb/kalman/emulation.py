@@ -132,8 +132,8 @@ def emulate(
     if model.has_inputs or isinstance(form, ArrayForm):
         if fused or sums is not None or compensated or order != "left":
             raise ValueError(
-                "got fused, sums, compensated or order with known inputs or a form without compiled loops; needed none of "
-                'them; for compensated summation write form="compensated"'
+                "got fused, sums, compensated or order with known inputs or a form without compiled loops; needed none "
+                'of them; for compensated summation write form="compensated"'
             )
         run = ArrayRun(model, fmt, form, chosen)
     else:
