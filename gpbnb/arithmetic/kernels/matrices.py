@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import njit
 from numba.extending import overload
 
@@ -73,11 +74,20 @@ def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @njit(nogil=True)
-def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, first: int, end: int) -> Any:
-    if end - first == 1:
-        return multiply(fmt, load(fmt, a, (i, first)), load(fmt, b, (first, j)))
-    middle = (first + end) // 2
-    return add(fmt, _pairwise(fmt, a, b, i, j, first, middle), _pairwise(fmt, a, b, i, j, middle, end))
+def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> Any:
+    # Without recursion, which numba's cache does not survive: product k completes every part that it is the last of.
+    count = 0
+    for k in range(n):
+        sums[count] = multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)))
+        count += 1
+        first, end = 0, n
+        while end - first > 1:
+            if k == end - 1:
+                count -= 1
+                sums[count - 1] = add(fmt, sums[count - 1], sums[count])
+            middle = (first + end) // 2
+            first, end = (first, middle) if k < middle else (middle, end)
+    return sums[0]
 
 
 @njit(nogil=True)
@@ -100,9 +110,10 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
     def pairwise(fmt: Any, a: Any, b: Any, c: Any) -> Any:
         inner = fmt.sums if mixed else fmt
+        sums = np.zeros(64)
         for i in range(c.shape[0]):
             for j in range(c.shape[1]):
-                put(fmt, c, (i, j), _pairwise(inner, a, b, i, j, 0, a.shape[1]) if a.shape[1] else zero(fmt))
+                put(fmt, c, (i, j), _pairwise(inner, a, b, i, j, a.shape[1], sums))
         check(fmt, c)
         return True
 
