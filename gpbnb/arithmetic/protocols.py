@@ -1,4 +1,4 @@
-"""NumPy's array protocols for arrays of a format: which of its functions they take, and what each does."""
+"""NumPy's array protocols for arrays of a format: the NumPy functions that they support, and their meaning."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import functions
 from gpbnb.arithmetic.conversion import single
 
-_EXACT = {2: 53, 16: 13}  # digits that float64 holds
+_EXACT = {2: 53, 16: 13}  # digits of float64
 _LEAST_NORMAL = 2.0**-1022
 
 _JOINERS = frozenset(("concatenate", "hstack", "stack", "vstack"))
@@ -31,7 +31,7 @@ _MOVERS = frozenset((
 
 
 class NumPyProtocols:
-    """What an array of a format needs so that NumPy's own functions take it."""
+    """Methods that let NumPy's own functions accept an array of a format."""
 
     __slots__ = ()
 
@@ -71,43 +71,43 @@ class NumPyProtocols:
         return functions.trace(self)
 
     def dot(self, other: Any) -> Any:
-        """As ``np.dot``: entries of products are summed from left to right."""
+        """Compute ``np.dot``, with products summed from left to right."""
         return _dot(self, self, other)
 
     def copy(self) -> Any:
-        """The same array: it does not change, and needs no copy."""
+        """Return the array itself, which is immutable and needs no copy."""
         return self
 
     def ravel(self) -> Any:
-        """The entries in one row."""
+        """Return the entries in one row."""
         return self.moved(np.ravel)
 
     def flatten(self) -> Any:
-        """The entries in one row."""
+        """Return the entries in one row."""
         return self.moved(np.ravel)
 
     def transpose(self, *axes: Any) -> Any:
-        """The axes in another order; by default in reverse."""
+        """Return the array with its axes in another order, by default reversed."""
         order = axes[0] if len(axes) == 1 and not isinstance(axes[0], int) else axes or None
         return self.moved(lambda a: np.transpose(a, order))
 
     @abstractmethod
     def to_fractions(self) -> Any:
-        """The exact value of each entry."""
+        """Return the exact value of each entry."""
 
     def tolist(self) -> Any:
-        """Exact Fractions in nested lists, or one Fraction."""
+        """Return exact Fractions in nested lists, or one Fraction."""
         found = self.to_fractions()
         return found.tolist() if isinstance(found, np.ndarray) else found
 
     def item(self, *index: Any) -> Any:
-        """One entry as an exact Fraction."""
+        """Return one entry as an exact Fraction."""
         found = np.asarray(self.to_fractions(), dtype=object)
         return found.item(*index)
 
     @abstractmethod
     def operand(self, other: Any) -> Any:
-        """The other operand of an operation, as an array of the same format."""
+        """Return the other operand of an operation as an array of the same format."""
 
     @abstractmethod
     def moved(self, move: Callable[[Any], Any]) -> Any:
@@ -121,10 +121,10 @@ class NumPyProtocols:
 
     @abstractmethod
     def to_float(self) -> Any:
-        """The nearest float64 of each entry."""
+        """Return the nearest float64 of each entry."""
 
     def _exact_float(self, what: str) -> NDArray[np.float64]:
-        """Each entry as float64, if that is exact."""
+        """Return each entry as float64 if that is exact."""
         given: Any = self
         nearest = np.asarray(given.to_float(), dtype=np.float64)
         sizes = np.abs(nearest[nearest != 0])
@@ -151,7 +151,7 @@ class NumPyProtocols:
         return float(given.reshape(())._exact_float("float()").item())
 
     def astype(self, dtype: Any) -> NDArray[Any]:
-        """A NumPy array of dtype float64, the nearest, or object, the exact Fractions.
+        """Return a NumPy array of the nearest float64 numbers, or of exact Fractions for dtype object.
 
         Raises
         ------
@@ -216,7 +216,7 @@ class NumPyProtocols:
         )
 
     def _rearrange(self, func: Any, args: Any, kwargs: Any) -> Any:
-        """Call a NumPy function that only moves entries, on each component."""
+        """Apply a NumPy function that only moves entries to each component."""
         if refused := {"out", "dtype", "casting", "like"} & kwargs.keys():
             raise TypeError(
                 f"got np.{func.__name__} of a {type(self).__name__} with {', '.join(sorted(refused))}; "
@@ -242,13 +242,13 @@ _OTHER_NAMES = {
 
 
 def _nearest(name: str, known: Sequence[str], prefix: str = "np.") -> str:
-    """A hint at the function that is meant, or the most similar name; empty if there is none."""
+    """Return a hint at the intended function or the most similar name; empty if there is none."""
     near = [_OTHER_NAMES[name]] if _OTHER_NAMES.get(name) in known else difflib.get_close_matches(name, known, 1)
     return f"; the nearest is {prefix}{near[0]}" if near else ""
 
 
 def broadcast(name: str, a: tuple[int, ...], b: tuple[int, ...]) -> None:
-    """ValueError if two shapes do not broadcast."""
+    """Raise ValueError if two shapes do not broadcast."""
     if a == b:
         return
     try:
@@ -320,7 +320,7 @@ def _append(x: NumPyProtocols, a: Any, values: Any, axis: int | None) -> Any:
 
 
 def _exponent(value: Any) -> Any:
-    """A plain exponent: NumPy hands it over as an array of a format."""
+    """Return a plain exponent, which NumPy passes as an array of a format."""
     if not value.ndim and (exact := value.to_fractions()).denominator == 1:
         return int(exact)
     raise TypeError("got an exponent that is no single whole number; needed one, as in np.power(x, 3)")

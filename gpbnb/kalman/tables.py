@@ -131,7 +131,9 @@ def order() -> Table:
     body = []
     for name, second in (("first", False), ("second", True)):
         found = report_bounds.order(second)
-        body.append((name, " → ".join(found) if found else "none: (99) waits for (101), and (101) for (99)"))
+        body.append(
+            (name, " → ".join(found) if found else "none: (99) needs the result of (101), and (101) that of (99)")
+        )
     return Table("the order of (98)-(101)", ("form of (99)", "order"), tuple(body))
 
 
@@ -148,13 +150,13 @@ def largest_violating_noise(fmts: Sequence[FloatFormat]) -> Table:
 
 
 def states(model: LinearModel) -> Table:
-    """States of :func:`gpbnb.kalman.gravity_probe_b.gravity_probe_b`: transition, first deviation, process noise."""
+    """Tabulate the states of the Gravity Probe B model: transition, initial standard deviation, process noise."""
     given = model.to_float()
     body = tuple(
         (name, unit, f"{given['Phi'][0, i, i]:g}", _root(given["P0"][i, i]), _root(given["Q"][0, i, i]))
         for i, (name, unit) in enumerate(STATES)
     )
-    header = ("state", "unit", "transition per step", "first standard deviation", "random walk per step")
+    header = ("state", "unit", "transition per step", "initial standard deviation", "random walk per step")
     return Table(f"{len(body)} states", header, body)
 
 
@@ -177,10 +179,10 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
         *(["model"] if several else []),
         "arithmetic",
         "form",
-        "drift (mas)",
-        "rate (mas/yr)",
-        "gain, relative",
-        "covariance, relative",
+        "error of the drift (mas)",
+        "error of the rate (mas/yr)",
+        "relative error of the gain",
+        "relative error of the covariance",
         "smallest eigenvalue",
     )
     return Table(f"{len(body)} years", header, tuple(body))
@@ -206,7 +208,7 @@ def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms
         body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.5f}"))
     header = (
         "arithmetic",
-        "rate, error (mas/yr)",
+        "error of the rate (mas/yr)",
         *(f"(125), {name}" for name in report_bounds.CORRECTIONS),
         "companion bound",
     )
@@ -276,7 +278,17 @@ def shares(found: Sequence[Share]) -> Table:
         )
         for each in found
     ]
-    head = ("state", "form", "arithmetic", "within", "probability", "median", "90 %", "largest", "99 %, upper limit")
+    head = (
+        "state",
+        "form",
+        "arithmetic",
+        "within tolerance",
+        "probability",
+        "median",
+        "90 %",
+        "largest",
+        "upper limit for 99 % of records",
+    )
     return Table("records that stay within a milliarcsecond for a year", head, tuple(rows))
 
 
@@ -292,7 +304,7 @@ def sensitivity(moved: Sequence[Moved]) -> Table:
         (each.choice, each.before, each.after, f"{each.bits:+.1f}".replace("-", "−"), str(each.records))
         for each in moved
     )
-    return Table("what moves the answer", ("choice", "from", "to", "bits", "records at least"), rows)
+    return Table("what moves the answer", ("choice", "from", "to", "bits", "records (at least)"), rows)
 
 
 def needed_precisions(found: Sequence[Share]) -> Table:
@@ -315,7 +327,7 @@ def needed_precisions(found: Sequence[Share]) -> Table:
         rows.append((f"{setting}, {states}", f"{form}, {rounding}", observed, passed, limits, lognormal, shown))
     head = (
         "model and states", "form and rounding", "99 % of the records", "passed", "probability", "99 %, lognormal",
-        "99 %, no assumption",
+        "99 %, proved with 95 % confidence",
     )  # fmt: skip
     return Table("smallest precision that stays within a milliarcsecond", head, tuple(rows))
 
@@ -324,7 +336,9 @@ def first_steps(found: Sequence[FirstStep]) -> Table:
     """Models that exceed (105) in their first step, by kind, with the 95 % limits of the probability."""
     rows = [(each.kind, str(each.models), str(each.exceeded), f"{each.low:.2f} to {each.high:.2f}") for each in found]
     return Table(
-        "models that exceed (105) in their first step", ("kind", "models", "exceed", "probability"), tuple(rows)
+        "models that exceed (105) in their first step",
+        ("kind", "models", "models that exceed (105)", "probability"),
+        tuple(rows),
     )
 
 
@@ -371,8 +385,8 @@ def bound_costs(
             cells.append(f"{value / float(error[at]):.3g}")
     costs = (
         ("a formula", "none"),
-        (f"{time:.0f} times the run", "106 bits for each step again"),
-        (f"{time:.0f} times the run", "106 bits for a second run"),
+        (f"{time:.0f} times the run", "106 bits, to repeat each step"),
+        (f"{time:.0f} times the run", "106 bits, for a second run"),
     )
     body = tuple((name, *cost, *cells) for (name, cells), cost in zip(ratios.items(), costs, strict=True))
     head = ("bound", "processor time", "extra digits", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))

@@ -1,7 +1,7 @@
 """Guarantees for every measurement and for all time, for filters of this package and of other projects.
 
-``python -m gpbnb.wordlength.guarantees`` computes ``guarantees.csv`` anew; with words, only the filters whose names
-contain one of them.
+``python -m gpbnb.wordlength.guarantees`` recomputes ``guarantees.csv``. If words are given, it computes only the
+filters whose names contain one of them.
 """
 
 from __future__ import annotations
@@ -58,13 +58,13 @@ class Case:
 
     Parameters
     ----------
-    make : the filter.
-    state, innovation : limits, for a Kalman filter. measurement : limit, for a linear filter.
-    center : where the adversary keeps the state.
-    steps : of the adversary's runs. candidates : among how many measurements it chooses at each step.
-    aims : the states whose errors it tries to make large; all if empty.
-    horizon : for filters without process noise, the number of steps that the bound is for.
-    form : of a Kalman filter. budget : of the guarantee in binary32, for filters that take long to settle.
+    make : function that returns the filter.
+    state, innovation : limits for a Kalman filter. measurement : limit for a linear filter.
+    center : the state near which the adversary stays.
+    steps : length of the adversary's runs. candidates : number of measurements to choose from at each step.
+    aims : the states whose errors the adversary tries to make large; all states if empty.
+    horizon : number of steps that the bound covers, for filters without process noise.
+    form : form of a Kalman filter. budget : budget of the guarantee in binary32, for filters that settle slowly.
     """
 
     make: Callable[[], LinearModel | LinearFilter]
@@ -104,7 +104,7 @@ CASES = (
 
 
 class Row(NamedTuple):
-    """One line of the table; text as printed."""
+    """One row of the table, as text."""
 
     name: str
     n: str
@@ -133,7 +133,7 @@ COLUMNS = tuple(
 
 
 def compute(case: Case) -> Row:
-    """Guarantee in binary32, an attack on it, and the precision that each basis asks for."""
+    """Compute the guarantee in binary32, an attack on it, and the precision that each basis requires."""
     made = case.make()
     begin = time.process_time()
     found = _found(case, made, FORMAT)
@@ -193,7 +193,7 @@ def _bits(
     tolerance: NDArray[np.float64],
     known: NDArray[np.float64],
 ) -> str:
-    """Bits that a basis asks for; empty where it does not apply. `known` are its errors in binary32."""
+    """Return the bits that a basis requires, empty if it does not apply; `known` holds its errors in binary32."""
     finite = case.horizon is not None
     if basis == "bound" or (basis == "emulation" and isinstance(made, LinearModel)):
         if not isinstance(made, LinearModel):
@@ -216,7 +216,7 @@ def _bits(
             errors = 3 * probable_error(found) if found.for_ever else np.full(len(tolerance), math.inf)
         return bool((errors <= tolerance).all())
 
-    # Errors are nearly proportional to the unit roundoff: look near the precision that this predicts first.
+    # Errors are nearly proportional to the unit roundoff, so first try near the precision that this predicts.
     near = FORMAT.precision + math.ceil(math.log2((known / tolerance).max()))
     least, largest = max(near - 2, 2), min(near + 3, LARGEST_PRECISION[2])
     fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=least, largest=largest)
@@ -226,7 +226,7 @@ def _bits(
 
 
 def fixed_and_floating_bits() -> tuple[int, int]:
-    """Bits with which the output of FixIF's controller is within its target, in fixed and in floating point.
+    """Return the bits with which the output of FixIF's controller meets its target, in fixed and in floating point.
 
     In fixed point, all states have the same number of bits and the coefficients that FixIF printed bound the output.
     """
@@ -244,12 +244,12 @@ def fixed_and_floating_bits() -> tuple[int, int]:
 
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
-    """The stored rows."""
+    """Return the stored rows."""
     return tuple(Row(**line) for line in read(file, COLUMNS, COMMAND).records())
 
 
 def table() -> Table:
-    """Bound and sharpness of each filter."""
+    """Tabulate the bound of each filter and its sharpness."""
     header = (
         "filter", "n, m", "repeats from step", "period", "bound", "achieved / bound", "probable error",
         "scatter / probable",
@@ -268,7 +268,7 @@ def table() -> Table:
 
 
 def bits_table() -> Table:
-    """Bits that each basis asks for."""
+    """Tabulate the bits that each basis requires."""
     header = ("filter", "guarantee", "contraction bound", "3 × probable error", "emulation", "seconds")
     body = [
         tuple(
@@ -289,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words, file = given.words, given.output / FILE.name
     given.output.mkdir(parents=True, exist_ok=True)
     rows = {row.name: row for row in load()} if words and FILE.exists() else {}
-    for case in (CASES[0], CASES[-2]):  # what is compiled or loaded now does not count as time of a guarantee
+    for case in (CASES[0], CASES[-2]):  # time for compiling and loading must not count as time of a guarantee
         _found(case, case.make(), FORMAT)
     for case in CASES:
         name = case.make().name

@@ -1,4 +1,4 @@
-"""Many measurement records in many formats at once, on any executor, with progress and resume."""
+"""Run many measurement records in many formats, on any executor, with progress and resumption."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from gpbnb.sweeps import Column, Sweep
 
 
 class RecordCell(NamedTuple):
-    """One record of a question; the question is named by a digest of all that its answer depends on."""
+    """One record of a survey; a digest of everything that the result depends on identifies the survey."""
 
     question: str
     record: int
 
 
 class RecordSurvey(NamedTuple):
-    """What happened with each record in each format.
+    """Results for each record in each format.
 
     Parameters
     ----------
-    formats : as they were given.
-    ratios : (records, formats), largest error or bound over the tolerance; infinite where a run stopped, a variance was
-        lost, or no bound exists.
+    formats : the formats of the survey.
+    ratios : (records, formats), largest error or bound / tolerance; infinite if a run stopped, a variance was no
+        longer positive, or no bound exists.
     """
 
     formats: tuple[FloatFormat, ...]
@@ -47,13 +47,13 @@ class RecordSurvey(NamedTuple):
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """For each format, the share of the records that stay within the tolerance."""
+        """For each format, the share of records that stay within the tolerance."""
         return tuple(float(share) for share in (self.ratios <= 1).mean(axis=0))
 
     def enough(self) -> tuple[FloatFormat, ...]:
         """For each base and rounding, the format of fewest digits with which all records stay within the tolerance.
 
-        A format counts only if those of more digits in the survey do so, too.
+        A format counts only if the formats with more digits in the survey also meet the tolerance.
         """
         met = {fmt: bool((self.ratios[:, i] <= 1).all()) for i, fmt in enumerate(self.formats)}
         found = []
@@ -86,19 +86,19 @@ def survey_records(
 
     Parameters
     ----------
-    records : (records, steps, m), or a list of (steps, m) of any lengths, NaN where a measurement is missing. Or how
-        many to simulate, with the seeds 0, 1, …, of `steps` steps each.
-    tolerance, form, basis : as of :func:`gpbnb.kalman.precision.required_precision`; basis "emulation" or "bound".
-    formats : of any bases and roundings, with compiled loops and without limits on the range.
-    executor : any of concurrent.futures, or ``Client.get_executor()`` of Dask; by default this process.
-    directory : where finished records are saved: the same call goes on after an interruption, another question begins
-        anew. By default nothing is kept.
-    chunk : how many records are sent to a worker at once.
-    progress : show a bar, a tick a record.
+    records : (records, steps, m), or a list of (steps, m) of any lengths, NaN where a measurement is missing. Or the
+        number of records to simulate, with the seeds 0, 1, …, of `steps` steps each.
+    tolerance, form, basis : as for :func:`gpbnb.kalman.precision.required_precision`; basis "emulation" or "bound".
+    formats : formats of any base and rounding, with compiled loops and an unlimited range.
+    executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
+    directory : folder for finished records. After an interruption, the same call resumes; other arguments start a new
+        survey. By default nothing is saved.
+    chunk : number of records sent to a worker at once.
+    progress : show a progress bar that counts records.
 
     Raises
     ------
-    ValueError : no records or formats; a format with limits on its range; as ``survey``.
+    ValueError : no records or formats; a format with a limited range; or for a reason given in ``survey``.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def survey_records(
 
 
 def _data(model: LinearModel, records: Any, steps: int | None) -> tuple[Any, ...]:
-    """Measurements of each record."""
+    """Return the measurements of each record."""
     if isinstance(records, (int, np.integer)):
         count = whole_number("records", records)
         if steps is None:
@@ -172,7 +172,7 @@ def _ratios(
     cell: RecordCell,
     directory: Path | None,
 ) -> list[float]:
-    """Error over tolerance of one record in each format."""
+    """Return the error / tolerance of one record in each format."""
     found: dict[FloatFormat, float] = {}
     for base, rounding in dict.fromkeys((fmt.base, fmt.rounding) for fmt in formats):
         alike = [fmt for fmt in formats if (fmt.base, fmt.rounding) == (base, rounding)]
@@ -190,7 +190,7 @@ def _digest(
     form: AnyForm,
     basis: Basis,
 ) -> str:
-    """A name for all that an answer depends on."""
+    """Return a name for everything that a result depends on."""
     letters = ("Phi", "H", "Q", "R", "x0", "P0", "B", "u", "b", "d")
     matrices = [None if each is None else each.tolist() for each in (getattr(model, letter) for letter in letters)]
     measured = z.filled(np.nan) if isinstance(z, np.ma.MaskedArray) else z

@@ -49,7 +49,7 @@ def test_possibilities():
     found = existence.all_possible()
     table = tables.possibilities(found)
     assert len(table.body) == 6 * 4 * 2
-    assert table.body[-1][0] == "t = places, chop, matrix stored so"
+    assert table.body[-1][0] == "t = places, chop, matrix rounded to this format"
     answers = [answer for line in table.body for answer in line[3:]]
     assert answers == ["no" if one.witness is None else "yes" for one in found]
     assert table.header[3] == "3 places: 7.782e-5"
@@ -97,7 +97,7 @@ def test_prices():
         "bound",
         "bound / error, n = 2",
         "bound / error, n = 10",
-        "operations / inversion",
+        "operations / those of the inverse",
         "digits",
     )
     assert table.body == (("Higham", "31.6", "1230", "2.3", "53 bits"),)

@@ -67,7 +67,7 @@ def test_violations():
 def test_the_order():
     assert cells(tables.order()) == [
         ["first", "(100) → (99) → (101) → (98)"],
-        ["second", "none: (99) waits for (101), and (101) for (99)"],
+        ["second", "none: (99) needs the result of (101), and (101) that of (99)"],
     ]
 
 
@@ -110,7 +110,7 @@ def run(**changes):
 
 def test_year_ends():
     table = tables.year_ends([run(), run(indefinite=2)])
-    assert table.header[:4] == ("arithmetic", "form", "drift (mas)", "rate (mas/yr)")
+    assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
     rows = cells(table)
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5; first non-positive variance at step 2"
@@ -217,5 +217,5 @@ def test_what_a_bound_costs():
     rows = cells(tables.bound_costs([(fmt, found)], terms, reference, 8.2))
     beta = float(fmt.unit_roundoff)
     assert rows[0] == ["(125), least $B$", "a formula", "none", f"{beta * (7 * first + 5 * second) / 0.5:.3g}"]
-    assert rows[1] == ["running bound", "8 times the run", "106 bits for each step again", "8"]
-    assert rows[2] == ["companion bound", "8 times the run", "106 bits for a second run", "1.25"]
+    assert rows[1] == ["running bound", "8 times the run", "106 bits, to repeat each step", "8"]
+    assert rows[2] == ["companion bound", "8 times the run", "106 bits, for a second run", "1.25"]
