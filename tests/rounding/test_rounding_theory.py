@@ -282,7 +282,7 @@ REFUSED = [
         )
     ),
     *(
-        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of 2 and 1; needed equal lengths")
+        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of lengths 2 and 1; needed equal lengths")
         for bound in (theory.dot_bound, theory.strict_dot_bound, theory.relative_dot_bound)
     ),
     *(
