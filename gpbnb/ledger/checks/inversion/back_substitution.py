@@ -340,7 +340,7 @@ def computed_inverse(printed: Statement) -> Finding:
 
 @cache
 def _left_alone() -> tuple[int, int, int]:
-    """Count samples in which elimination leaves the triangular factor, or the full matrix, as it is; and all samples."""
+    """Count samples in which elimination leaves the triangular factor, or the full matrix, as is, and all samples."""
     triangular = full = 0
     few = samples()[::3]
     for sample in few:
