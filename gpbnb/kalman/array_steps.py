@@ -1,7 +1,7 @@
 """The arithmetic of one step with arrays of a format, for covariances, their factors and their square roots.
 
-If the compiled loops of :mod:`gpbnb.kalman.kernels.step` have the same form, operations have the same order, so every
-digit is the same.
+Where the compiled loops of ``gpbnb.kalman.kernels.step`` have the same form, operations are done in the same order,
+so that every digit is the same.
 """
 
 from __future__ import annotations

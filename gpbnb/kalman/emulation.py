@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -101,6 +102,8 @@ def emulate(
     fused: bool = False,
     sums: FloatFormat | FixedFormat | None = None,
     compensated: bool = False,
+    order: Order = "left",
+    block: int = 32,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
 
@@ -113,12 +116,12 @@ def emulate(
     checkpoint_steps : steps at which to compare; by default four per decade.
     true : a reference to compare with. By default it gets model and measurements as the format stores them, so
         errors come only from the arithmetic. With a reference for the model as given, they include those of storing it.
-    fused : whether products are added by fused multiply-add; base 2 or 16.
-    sums, compensated : as for :class:`~gpbnb.kalman.filter_run.Run`.
+    fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
+    sums, compensated, order, block : as for :class:`~gpbnb.kalman.filter_run.Run`.
 
     Raises
     ------
-    ValueError : `fused`, `sums` or `compensated` with known inputs, or with a form without compiled loops.
+    ValueError : one of these options with known inputs, or with a form without compiled loops.
     """
     form = form_named(form)
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
@@ -127,14 +130,14 @@ def emulate(
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
     run: Run | ArrayRun
     if model.has_inputs or isinstance(form, ArrayForm):
-        if fused or sums is not None or compensated:
+        if fused or sums is not None or compensated or order != "left":
             raise ValueError(
-                "got fused, sums or compensated with known inputs or a form without compiled loops; needed none of "
-                'them; for compensated summation write form="compensated"'
+                "got fused, sums, compensated or order with known inputs or a form without compiled loops; needed none "
+                'of them; for compensated summation write form="compensated"'
             )
         run = ArrayRun(model, fmt, form, chosen)
     else:
-        run = Run(model, fmt, form, chosen, fused, sums, compensated)
+        run = Run(model, fmt, form, chosen, fused, sums, compensated, order, block)
     run.take(measured)
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)

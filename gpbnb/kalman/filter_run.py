@@ -15,6 +15,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.forms import Form
@@ -35,10 +36,13 @@ class Run:
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
     compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
         a step over to the next; only for the innovation form and Joseph's.
+    order, block : of the additions in matrix products, as of :func:`gpbnb.linalg.matmul`; any but "left" in bases 2 and
+        16, and not in the UD form, which has few matrix products.
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not ascend; compensation in another form.
+    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation or another order of
+        additions in a form that does not have it.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -51,6 +55,8 @@ class Run:
         fused: bool = False,
         sums: FloatFormat | FixedFormat | None = None,
         compensated: bool = False,
+        order: Order = "left",
+        block: int = 32,
     ) -> None:
         model.refuse_inputs("a run in compiled loops")
         self.model, self.fmt, self.form = model, fmt, Form(form)
@@ -65,8 +71,10 @@ class Run:
             )
         if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
+        if order != "left" and form == Form.UD:
+            raise ValueError(f"got {order} sums in the UD form; needed another form")
         #: The arithmetic of the compiled loops.
-        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums)
+        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
         Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn import BLACK, BLUE, GREEN, GREY, NAVY, PINK, PURPLE, at, look, named, near
+from drawn import BLACK, BLUE, GREEN, GREY, NAVY, PINK, PURPLE, at, look, named, near, pictured
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 
@@ -15,6 +15,7 @@ from gpbnb.budget.experiment import Draws
 from gpbnb.budget.theory import Budget, ErrorForm, Kind, Source
 
 
+@pictured
 def test_budget_curve(ax):
     goal, larger, linear, printed, *_ = figures.budget_curve((44, 0.15), (2.0, 3.0), ax, most=25)
     n = range(1, 26)
@@ -31,6 +32,7 @@ def test_budget_curve(ax):
     assert near(names.pop("printed example"), BLACK, (44, 0.15))
     assert not names
     assert ax.get_xlabel() == "number of equal sources $N$"
+    return ax.figure
 
 
 def budget():
@@ -43,6 +45,7 @@ def budget():
     )
 
 
+@pictured
 def test_shares(ax):
     artists = figures.shares(budget(), ax)
     bars = artists[:4]
@@ -57,8 +60,10 @@ def test_shares(ax):
         assert near(names.pop(text), BLACK, (bar.get_width(), i))
         assert to_hex(bar.get_facecolor()).upper() == paint[text.split(", ")[1]]
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_distribution(ax):
     draws = Draws(budget(), np.array([-3.0, -1.0, 0.0, 0.0, 0.5, 2.0]))
     artists = figures.distribution(draws, ax)
@@ -88,3 +93,4 @@ def test_distribution(ax):
     assert len({str(style) for style in styles}) == 3
     assert near(names.pop("random draws"), BLUE, (0, top))
     assert not names
+    return ax.figure

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, at, look, named, near, points_of
+from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, at, look, named, near, pictured, points_of
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, Circle, FancyArrowPatch, Rectangle
 
@@ -52,6 +52,7 @@ PATHS = {
 }
 
 
+@pictured
 def test_block_diagram(ax):
     artists = figures.block_diagram(ax)
     texts = {
@@ -97,6 +98,7 @@ def test_block_diagram(ax):
     assert [sign for _, sign in near_second] == ["+", "−"]
     assert near_second[0][0] < second[1] < near_second[1][0]
     assert len(signs) == 3
+    return ax.figure
 
 
 def inside(box, place):
@@ -136,6 +138,7 @@ def beside(place, start, end):
 # -- curves ---------------------------------------------------------------------------------------
 
 
+@pictured
 def test_accuracy(ax):
     mu = np.array([1e-9, 1e-2, 1.0, 5.0, 10.0])
     results = {
@@ -154,8 +157,10 @@ def test_accuracy(ax):
     assert near(names.pop("stable"), GREEN, (1e-2, 0.7))
     assert near(names.pop("no digit correct"), GREY, (10, top))
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_approximations(ax):
     figures.approximations(3, ax)
     found, names = curves(ax), named(ax)
@@ -179,8 +184,10 @@ def test_approximations(ax):
     assert (found[r"$\mu=2\pi$"].get_xdata()[0], look(found[r"$\mu=2\pi$"])[:2]) == (2 * np.pi, (GREY, ":"))
     assert near(names.pop(r"$2\pi$"), GREY, (2 * np.pi, 2e-6))
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_powers(ax):
     figures.powers(ax)
     found = curves(ax)
@@ -201,11 +208,13 @@ def test_powers(ax):
         ("power of the iteration rate", (0.012, -1.0), GREEN),
         ("abstract", (100, -1.0), ORANGE),
     ]
+    return ax.figure
 
 
 SWEPT = Sweep(np.array([0.3, 1.0, 20.0]), 1000, 800, np.array([0.051, 0.17, 0.95]))
 
 
+@pictured
 def test_random_walk(ax):
     figures.random_walk(SWEPT, ax)
     found, names = curves(ax), named(ax)
@@ -225,8 +234,10 @@ def test_random_walk(ax):
     assert near(names.pop("(39)"), ORANGE, (x[-1] / 4, math.sqrt(x[-1] / 24)))
     assert near(names.pop("simulation"), BLUE, (10 * x[0], math.sqrt(10 * x[0] / 6)))
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_deviations(ax):
     figures.deviations(SWEPT, ax)
     found, names = curves(ax), named(ax)
@@ -249,8 +260,10 @@ def test_deviations(ax):
     assert near(names.pop("dots: from (35)"), BLUE, (edge, -2))
     assert near(names.pop("squares: from (39)"), ORANGE, (edge, -2))
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_build_up(ax):
     mu, n = 0.2, (1, 10, 100)
     process = theory.first_order(3.0, 0.4)
@@ -279,8 +292,10 @@ def test_build_up(ax):
     assert near(names.pop("rectangular"), PINK, (1, 20))
     assert not names
     assert ax.get_title(loc="left") == r"$\mu = 0.2$; green: theory; dashed: random walk alone"
+    return ax.figure
 
 
+@pictured
 def test_rules_first_order(ax):
     figures.rules_first_order(("trapezoidal", "Simpson"), ax)
     found, names = curves(ax), named(ax)
@@ -298,8 +313,10 @@ def test_rules_first_order(ax):
     assert near(names.pop("Simpson"), BLUE, (mu[15], 1.45))
     assert near(names.pop("scaled samples"), BLACK, points_of(found["scaled samples (bound)"])[45])
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_rules_resonant(ax):
     figures.rules_resonant(("trapezoidal", "Simpson"), 0.05, ax)
     found = curves(ax)
@@ -312,6 +329,7 @@ def test_rules_resonant(ax):
         assert look(found[name])[:2] == (paint, "-")
     assert found["trapezoidal"].get_ydata()[77] != found["Simpson"].get_ydata()[77]
     assert ax.get_title(loc="left") == "resonant input, damping 0.05; colours as above"
+    return ax.figure
 
 
 FORMATS = (FloatFormat(2, 11), FloatFormat(2, 20, CHOP))
@@ -325,6 +343,7 @@ def swept():
     return experiment.RateSweep(64.0, 2.0, 20, FORMATS, rates, *errors)
 
 
+@pictured
 def test_errors_over_rate(ax, swept):
     figures.errors_over_rate(swept, ax)
     found, names = curves(ax), named(ax)
@@ -348,8 +367,10 @@ def test_errors_over_rate(ax, swept):
     assert near(names.pop("11 bits"), BLUE, (128, 0.01))
     assert near(names.pop("20 bits, chopped"), PINK, (128, 100))
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_names_that_would_collide_move_apart(ax, swept):
     close = np.array([9.0, 3.0, 1.05])
     figures.errors_over_rate(replace(swept, rounding=np.stack([close, close * 1.05])), ax)
@@ -357,8 +378,10 @@ def test_names_that_would_collide_move_apart(ax, swept):
     assert heights["discretization"] == pytest.approx(1)
     assert heights["11 bits"] == pytest.approx(10**0.6)
     assert heights["20 bits, chopped"] == pytest.approx(10**1.2)
+    return ax.figure
 
 
+@pictured
 def test_totals(ax, swept):
     figures.totals(replace(swept, rates=np.array([1000.0, 2000.0, 4000.0])), ax)
     found, names = curves(ax), named(ax)
@@ -379,11 +402,13 @@ def test_totals(ax, swept):
     assert near(names.pop("20 bits, chopped"), PINK, (4000, 7 * 10**0.3))  # moved apart from the other
     assert not names
     assert ax.get_title(loc="left") == "total error; stars mark the best rate"
+    return ax.figure
 
 
 DURATIONS = {"1 minute": 60.0, "1 hour": 3600.0, "1 day": 86400.0}
 
 
+@pictured
 def test_best_rates(ax):
     figures.best_rates(628.0, DURATIONS, [20, 24, 30], ax)
     names, last = named(ax), -math.inf
@@ -404,8 +429,10 @@ def test_best_rates(ax):
         assert math.log10(heights[text]) == pytest.approx(expected)
         last = expected
     assert ax.get_title(loc="left") == "solid: rounded; dotted: chopped"
+    return ax.figure
 
 
+@pictured
 def test_needed_bits(ax):
     figures.needed_bits(628.0, DURATIONS, [100.0, 1000.0], ax)
     names = named(ax)
@@ -419,3 +446,4 @@ def test_needed_bits(ax):
         assert names[text][0] == paint
         assert names[text][1][0] == 1000
     assert len({names[text][1][1] for text in DURATIONS}) == 3
+    return ax.figure

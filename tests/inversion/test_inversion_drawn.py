@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, at, labelled, look, named, near
+from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, at, labelled, look, named, near, pictured
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
@@ -50,6 +50,7 @@ ERRORS = {
 ERRORS |= {"$\\delta A = \\tilde A + \\Delta A$\n$\\delta b_j = \\tilde b_j + \\Delta b_j$"}
 
 
+@pictured
 def test_flow_chart(ax):
     artists = figures.flow_chart(ax)
     boxes = {text.get_position(): text for text in artists if hasattr(text, "get_text")}
@@ -73,12 +74,14 @@ def test_flow_chart(ax):
     # The computation runs downwards on the left, the errors on the right.
     assert all(x > 0.5 for (x, _), text in boxes.items() if text.get_text() in ERRORS)
     assert all(boxes_y(boxes, start) >= boxes_y(boxes, end) - 0.02 for start, end in ARROWS)
+    return ax.figure
 
 
 def boxes_y(boxes, words):
     return next(y for (_, y), text in boxes.items() if text.get_text() == words)
 
 
+@pictured
 def test_table1(ax):
     def column(kind, *values):
         return Column(kind, Wordlength("t = places", Rounding.NEAREST), "", "column sum", False, values)
@@ -103,8 +106,10 @@ def test_table1(ax):
     assert not names
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["3", "5", "8"]
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("places after the decimal point", "error norm (no unit)")
+    return ax.figure
 
 
+@pictured
 def test_violations(ax):
     rows = [
         {"family": family, "format": "all", "bound": bound, "regular": "40", "violations_regular": str(4 * k + i)}
@@ -120,6 +125,7 @@ def test_violations(ax):
     assert [marker for _, _, marker in labelled(ax).values()] == ["o", "o", "s", "s"]
     assert [handle.get_markerfacecolor() for handle in ax.get_legend().legend_handles] == [ORANGE, "none"] * 2
     assert ax.yaxis_inverted()
+    return ax.figure
 
 
 class Matrix(NamedTuple):
@@ -135,6 +141,7 @@ def trial(n, condition, error, **bounds):
     return Trial("random", matrix, None, True, condition, Fraction(error), bounds)
 
 
+@pictured
 def test_ratios_against_size(ax):
     trials = [
         trial(2, 3.0, "1/8", loose=4.0, tight=0.5),
@@ -154,8 +161,10 @@ def test_ratios_against_size(ax):
     assert near(names.pop("tight"), GREEN, (1, 3))
     assert near(names.pop("error"), BLUE, (1, 1))
     assert not names
+    return ax.figure
 
 
+@pictured
 def test_ratios_against_condition(ax):
     trials = [
         trial(3, 90.0, "1/8", loose=4.0, middle=3.0, tight=0.5),
@@ -176,3 +185,4 @@ def test_ratios_against_condition(ax):
     assert near(names.pop("error"), BLUE, (10, 1))
     assert not names
     assert np.isclose(ax.get_ylim()[0], 0.4)
+    return ax.figure

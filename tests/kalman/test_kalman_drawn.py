@@ -24,6 +24,7 @@ from drawn import (
     look,
     named,
     near,
+    pictured,
 )
 from matplotlib.colors import to_hex
 
@@ -60,7 +61,9 @@ def digits(precision, chopped=False):
         ("gain", [10.0, 12.0, 14.0], "error / gain, norms (no unit)"),
         ("covariance", [15.0, 18.0, 21.0], "error / covariance, norms (no unit)"),
     ],
+    ids=["drift", "rate", "gain", "covariance"],
 )
+@pictured
 def test_years(ax, quantity, values, words):
     runs = [
         run(24, NEAREST, Form.HUNG, 1.0),
@@ -88,8 +91,10 @@ def test_years(ax, quantity, values, words):
     ]
     assert (set(tolerance.get_ydata()), look(tolerance)[:2], tolerance.get_label()) == ({0.3}, (GREY, ":"), "tolerance")
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("step $k$", words)
+    return ax.figure
 
 
+@pictured
 def test_lines_and_level(ax):
     curves = [(name, [1, 2], [i + 3.0, i + 5.0]) for i, name in enumerate(("first", "second", "third", "last"))]
     artists = figures.lines(curves, ax)
@@ -103,8 +108,10 @@ def test_lines_and_level(ax):
     }
     level = figures.level("printed", 9.0, ax)
     assert (look(level)[:2], level.get_label(), set(level.get_ydata())) == ((ORANGE, "-"), "printed", {9.0})
+    return ax.figure
 
 
+@pictured
 def test_bound_by_digits(ax):
     (printed,) = figures.bound_by_digits(ax, {}, ls="--")
     assert look(printed)[:2] == (ORANGE, "--")
@@ -118,6 +125,7 @@ def test_bound_by_digits(ax):
     assert slope == pytest.approx(-1, abs=1e-9)
     heights = figures.bound_by_steps([10, 1000], FloatFormat(2, 24), {})
     assert heights == [figures.report_bounds.gravity_probe_b_bound(Fraction(1, 2**24), k) for k in (10, 1000)]
+    return ax.figure
 
 
 ANSWERS = {
@@ -140,6 +148,7 @@ def answers():
     return Answers(runs=runs, **ANSWERS)
 
 
+@pictured
 def test_digits_needed(ax):
     figures.digits_needed(answers(), ax)
     lines = {line.get_label(): line for line in ax.lines}
@@ -177,12 +186,14 @@ def test_digits_needed(ax):
     assert (look(printed)[1], look(corrected)[1]) == ("-", "--")
     bound, x = figures.report_bounds.gravity_probe_b_bound, Fraction(0.5 * 10.0 ** (1 - 3.5))
     assert printed.get_ydata()[0] == bound(x, figures.report_bounds.EXAMPLE[0])
-    every = figures.report_bounds.CORRECTIONS["and errors carried on"]
+    every = {"once": True, "free_signs": True, "carried": True}
     assert all(every.values())
     assert corrected.get_ydata()[0] == bound(x, figures.report_bounds.EXAMPLE[0], **every)
     assert printed.get_ydata()[0] != corrected.get_ydata()[0]
+    return ax.figure
 
 
+@pictured
 def test_headline(ax):
     figures.headline(answers(), ax)
     chopped, rounded, printed, corrected, goal, drift, marks = ax.lines
@@ -199,7 +210,7 @@ def test_headline(ax):
         (GREY, ":"),
     ]
     bound, beta = figures.report_bounds.gravity_probe_b_bound, Fraction(0.5 * 10.0 ** (1 - 3.5))
-    every = figures.report_bounds.CORRECTIONS["and errors carried on"]
+    every = {"once": True, "free_signs": True, "carried": True}
     assert printed.get_ydata()[0] == bound(beta, figures.report_bounds.EXAMPLE[0])
     assert corrected.get_ydata()[0] == bound(beta, figures.report_bounds.EXAMPLE[0], **every)
     assert at(marks, (9, size), (17, size))
@@ -214,8 +225,10 @@ def test_headline(ax):
     assert near(names.pop("17 printed"), ORANGE, (17, size))
     assert not names
     assert ax.get_ylabel() == "largest error in a year (mas, mas/yr)"
+    return ax.figure
 
 
+@pictured
 def test_contraction(ax):
     state = np.array([[9.0, -1.0], [9.0, 0.0], [9.0, 3.0]])
     bound = np.array([[8.0, 2.0], [8.0, 4.0], [8.0, 6.0]])
@@ -225,8 +238,10 @@ def test_contraction(ax):
     assert at(line, (1, 2), (10, 4), (100, 6))
     assert labelled(ax) == {"observed": (BLUE, "", "o"), "contraction bound": (GREEN, "-", "")}
     assert (points.get_label(), line.get_label()) == ("observed", "contraction bound")
+    return ax.figure
 
 
+@pictured
 def test_violations(ax):
     def summary(form, trials, *violated):
         names = dict(zip(("violations_105", "violations_108", "violations_125"), violated, strict=True))
@@ -246,8 +261,10 @@ def test_violations(ax):
         for text, handle in zip(ax.get_legend().get_texts(), ax.get_legend().legend_handles, strict=True)
     }
     assert shown == {"(105)": BLUE, "(108)": PURPLE, "(125)": PINK}
+    return ax.figure
 
 
+@pictured
 def test_shares(ax):
     def share(states, precision, errors):
         return Share("", states, "", FloatFormat(2, precision), np.array(errors), 0, 0.0, 0.0, 0.0)
@@ -275,8 +292,10 @@ def test_shares(ax):
     ax.clear()
     figures.shares([found[0]._replace(fmt=FloatFormat(10, 8))], ax)
     assert ax.get_xlabel() == "decimal digits"
+    return ax.figure
 
 
+@pictured
 def test_guarantee(ax):
     found = SimpleNamespace(history=np.array([[9.0, 1.0], [9.0, 2.0]]), bound=np.array([9.0, 3.0]))
     chosen, random = np.array([[5.0, -0.5], [5.0, 1.5], [5.0, 2.5]]), np.array([[4.0, 0.1], [4.0, -0.2], [4.0, 0.3]])
@@ -292,3 +311,4 @@ def test_guarantee(ax):
     }
     assert [look(each)[0] for each in (bound, adversary, noise)] == [GREEN, BLUE, GREY]
     assert ax.get_ylabel() == "rounding error of the speed, m/s"
+    return ax.figure

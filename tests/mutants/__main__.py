@@ -1,8 +1,8 @@
 """Seed faults in the package and list those that no test catches: ``make mutants``.
 
 Faults are the changes of :mod:`tests.mutants.operators`, made with cosmic-ray in a copy of the checkout. The tests of a
-mutant are those that reach its module through imports, nearest first, up to a number of seconds. What is found is
-written after every mutant, so that a campaign that was stopped goes on where it was.
+mutant are those that reach its module through imports, nearest first, up to a number of seconds. Each result is written
+at once, so that a campaign that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -169,6 +169,11 @@ def read(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def text_of(name: str) -> str:
+    path = ROOT / name
+    return path.read_text(encoding="utf-8") if path.is_file() else ""
+
+
 def key(row: Mapping[str, str]) -> tuple[str, ...]:
     return row["module"], row["operator"], str(row["occurrence"]), row["line"]
 
@@ -201,21 +206,22 @@ def main() -> None:
     parser.add_argument("--budget", type=float, default=12.0, help="seconds of processor time for each mutant")
     parser.add_argument("--again", action="store_true", help="judge the survivors of the stored results again")
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after so many minutes; it resumes")
-    parser.add_argument("--store", action="store_true", help="write tests/mutants/results.csv, too")
+    parser.add_argument("--results", type=Path, default=RESULTS, help="table to continue; without it %(default)s")
     chosen = parser.parse_args()
     CACHE.mkdir(parents=True, exist_ok=True)
     commit, now = git("rev-parse", "--short", "HEAD"), datetime.now(UTC)
     names = chosen_files(chosen.files, chosen.since)
     print(f"mutants: seed {chosen.seed}, commit {commit}, {len(names)} files", flush=True)
 
-    stored = read(RESULTS)
+    rows = {key(row): row for row in read(chosen.results)}
+    # A result is of no use once its line has changed.
+    rows = {at: row for at, row in rows.items() if row["before"] in text_of(row["module"])}
     if chosen.again:
         plan = [
             (row["module"], Mutant(row["operator"], int(row["occurrence"]), int(row["line"])))
-            for row in stored
+            for row in rows.values()
             if row["outcome"] in ("survived", "no test") and (not chosen.files or row["module"] in names)
         ]
-        found_file = CACHE / f"again-{commit}.csv"
     else:
         samples = {name: sample(name, chosen.lines, chosen.seed) for name in names}
         # One of each file in turn, so that a part of a campaign tells of all files.
@@ -225,38 +231,28 @@ def main() -> None:
             for name, mutant in zip(samples, round_, strict=True)
             if mutant is not None
         ]
-        found_file = CACHE / f"{commit}-{chosen.seed}-{chosen.lines}.csv"
-    rows = read(found_file)
-    done = {key(row) for row in rows}
     tree = CACHE / f"tree-{os.getpid()}"
     copy_tree(tree)
     load_libraries()
     judges = Judges(tree, chosen.budget)
     end = time.monotonic() + 60 * chosen.minutes
     for number, (name, mutant) in enumerate(plan):
-        row = {
-            "module": name,
-            "operator": mutant.operator,
-            "occurrence": str(mutant.occurrence),
-            "line": str(mutant.line),
-        }
-        if key(row) in done:
+        place = (name, mutant.operator, str(mutant.occurrence), str(mutant.line))
+        row = dict(zip(FIELDS, place, strict=False))
+        if key(row) in rows and not chosen.again:
             continue
         if time.monotonic() > end:
             break
         row |= {"commit": commit, "date": f"{now:%Y-%m-%d}"} | judge(judges, name, mutant)
-        rows.append(row)
-        write(found_file, rows)
+        if row["outcome"] != "no change":
+            rows[key(row)] = row
+            write(
+                chosen.results, sorted(rows.values(), key=lambda each: (each["module"], int(each["line"]), key(each)))
+            )
         where = f"{name}:{mutant.line} {mutant.operator}"
         print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
     shutil.rmtree(tree)
-    summary([row for row in rows if row["outcome"] != "no change"])
-    if chosen.store:
-        new = {key(row): row for row in rows if row["outcome"] != "no change"}
-        kept = [row for row in stored if key(row) not in new]
-        write(
-            RESULTS, sorted([*kept, *new.values()], key=lambda row: (row["module"], int(row["line"]), row["operator"]))
-        )
+    summary([row for row in rows.values() if row["module"] in names])
 
 
 if __name__ == "__main__":

@@ -143,17 +143,13 @@ def _child(root: Path, tests: Sequence[str], report: Path, recorder: _Recorder, 
         if not compiled:
             os.environ["NUMBA_DISABLE_JIT"] = "1"
             importlib.import_module("numba").config.DISABLE_JIT = 1
-        options = [
-            "-q",
-            "-W",
-            "ignore::pytest.PytestAssertRewriteWarning",
-            "-o",
-            f"cache_dir={report.parent}",
-            *(["-x"] if stop else []),
-        ]
-        code = int(pytest.main([*options, *tests], plugins=[recorder]))
-        if code not in (0, 1, 2, 5) and not recorder.failed:
-            recorder.failed.append(f"pytest ended with {code}")
+        options = ["-q", "-W", "ignore::pytest.PytestAssertRewriteWarning", "-o", f"cache_dir={report.parent}"]
+        for test in tests:  # one after the other: those that are not needed are not imported
+            code = int(pytest.main([*options, *(["-x"] if stop else []), test], plugins=[recorder]))
+            if code not in (0, 1, 2, 5) and not recorder.failed:
+                recorder.failed.append(f"{test}: pytest ended with {code}")
+            if time.process_time() > recorder.budget or (stop and recorder.failed):
+                break
         found = Outcome(recorder.failed, recorder.seconds, "")
         draft = report.with_suffix(".draft")
         draft.write_text(json.dumps(found._asdict()), encoding="utf-8")

@@ -23,11 +23,11 @@ FIGURES = {
         "error, unit of the state",
         {
             "as printed": "bound1",
-            "counted once": "bound2",
-            "and signs free": "bound3",
-            "and errors carried on": "bound4",
+            "roundings counted once": "bound2",
+            "and errors of either sign": "bound3",
+            "and covariance errors carried on": "bound4",
             "and old inputs forgotten": "bound5",
-            "error granted": "goal",
+            "allowed error": "goal",
         },
     ),
     "deroll": (

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, at, labelled, legend_of, look
+from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, at, labelled, legend_of, look, pictured
 from matplotlib.colors import to_hex
 
 from gpbnb.wordlength import figures
@@ -29,6 +29,7 @@ def standards_of(ax, upright):
     return texts
 
 
+@pictured
 def test_survey(ax):
     inf = math.inf
     emulated = {"UD": [(8, inf), (10, 5.0), (30, 0.1)], "Joseph": [(10, 0.0), (12, 7.0)]}
@@ -49,8 +50,10 @@ def test_survey(ax):
     assert {name: look(line) for name, line in found.items()} == labelled(ax)
     assert set(found["tolerance"].get_ydata()) == {1}
     assert standards_of(ax, True) == {name: STANDARD[name] for name in ("binary16", "binary32")}
+    return ax.figure
 
 
+@pictured
 def test_growth(ax):
     points = {"UD": [(10, 9), (1000, 24)], "Joseph": [(10, 11), (1000, 53)]}
     lines = {"bound": [(10, 20), (1000, 60)], "(125), corrected": [(10, 30), (1000, 50)], "law": [(10, 1), (1000, 2)]}
@@ -68,8 +71,10 @@ def test_growth(ax):
     assert labelled(ax) == expected
     assert {name: look(line) for name, line in found.items()} == expected
     assert standards_of(ax, False) == STANDARD
+    return ax.figure
 
 
+@pictured
 def test_overview(ax):
     found = {
         "tilt": {"emulation": 17, "bound": 32, "theory": 15, "printed": 40, "corrected": 44},
@@ -97,8 +102,10 @@ def test_overview(ax):
     assert [list(line.get_xdata()) for line in spans] == [[15, 44], [12, 18], [5, 5]]
     assert [list(line.get_ydata()) for line in spans] == [[0, 0], [1, 1], [2, 2]]
     assert standards_of(ax, True) == {name: STANDARD[name] for name in ("binary16", "binary32")}
+    return ax.figure
 
 
+@pictured
 def test_changes(ax):
     inf = math.inf
     figures.changes(["as it is", "scaled", "shifted"], {"tilt": [2.0, inf, 1.0], "gyro": [4.0, 12.0, 2.0]}, ax)
@@ -110,8 +117,10 @@ def test_changes(ax):
     assert (set(one.get_xdata()), look(one)[:2]) == ({1}, (GREY, "-"))
     assert [tick.get_text() for tick in ax.get_yticklabels()] == ["as it is", "scaled", "shifted"]
     assert ax.yaxis_inverted()
+    return ax.figure
 
 
+@pictured
 def test_bands(ax):
     records = np.arange(1.0, 12.0)
     found = {"UD": [(11, 10 * records), (12, records)], "Joseph": [(13, records / 10)]}
@@ -142,6 +151,7 @@ def test_bands(ax):
     (text,) = ax.texts
     assert (text.get_text(), text.xy) == ("tolerance", (1, 1))
     assert to_hex(text.get_color()).upper() == GREY
+    return ax.figure
 
 
 def test_no_more_series_than_markers(ax):
