@@ -27,7 +27,7 @@ _FINGERPRINT_STEPS = 200  # steps that show whether the code's results are uncha
 
 
 class ResumableRun:
-    """A run of a case, saved in a file, with its contraction bound for a case of ``BOUNDED_CASES``."""
+    """A run of one case, saved in a file, with its contraction bound if ``BOUNDED_CASES`` contains the case."""
 
     def __init__(self, case: Case, directory: Path, steps: int) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0
