@@ -62,7 +62,7 @@ class FixedFormat:
     --------
     >>> q15 = FixedFormat(integer_bits=0, fraction_bits=15)
     >>> (q15.array("0.1") * q15.array("0.5")).to_fractions()
-    Fraction(819, 16384)
+    Fraction(1639, 32768)
     """
 
     integer_bits: int

@@ -1,6 +1,6 @@
-"""Derive the algebra of savage2016 again from (1) and (2), and the consequence that each misprint would have.
+r"""Derive the algebra of savage2016 again from (1) and (2), and the consequence that each misprint would have.
 
-Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\\infty} = \\sigma_x^2`.
+Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\infty} = \sigma_x^2`.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from gpbnb.kalman.forms import Form
 
 
 class ArrayForm(StrEnum):
-    r"""Further orders in which one step is computed; in exact arithmetic they agree with those of :class:`Form`.
+    r"""Further orders in which one step is computed; in exact arithmetic they agree with those of ``Form``.
 
     ============  =======================================================================================
     form          gain, covariance, estimate

@@ -1,6 +1,6 @@
 """The arithmetic of one step, written with arrays of a format: covariances, their factors and their square roots.
 
-Where the compiled loops of :mod:`gpbnb.kalman.kernels.step` have the same form, operations are done in the same order,
+Where the compiled loops of ``gpbnb.kalman.kernels.step`` have the same form, operations are done in the same order,
 so that every digit is the same.
 """
 

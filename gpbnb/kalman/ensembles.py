@@ -389,6 +389,7 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     parser = argparse.ArgumentParser(prog=COMMAND, description="Random filters by thousands.")
     parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
     parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="where the two files go")

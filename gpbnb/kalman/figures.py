@@ -134,7 +134,7 @@ def year_end(
             list(places), [tolerance] * len(places), "|", color=BLACK, ms=26, mew=2, ls="none", label=name
         )
     ax.set_yscale("log")
-    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), markerscale=0.6)
     label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
     return artists
 
@@ -165,13 +165,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style, place, away in (
         ("(125) as printed", {}, "-", 0, (2, -38)),
-        (
-            "(125) with its faults corrected",
-            report_bounds.ALL_CORRECTED,
-            "--",
-            12,
-            (6, 6),
-        ),
+        ("(125) with its faults corrected", report_bounds.ALL_CORRECTED, "--", 12, (6, 6)),
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
         x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]
@@ -238,7 +232,7 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
             group = [summary for summary in summaries if summary.form == form]
             shares.append(100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group))
         artists += ax.bar(np.arange(len(forms)) + 0.27 * (number - 1), shares, 0.25, color=colour, label=name).patches
-    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]) for form in forms])
+    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]).replace(", ", ",\n") for form in forms])
     ax.set_ylim(0, 118)
     legend(ax, ncols=3, loc="upper right")
     label(ax, "form of the filter", "filters that violate the bound (%)")

@@ -172,6 +172,7 @@ SWEEP: Sweep[Cell] = Sweep(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     return run_command(SWEEP, "A year of the mission model.", Path(".cache/mission"), arguments)
 
 

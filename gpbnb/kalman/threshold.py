@@ -183,6 +183,7 @@ SWEEP: Sweep[Cell] = Sweep(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     return run_command(SWEEP, "A year for hundreds of measurement records.", Path(".cache/threshold"), arguments)
 
 

@@ -236,6 +236,7 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     parser = argparse.ArgumentParser(prog=_COMMAND, description="A year in many formats and forms.")
     parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="where runs are saved on the way")
     parser.add_argument("--steps", type=int, default=YEAR, help="fewer, for a trial")

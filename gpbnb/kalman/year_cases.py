@@ -34,6 +34,7 @@ class Case(NamedTuple):
 
     @property
     def fmt(self) -> FloatFormat | None:
+        """The format of the run; None for double-double."""
         return FloatFormat(self.base, self.precision, self.rounding) if self.precision else None
 
     @property

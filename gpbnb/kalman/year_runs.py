@@ -52,6 +52,7 @@ class ResumableRun:
 
     @property
     def finished(self) -> bool:
+        """Whether all steps are done, or the run has stopped."""
         return self.run.steps >= self.steps or self.run.stopped is not None
 
     def advance(self, blocks: int, bar: Any = None) -> None:
@@ -148,4 +149,5 @@ def history(case: Case, directory: Path, steps: int = YEAR) -> History:
 
 @cache
 def reference_checkpoints(case: Case, directory: Path, steps: int) -> Checkpoints:
+    """Checkpoints of a finished run that serves others as their reference."""
     return ResumableRun(case, directory, steps).run.checkpoints()

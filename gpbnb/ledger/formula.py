@@ -154,9 +154,11 @@ class Relation:
         return _Evaluation(names or {}, number)(tree.comparators[-1] if isinstance(tree, ast.Compare) else tree)
 
     def latex(self) -> str:
+        """Typeset the relation."""
         return typeset(self.tree, 0)
 
     def markdown(self) -> str:
+        """Typeset the relation as a formula in Markdown."""
         return f"${self.latex()}$"
 
 
@@ -185,13 +187,16 @@ class Number:
 
     @property
     def text(self) -> str:
+        """The number as the file of statements has it."""
         return f"{self.label}: {self.literal} {self.unit}".strip()
 
     def latex(self) -> str:
+        """Typeset the digits and the unit."""
         unit = rf"\ \text{{{self.unit.replace(chr(37), chr(92) + chr(37))}}}" if self.unit else ""
         return number_latex(self.literal) + unit
 
     def markdown(self) -> str:
+        """Typeset the number as a formula in Markdown."""
         return f"${self.latex()}$"
 
 
@@ -205,9 +210,11 @@ class Words:
 
     @property
     def text(self) -> str:
+        """The claim as the file of statements has it."""
         return f"{self.label}: {' | '.join((self.printed, *self.others))}"
 
     def markdown(self) -> str:
+        """The claim as it is printed."""
         return self.printed
 
 

@@ -45,7 +45,8 @@ PAGES = (
         "ledger-1984-1", "Report of 1984: rounding and inversion in general", "hung1984", r"I|II\.([1-9]|9\..*|10)"
     ),
     LedgerPage("ledger-1984-2", "Report of 1984: inversion by elimination", "hung1984", r"II\.11.*"),
-    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter, roll and deroll", "hung1984", r"II\.1[234]|III.*"),
+    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter", "hung1984", r"II\.1[234]"),
+    LedgerPage("ledger-1984-4", "Report of 1984: roll and deroll", "hung1984", r"III.*"),
     LedgerPage("ledger-1982-1", "Report of 1982: budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"),
     LedgerPage("ledger-1982-2", "Report of 1982: inversion by elimination", "hung1982", r"III\.11.*"),
     LedgerPage("ledger-1982-3", "Report of 1982: Kalman filter, geometry", "hung1982", r"III\.1[23]|IV"),
@@ -165,12 +166,12 @@ def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
 def error_table(rows: Iterable[Row]) -> Html:
     """Tabulate the errors behind the statements that disagree, the most serious first, with the statements affected.
 
-    Statements with the same root error share a row; their notes are collapsed.
+    Statements with the same root error share a row, in which their notes are collapsed; so do those with the same note.
     """
     found = [row for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS]
     groups: dict[str, list[Row]] = {}
     for row in found:
-        groups.setdefault((row.finding and row.finding.root) or row.statement.id, []).append(row)
+        groups.setdefault((row.finding and (row.finding.root or row.finding.note)) or row.statement.id, []).append(row)
     ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
     header = ("Error", "Verdict", "Statements affected")
     table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
@@ -261,7 +262,7 @@ def _error(group: Sequence[Row]) -> str:
     for row in group:
         link = f'<a href="{address(row.statement)}">{typeset(row.statement.item)}</a>'
         places.setdefault(row.statement.document, []).append(link)
-    affected = "".join(f"<p>{document}: {', '.join(links)}</p>" for document, links in places.items())
+    affected = "".join(f"<p>{document[-4:]}: {', '.join(links)}</p>" for document, links in places.items())
     badges = " ".join(
         badge(outcome) for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
     )

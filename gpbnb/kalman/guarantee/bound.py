@@ -77,6 +77,7 @@ class Guarantee:
 
     @property
     def for_ever(self) -> bool:
+        """Whether the bound holds for any number of steps."""
         return self.steps is None
 
     def __str__(self) -> str:
