@@ -23,8 +23,8 @@ class LedgerPage:
 
     Parameters
     ----------
-    name : of the page.
-    title : of the page.
+    name : file name of the page, without its ending.
+    title : title of the page.
     document : short name of the document.
     sections : regular expression of the chapter and section, as in ``II.11.2``, of the statements on the page.
     """
@@ -35,7 +35,7 @@ class LedgerPage:
     sections: str
 
     def holds(self, statement: Statement) -> bool:
-        """Whether a statement stands on this page."""
+        """Whether a statement is on this page."""
         place = section_name(statement.chapter, statement.section)
         return statement.document == self.document and re.fullmatch(self.sections, place) is not None
 
@@ -69,7 +69,7 @@ CLAIMS = {
     "hung1982.IV.eq8": "Deroll of the first drift",
     "hung1982.IV.eq9": "Deroll of the second drift",
     "savage2016.main.eq35": "Random walk of a trapezoidal integrator",
-    "savage2016.main.eq39": "The same for fast sampling",
+    "savage2016.main.eq39": "Random walk for fast sampling",
 }
 """The principal claims of the documents, by statement id."""
 
@@ -94,7 +94,7 @@ def topics() -> dict[str, str]:
 
 
 def address(statement: Statement) -> str:
-    """The link to a statement in the complete ledger."""
+    """Return the link to a statement in the complete ledger."""
     page = next(page for page in PAGES if page.holds(statement))
     return f"{page.name}.html#{escape(statement.id)}"
 
@@ -107,7 +107,7 @@ def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[R
     ValueError : no such topic.
     """
     if topic not in TOPICS:
-        raise ValueError(f"no topic {topic!r}; the topics are {', '.join(TOPICS)}")
+        raise ValueError(f"got topic {topic!r}; needed one of {', '.join(TOPICS)}")
     return tuple(
         row
         for row in rows
@@ -116,16 +116,16 @@ def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[R
 
 
 def count_table(rows: Iterable[Row], by: str) -> Table:
-    """Tabulate the counts of `rows`: a line per document, chapter of this book or kind, and a column per verdict.
+    """Count `rows` in a table with a row per document, chapter of this book or kind, and a column per verdict.
 
     Parameters
     ----------
-    rows : what to count.
+    rows : the rows to count.
     by : ``document``, ``chapter`` (of this book) or ``kind``.
 
     Raises
     ------
-    ValueError : `by` is something else.
+    ValueError : `by` has another value.
     """
     rows = in_reading_order(rows)
     owner = topics()
@@ -135,7 +135,7 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
         "kind": lambda row: row.statement.kind,
     }
     if by not in groups:
-        raise ValueError(f"by={by!r}; take one of {', '.join(groups)}")
+        raise ValueError(f"got by={by!r}; needed one of {', '.join(groups)}")
     total = counts(rows)
     inside: dict[str, list[Row]] = {}
     for row in rows:
@@ -152,7 +152,7 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
 def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
     """Lay out one page of the complete ledger: a form with filters, and a row per statement.
 
-    The form is hidden until the page's script, ``ledger.js``, shows and serves it.
+    The form is hidden until the page's script, ``ledger.js``, shows it and responds to it.
     """
     rows = in_reading_order(row for row in rows if page.holds(row.statement))
     owner = topics()
@@ -208,7 +208,7 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
 
 
 def root_table(rows: Iterable[Row]) -> Html:
-    """Tabulate the root errors, those that spoil most statements first: the mistake, the reason, and the statements."""
+    """Tabulate the root errors, by the number of statements affected: the mistake, the reason, the statements."""
     roots = load_roots()
     found = sorted(by_root(rows).items(), key=lambda item: -len(item[1]))
     lines = []
@@ -219,7 +219,8 @@ def root_table(rows: Iterable[Row]) -> Html:
             f'<td><p>{typeset(roots[key].explanation)}</p><p class="spoils">{places}</p></td></tr>'
         )
     return Html(
-        f"{len(found)} root errors", _wrapped(("Root error", "Statements", "Why, and where"), lines, "ledger-roots")
+        f"{len(found)} root errors",
+        _wrapped(("Root error", "Statements", "Explanation and affected statements"), lines, "ledger-roots"),
     )
 
 
@@ -236,7 +237,10 @@ def claim_table(rows: Iterable[Row]) -> Html:
             f'<tr><th scope="row">{escape(claim)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
             f"<td><p>{text}</p><p>{chapter_link(owner[key])}</p></td></tr>"
         )
-    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "As printed, and where it is examined"), lines))
+    return Html(
+        f"{len(lines)} claims",
+        _wrapped(("Claim", "Outcome", "Printed statement, and the chapter that examines it"), lines),
+    )
 
 
 def _link(row: Row) -> str:
