@@ -103,7 +103,7 @@ function shrinkToCells() {
 // others follow in batches between which the page answers. Formulas that are not shown, in closed details or filtered
 // rows, wait until they are, and everything is typeset before the page is printed.
 const NEARBY = "50%"; // of the window's height, above and below
-const BATCH = 40;
+const BATCH = 40; // the first; each is twice as large, as each has the whole page laid out anew
 const waiting = new Set();
 let typesetting = Promise.resolve();
 window.formulas = { near: null, shown: null, count: () => document.querySelectorAll("mjx-container").length };
@@ -139,9 +139,9 @@ async function typesetShown() {
   window.formulas.near = { time: performance.now(), count: window.formulas.count() };
   for (const formula of all) if (waiting.has(formula)) nearby.observe(formula);
   const rest = all.filter((_, i) => shown[i]);
-  while (rest.length) {
+  for (let batch = BATCH; rest.length; batch *= 2) {
     await pause();
-    await typeset(rest.splice(0, BATCH));
+    await typeset(rest.splice(0, batch));
   }
   window.formulas.shown = { time: performance.now(), count: window.formulas.count() };
 }
