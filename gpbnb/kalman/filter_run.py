@@ -17,7 +17,17 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, QUANTITIES, STOPPED, advance, prepare
+from gpbnb.kalman.kernels.step import (
+    DONE,
+    INDEFINITE,
+    NEXT_CHECKPOINT,
+    QUANTITIES,
+    STOPPED,
+    advance,
+    advance_ud,
+    factor_each,
+    invert_each,
+)
 from gpbnb.kalman.model import LinearModel
 
 
@@ -76,7 +86,7 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         try:
-            definite = prepare(self.tag, int(form), Q, R, self.P, RI, self.UQ, self.UR)
+            definite = self._prepare(Q, R, RI)
         except ZeroDivisionError:
             definite = False
         if not definite:
@@ -87,9 +97,19 @@ class Run:
         increment = self.as_packed(model.Phi - np.eye(n, dtype=int) if compensated else np.zeros((0, n, n)))
         self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
         rest = (identity, increment, np.zeros_like(self.x), self._place)
-        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, *rest)
+        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, *rest)
         #: Why the run stopped, if it has.
         self.reason = ""
+
+    def _prepare(self, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
+        """Compute what the form needs beside the model; whether the covariances are definite in this arithmetic."""
+        if self.form is Form.HUNG_SECOND_GAIN:
+            return bool(invert_each(self.tag, R, RI))
+        if self.form is Form.UD:
+            given, self.P = self.P, np.empty_like(self.P)
+            pairs = (Q, self.UQ), (R, self.UR), (given[np.newaxis], self.P[np.newaxis])
+            return all(factor_each(self.tag, *pair) for pair in pairs)
+        return True
 
     @property
     def steps(self) -> int:
@@ -114,15 +134,34 @@ class Run:
             return
         packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
-            advance(self.tag, int(self.form), self.matrices, packed, self.steps, self.x, self.P, *outputs)
+            self.advance(packed, (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
         except (OverflowError, ZeroDivisionError) as error:
             self.notes[STOPPED] = self.steps + 1
             self.reason = self.stopped_by(error)
         else:
             if self.stopped:
                 self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
+
+    def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
+        """Take one step per packed measurement, (steps, m, columns of x).
+
+        Parameters
+        ----------
+        kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
+        notes : the status of the run, which is brought up to date.
+
+        Raises
+        ------
+        OverflowError, ZeroDivisionError : one more step than are noted as done came to that.
+        """
+        if self.form is Form.UD:
+            Phi, _, H, HT, *_ = self.matrices
+            factors = Phi, H, HT, self.UQ, self.UR, self._place
+            advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
+        else:
+            repeated = kept[1][:0], kept[3][:0], self.UR[:0]
+            advance(self.tag, int(self.form), self.matrices, z, self.steps, self.x, self.P, repeated, kept, notes)
 
     def stopped_by(self, error: ArithmeticError) -> str:
         """Name what ended the last step: "overflow in the gain at step 812"."""

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     check,
@@ -27,13 +26,13 @@ from gpbnb.arithmetic.kernels.scalar import (
 )
 
 
-@njit(nogil=True)
+@inner
 def is_zero(fmt: Any, x: Any) -> Any:
     """Whether a number is zero."""
     return compare(fmt, x, zero(fmt)) == 0
 
 
-@njit(nogil=True)
+@inner
 def copy(fmt: Any, a: Any, c: Any) -> None:
     """c = a."""
     for i in range(a.shape[0]):
@@ -41,7 +40,7 @@ def copy(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (i, j), load(fmt, a, (i, j)))
 
 
-@njit(nogil=True)
+@inner
 def transpose(fmt: Any, a: Any, c: Any) -> None:
     """c = a'; c is not a."""
     for i in range(a.shape[0]):
@@ -49,7 +48,7 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (j, i), load(fmt, a, (i, j)))
 
 
-@njit(nogil=True)
+@inner
 def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a + b."""
     for i in range(a.shape[0]):
@@ -57,7 +56,7 @@ def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
             store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
-@njit(nogil=True)
+@inner
 def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a - b."""
     for i in range(a.shape[0]):
@@ -65,7 +64,7 @@ def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
             store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
-@njit(nogil=True)
+@inner
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right, over the entries of a that are not zero; c is neither a nor b."""
     for i in range(a.shape[0]):
@@ -87,7 +86,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """As :func:`product`, with the same digits, over the entries of b that are not zero."""
     for j in range(b.shape[1]):
@@ -109,7 +108,7 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def inverse(fmt: Any, a: Any, c: Any) -> Any:
     """c = the inverse of a, by elimination without exchange of rows, which a covariance does not need; a is used up.
 
@@ -142,7 +141,7 @@ def inverse(fmt: Any, a: Any, c: Any) -> Any:
     return answer
 
 
-@njit(nogil=True)
+@inner
 def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
     """u = the factors of a covariance a = U D U', D on the diagonal of u and U, with ones there, above; a is used up.
 
