@@ -1,6 +1,6 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test test-pages test-portable verify-sweeps notebooks lint format exactness bench environment screenshots pdf serve clean
+.PHONY: help book test test-pages test-portable verify-sweeps notebooks lint format exactness bench mutants environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
@@ -90,11 +90,18 @@ bench: .venv/made-for ## timings against peers, side by side
 	$(PY) -m benchmarks
 	$(PY) -m benchmarks.year
 
-environment: .venv/made-for ## compile both environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
+# yattag, which cosmic-ray uses, has no wheel.
+mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/budget/theory.py" or SINCE=HEAD~3 picks files
+	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r tests/mutants/environment.txt
+	$(PY) -m tests.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(OPTIONS)
+
+environment: .venv/made-for ## compile every environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
 	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group book --group test --group pages --group dev \
 		--output-file environment.txt
 	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group bench --no-binary pychop \
 		--constraints environment.txt --output-file benchmarks/environment.txt
+	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group mutants --no-binary yattag \
+		--constraints environment.txt --output-file tests/mutants/environment.txt
 
 screenshots: .venv/made-for ## pictures of every page: light, dark, phone
 	@test -f $(HTML)/index.html || $(MAKE) book

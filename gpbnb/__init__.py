@@ -1,4 +1,4 @@
-"""Rounding errors in recursive filters, integrators and matrix computations, bounded and emulated digit for digit.
+"""Bound and emulate, digit for digit, rounding errors in recursive filters, integrators and matrix computations.
 
 The public interface::
 
@@ -57,7 +57,7 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used, so that ``import gpbnb`` stays light."""
+    """Import a public name when it is first used, so that ``import gpbnb`` stays fast."""
     if name == "linalg":
         return import_module("gpbnb.arithmetic.linalg")
     if name in NAMED_FORMATS:

@@ -20,11 +20,11 @@ COMMANDS = {
     "kalman.guarantee.survey": "compute the survey of guarantees again",
     "wordlength.guarantees": "compute the table of guarantees again",
 }
-"""Each is also ``python -m gpbnb.<command>``."""
+"""Commands, each also available as ``python -m gpbnb.<command>``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command and return its exit status."""
     lines = "\n".join(f"  {name:<24} {help_}" for name, help_ in COMMANDS.items())
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb",

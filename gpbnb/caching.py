@@ -1,4 +1,4 @@
-"""Folders for results that are kept between runs, and digests of the sources that those results depend on."""
+"""Folders for results kept between runs, and digests of the sources on which those results depend."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ import llvmlite.binding as llvm
 
 try:
     import fcntl
-except ImportError:  # Windows: processes do not wait for each other there
+except ImportError:  # on Windows, processes do not wait for each other
     fcntl = None  # type: ignore[assignment]
 
 PACKAGE = Path(__file__).resolve().parent
@@ -39,14 +39,14 @@ _IMPORT = re.compile(
 
 
 def cache_folder(name: str) -> Path | None:
-    """Find a folder that can be written to, and create it.
+    """Find a writable folder, and create it if necessary.
 
-    The first that works of ``$GPBNB_CACHE_DIR``, ``.cache/gpbnb`` in a checkout, the user's folder for caches, and the
-    system's folder for temporary files.
+    The first writable one is used: ``$GPBNB_CACHE_DIR``, ``.cache/gpbnb`` in a checkout, the user's folder for caches,
+    or the system's folder for temporary files.
 
     Parameters
     ----------
-    name : of the folder below, as in ``kernels``.
+    name : name of the subfolder, as in ``kernels``.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def cache_folder(name: str) -> Path | None:
 
 
 def writable(folder: Path) -> bool:
-    """Tell whether files can be written into a folder, which is created if need be."""
+    """Tell whether a folder is writable; create it if necessary."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -75,7 +75,7 @@ def _bases() -> Iterator[Path]:
         yield Path(user) / "gpbnb"
     try:
         home = Path.home()
-    except RuntimeError:  # no home at all
+    except RuntimeError:  # there is no home folder
         pass
     else:
         if sys.platform == "win32":
@@ -85,7 +85,7 @@ def _bases() -> Iterator[Path]:
     temporary = Path(tempfile.gettempdir()) / f"gpbnb-{_user()}"
     try:
         temporary.mkdir(mode=0o700, exist_ok=True)
-        # Anyone may have put a folder there, and what is cached is executed.
+        # Anyone may have created a folder there, and cached files are executed.
         if not hasattr(os, "getuid") or temporary.stat(follow_symlinks=False).st_uid == os.getuid():
             yield temporary
     except OSError:
@@ -97,7 +97,7 @@ def _user() -> str:
 
 
 def remove_unused(folder: Path) -> None:
-    """Remove the files of a folder that nobody has used for a month; who uses one, touches it."""
+    """Remove the files of a folder that have not been used for a month; every use updates a file's time."""
     with contextlib.suppress(OSError):
         for file in folder.iterdir():
             if file.is_file() and time.time() - file.stat().st_mtime > _KEPT:
@@ -105,16 +105,16 @@ def remove_unused(folder: Path) -> None:
 
 
 def lock(path: Path, longest_wait: float) -> IO[bytes] | None:
-    """Wait until no other process holds the lock of a file, and hold it; :func:`unlock` gives it back.
+    """Wait until no other process holds the lock of a file, then take it; :func:`unlock` releases it.
 
     Parameters
     ----------
-    path : the file; the lock is a file beside it.
-    longest_wait : seconds, after which to go on without the lock.
+    path : the file; the lock is a separate file next to it.
+    longest_wait : seconds after which to continue without the lock.
 
     Returns
     -------
-    handle : None where there are no locks, or where the wait was too long.
+    handle : None if the system has no locks or if the wait was too long.
     """
     if fcntl is None:
         return None
@@ -136,7 +136,7 @@ def lock(path: Path, longest_wait: float) -> IO[bytes] | None:
 
 
 def unlock(path: Path, handle: IO[bytes] | None) -> None:
-    """Give back a lock of a file."""
+    """Release the lock of a file."""
     if handle is not None:
         _beside(path).unlink(missing_ok=True)
         handle.close()
@@ -144,7 +144,7 @@ def unlock(path: Path, handle: IO[bytes] | None) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, longest_wait: float) -> Iterator[None]:
-    """Hold the lock of a file, as by :func:`lock`."""
+    """Hold the lock of a file within a ``with`` block; see :func:`lock`."""
     handle = lock(path, longest_wait)
     try:
         yield
@@ -157,7 +157,7 @@ def _beside(path: Path) -> Path:
 
 
 def digest(paths: Iterable[Path]) -> str:
-    """Digest the names and contents of files, in any order; names count from the package's folder where they can."""
+    """Digest the names and contents of files, in any order; names are relative to the package's folder if possible."""
     found = hashlib.sha256()
     for path in sorted(set(paths)):
         name = path.relative_to(PACKAGE) if path.is_relative_to(PACKAGE) else path
@@ -169,7 +169,7 @@ def digest(paths: Iterable[Path]) -> str:
 
 @cache
 def environment() -> tuple[str, ...]:
-    """Describe what a result may depend on beside sources and data: Python, the installed packages, the processor."""
+    """Describe what a result may depend on besides sources and data: Python, the installed packages, the processor."""
     packages = sorted({f"{each.name}=={each.version}" for each in distributions()})
     features = sorted(name for name, there in llvm.get_host_cpu_features().items() if there)
     settings = [f"{name}={os.environ.get(name, '')}" for name in _SETTINGS]
@@ -178,17 +178,17 @@ def environment() -> tuple[str, ...]:
 
 
 def changed_since_import(paths: Iterable[Path]) -> bool:
-    """Tell whether a file was written after this process imported the package, and may run what it was before."""
+    """Tell whether a file changed after this process imported the package, so that the process may run old code."""
     return any(path.stat().st_mtime > _IMPORTED for path in paths)
 
 
 def imported(path: Path) -> frozenset[Path]:
-    """List a source file of the package, and all files of the package that it imports, directly or through others."""
+    """List a source file of the package and all files of the package that it imports, directly or indirectly."""
     return _following([path.resolve()])
 
 
 def imported_by(code: str) -> frozenset[Path]:
-    """List all files of the package that some code imports, directly or through others."""
+    """List all files of the package that some code imports, directly or indirectly."""
     return _following(_named(code.encode()))
 
 
@@ -204,7 +204,7 @@ def _following(first: Iterable[Path]) -> frozenset[Path]:
 
 
 def with_data(sources: Iterable[Path]) -> frozenset[Path]:
-    """Add to source files the data files next to them."""
+    """Add the data files next to source files."""
     found = set(sources)
     for folder in {path.parent for path in found}:
         found |= {path for path in folder.iterdir() if path.is_file() and path.suffix not in _NO_DATA}
@@ -212,7 +212,7 @@ def with_data(sources: Iterable[Path]) -> frozenset[Path]:
 
 
 def forget() -> None:
-    """Read the files again when their digests are asked for next."""
+    """Forget all digests, so that files are read again for the next digest."""
     _content.cache_clear()
 
 
@@ -223,7 +223,7 @@ def _content(path: Path) -> bytes:
 
 @cache
 def _named(code: bytes) -> frozenset[Path]:
-    """Files of the package that some code names in its import statements."""
+    """List the files of the package that some code names in its import statements."""
     names: set[str] = set()
     for match in _IMPORT.finditer(code):
         if match["module"]:

@@ -1,10 +1,10 @@
-r"""What telescope and gyro read in a rolling spacecraft: frames, rotations, and the measurement matrix.
+r"""Readings of telescope and gyro in a rolling spacecraft: frames, rotations, and the measurement matrix.
 
-Six frames with one origin are used, as in hung1982, ch. IV. A rotation carries the components of a vector
-from one to the next, in the order in which they are chained:
+As in hung1982, ch. IV, there are six frames with a common origin. A rotation transforms the components of a vector
+from one frame to the next along the chain:
 
 ======  ============  ==============================================================================
-frame   name          how one gets there
+frame   name          how it is reached
 ======  ============  ==============================================================================
 ``a``   absolute      fixed; :math:`x_a` points to the guide star
 ``i``   intermediate  from ``a`` by the pointing α; :math:`x_i` is the roll axis
@@ -14,9 +14,9 @@ frame   name          how one gets there
 ``g``   gyro          :math:`x_g` is the spin axis; θ leads from ``g`` to ``i``, φ = θ - α to ``a``
 ======  ============  ==============================================================================
 
-Angles are in radians, and each set of three is turned about the axes 3, 2, 1 in this order. To first order the order
-does not matter; the document does not say it. Mind the sign of θ and φ: they turn the gyro frame *into* the others,
-so that the spin axis stands at :math:`(1, -\varphi_3, \varphi_2)` in the absolute frame.
+Angles are in radians, and each set of three rotates about the axes 3, 2, 1 in this order. The document does not state
+the order, which does not matter to first order. Note the sign of θ and φ: they rotate the gyro frame *into* the others,
+so the spin axis points to :math:`(1, -\varphi_3, \varphi_2)` in the absolute frame.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ MAS = ARCSEC / 1000
 """One milliarcsecond, in radians."""
 
 YEAR = 365 * 86400.0
-"""Seconds of the year that hung1984 takes."""
+"""Seconds in a year, as hung1984 counts them."""
 
 Floats = NDArray[np.float64]
 Signal = Literal["gyro", "telescope", "difference"]
 
 SEQUENCE = (3, 2, 1)
-"""Axes about which a set of three angles is turned, the first turn first."""
+"""Axes of the three rotations, the first rotation first."""
 
 STATES = (
     "phi2",
@@ -59,7 +59,7 @@ STATES = (
     "bias_z",
     "scale",
 )
-"""All that :func:`measurement_matrix` has a column for."""
+"""All states for which :func:`measurement_matrix` has a column."""
 
 GPB_STATES = (
     "phi2",
@@ -73,9 +73,9 @@ GPB_STATES = (
     "bias_z",
     "scale",
 )
-"""Ten of them. Drift and its rate, pointing, the misalignment about the roll axis, biases, scale factor.
+"""Ten of these states, for drift and its rate, pointing, misalignment about the roll axis, biases, and scale factor.
 
-The transverse misalignments β2, β3, γ2, γ3 have the columns of the biases, up to sign, and so are part of them.
+The transverse misalignments β2, β3, γ2, γ3 have the same columns as the biases, up to sign, and so are part of them.
 """
 
 
@@ -83,11 +83,12 @@ The transverse misalignments β2, β3, γ2, γ3 have the columns of the biases, 
 
 
 def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
-    r"""Exact matrix that carries components over to a frame turned by `angles`.
+    r"""Exact matrix that transforms components to a frame rotated by `angles`.
 
     .. math:: C = R_1(\alpha_1)\,R_2(\alpha_2)\,R_3(\alpha_3)
 
-    for the sequence (3, 2, 1); another one orders the factors accordingly, the first turn on the right.
+    for the sequence (3, 2, 1). For another sequence the factors are ordered accordingly, with the first rotation on
+    the right.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
 
 
 def small_rotation(angles: ArrayLike) -> Floats:
-    r"""The small-angle form of :func:`rotation`, the same for every sequence; orthogonal only to first order.
+    r"""The small-angle form of :func:`rotation`, the same for every sequence and orthogonal only to first order.
 
     .. math:: C \approx \begin{bmatrix} 1 & \alpha_3 & -\alpha_2 \\ -\alpha_3 & 1 & \alpha_1 \\
         \alpha_2 & -\alpha_1 & 1 \end{bmatrix}
@@ -162,7 +163,7 @@ def angles_of(matrix: ArrayLike) -> Floats:
 
 
 def roll(phase: ArrayLike) -> Floats:
-    r"""Matrix (..., 3, 3) from the intermediate to the roll frame, a turn by the phase ωt, in radians, about x.
+    r"""Matrix (..., 3, 3) from the intermediate to the roll frame, a rotation about x by the phase ωt in radians.
 
     .. math:: R(\omega t) = \begin{bmatrix} 1 & 0 & 0 \\ 0 & \cos\omega t & \sin\omega t \\
         0 & -\sin\omega t & \cos\omega t \end{bmatrix}
@@ -171,7 +172,7 @@ def roll(phase: ArrayLike) -> Floats:
 
 
 def deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
-    r"""Turn readings y, z of a rolling frame back into those of the intermediate frame.
+    r"""Transform readings y, z of a rolling frame into readings of the intermediate frame.
 
     .. math:: \begin{bmatrix} y_i \\ z_i \end{bmatrix} = \begin{bmatrix} \cos\omega t & -\sin\omega t \\
         \sin\omega t & \cos\omega t \end{bmatrix} \begin{bmatrix} y \\ z \end{bmatrix}
@@ -183,11 +184,11 @@ def deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
 
     Returns
     -------
-    derolled : (..., 2); of the telescope (-α3, α2), of the gyro (-θ3, θ2), to first order.
+    derolled : (..., 2); to first order (-α3, α2) for the telescope and (-θ3, θ2) for the gyro.
 
     References
     ----------
-    hung1982, ch. IV, eqs. (5)-(7); (8) and (9) have other signs and do not deroll.
+    hung1982, ch. IV, eqs. (5)-(7). Equations (8) and (9) have other signs and do not deroll.
     """
     body, turned = _angles("readings", readings, 2), _finite("phase", phase)
     return _turned_back(body, np.cos(turned), np.sin(turned))
@@ -201,12 +202,12 @@ Rotate = Callable[[ArrayLike], Floats]
 def into_spacecraft(
     vector: ArrayLike, phase: ArrayLike, *misalignments: ArrayLike, rotate: Rotate = rotation
 ) -> Floats:
-    """Components of a vector of the intermediate frame after the roll and one misalignment after the other.
+    """Transform a vector from the intermediate frame through the roll and then each misalignment.
 
     Parameters
     ----------
     vector : (..., 3), in any unit.
-    phase : ωt, in radians; all are broadcast.
+    phase : ωt, in radians; all arguments are broadcast.
     misalignments : (..., 3) each, in radians: β to reach the telescope frame, β and γ for the readout frame.
     rotate : `rotation` or `small_rotation`.
 
@@ -223,7 +224,7 @@ def into_spacecraft(
 
 
 def apply(matrix: Floats, vector: Floats) -> Floats:
-    """Product of matrices (..., 3, 3) and vectors (..., 3), broadcast; without BLAS, whose last digits differ."""
+    """Multiply matrices (..., 3, 3) and vectors (..., 3), broadcast, without BLAS, whose last digits vary."""
     return np.asarray(np.einsum("...jk,...k->...j", matrix, vector))
 
 
@@ -232,8 +233,8 @@ def star_in_telescope(alpha: ArrayLike, beta: ArrayLike, phase: ArrayLike, rotat
 
     Parameters
     ----------
-    alpha, beta : (..., 3), in radians: pointing, and misalignment of telescope against roll frame.
-    phase : ωt, in radians; all three are broadcast.
+    alpha, beta : (..., 3), in radians: pointing, and misalignment of the telescope frame against the roll frame.
+    phase : ωt, in radians; all three arguments are broadcast.
     rotate : `rotation` for the exact vector; `small_rotation` for the equation as printed.
 
     Returns
@@ -256,8 +257,8 @@ def spin_in_readout(
 
     Parameters
     ----------
-    theta, beta, gamma : (..., 3), in radians: from gyro to intermediate frame, and both misalignments.
-    phase : ωt, in radians; all are broadcast.
+    theta, beta, gamma : (..., 3), in radians: angles from gyro to intermediate frame, and both misalignments.
+    phase : ωt, in radians; all arguments are broadcast.
     rotate : `rotation` for the exact vector; `small_rotation` for the equation as printed.
 
     Returns
@@ -272,7 +273,7 @@ def spin_in_readout(
 
 
 def theta_of(phi: ArrayLike, alpha: ArrayLike) -> Floats:
-    """Angles θ from gyro to intermediate frame, for drift φ and pointing α, exactly; φ + α to first order.
+    """Exact angles θ from gyro to intermediate frame for drift φ and pointing α; to first order, φ + α.
 
     Parameters
     ----------
@@ -296,10 +297,10 @@ def measurement_matrix(
 ) -> Floats:
     r"""Two readings, y and z, as a linear function of the unknowns, at given roll phases.
 
-    In the roll frame, to first order in every unknown, with the pairs :math:`\vec\theta = (-\theta_3, \theta_2)^T`,
-    :math:`\vec\alpha`, :math:`\vec\beta`, :math:`\vec\gamma` alike, :math:`\vec\theta = \vec\varphi + \vec\alpha`,
-    the 2×2 block R of :func:`roll`, :math:`J = \begin{bmatrix} 0 & 1 \\ -1 & 0 \end{bmatrix}`, bias b, scale factor
-    error k:
+    Let :math:`\vec\theta = (-\theta_3, \theta_2)^T`, define :math:`\vec\alpha`, :math:`\vec\beta` and
+    :math:`\vec\gamma` in the same way, and let :math:`\vec\theta = \vec\varphi + \vec\alpha`. R is the 2×2 block of
+    :func:`roll`, :math:`J = \begin{bmatrix} 0 & 1 \\ -1 & 0 \end{bmatrix}`, b is the bias and k the error of the scale
+    factor. In the roll frame, to first order in every unknown, the readings are
 
     .. math::
 
@@ -307,22 +308,22 @@ def measurement_matrix(
             + \vec\beta + \vec\gamma\bigr] + b \\
         \text{telescope} &= (1 + \beta_1 J)\,R\,\vec\alpha + \vec\beta
 
-    ``difference`` is gyro less telescope. Scale factor and turns about the roll axis multiply the signal: their columns
-    are taken where the signal is nominal, and are zero where it is zero. A rate has a column of zeros: it shows
-    in the readings only through the angle that it changes.
+    ``difference`` is gyro minus telescope. Scale factor and rotations about the roll axis multiply the signal. Their
+    columns are evaluated for the nominal signal, and are zero where it is zero. A rate has a column of zeros, because
+    it affects the readings only through the angle that it changes.
 
     Parameters
     ----------
     phase : (...), ωt in radians.
-    states : names from `STATES`, one a column, in this order; rates are per any unit of time.
-    signal : which readings.
-    derolled : whether they are turned back into the intermediate frame, as by :func:`deroll`.
+    states : names from `STATES`, one for each column, in this order; rates are per any unit of time.
+    signal : which readings to use.
+    derolled : whether the readings are transformed into the intermediate frame, as by :func:`deroll`.
     nominal_theta, nominal_alpha : (..., 3), in radians; broadcast against `phase`. The first element is not used.
 
     Returns
     -------
     H : (..., 2, n). Readings and angles share one unit, which is free in all columns but those of ``scale``,
-        ``beta1`` and ``gamma1``: these are in radians a unit (scale) and a radian, from the nominal angles.
+        ``beta1`` and ``gamma1``. These are in radians per unit (scale) or per radian, from the nominal angles.
 
     Raises
     ------
@@ -343,7 +344,7 @@ def measurement_matrix(
         nominal_theta=theta,
         nominal_alpha=alpha,
     )
-    return np.asarray(H, dtype=np.float64) + 0.0  # no minus before a zero
+    return np.asarray(H, dtype=np.float64) + 0.0  # no minus sign before a zero
 
 
 def measurement_rows(
@@ -356,17 +357,17 @@ def measurement_rows(
     nominal_theta: ArrayLike = (0, 0, 0),
     nominal_alpha: ArrayLike = (0, 0, 0),
 ) -> NDArray[Any]:
-    """The same from cosine and sine of the roll phase, in the numbers that are given: Fractions stay exact.
+    """Compute :func:`measurement_matrix` from cosine and sine of the roll phase; Fractions stay exact.
 
     Parameters
     ----------
-    cosine, sine : (...), of ωt; floats, or objects such as Fractions, for a model that is held exactly.
+    cosine, sine : (...), of ωt; floats, or objects such as Fractions for an exact model.
     states, signal, derolled : as in :func:`measurement_matrix`.
     nominal_theta, nominal_alpha : (..., 3), numbers of the same type or integers.
 
     Returns
     -------
-    H : (..., 2, n), an array of floats for floats, else of objects.
+    H : (..., 2, n), an array of floats if floats are given, otherwise of objects.
 
     Raises
     ------
@@ -421,7 +422,7 @@ def measurement_rows(
 
 
 def _turn(axis: int, angle: Floats) -> Floats:
-    """Elementary matrix that carries components to a frame turned by `angle` about `axis`."""
+    """Elementary matrix that transforms components to a frame rotated by `angle` about `axis`."""
     j, k = axis % 3, (axis + 1) % 3
     C = np.zeros((*angle.shape, 3, 3))
     C[..., axis - 1, axis - 1] = 1
@@ -438,12 +439,12 @@ def _turned_back(readings: NDArray[Any], C: NDArray[Any], S: NDArray[Any]) -> ND
 
 
 def _transverse(angles: NDArray[Any]) -> NDArray[Any]:
-    """(-v3, v2): where the x axis of a frame stands, in y and z, after small turns v."""
+    """(-v3, v2), the y and z components of a frame's x axis after small rotations v."""
     return np.stack([-angles[..., 2], angles[..., 1]], axis=-1)
 
 
 def _quarter(pair: NDArray[Any]) -> NDArray[Any]:
-    """J applied to (..., 2)."""
+    """Apply J to pairs (..., 2)."""
     return np.stack([pair[..., 1], -pair[..., 0]], axis=-1)
 
 

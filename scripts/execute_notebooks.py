@@ -32,6 +32,7 @@ KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # The longest first, so that none is left over at the end; others follow.
 LONGEST = (
     "kalman",
+    "year",
     "processors",
     "wordlength",
     "guarantee",

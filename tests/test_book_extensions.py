@@ -11,6 +11,9 @@ from xml.etree import ElementTree
 import pytest
 from docutils import nodes
 from docutils.utils import new_document
+from sphinx.application import Sphinx
+from sphinx.errors import ConfigError
+from sphinx.util.docutils import docutils_namespace
 
 from gpbnb.ledger import PAGES, load_statements
 from gpbnb.ledger.page import address
@@ -280,6 +283,58 @@ def test_addresses_are_full_if_the_address_of_the_book_is_known():
     assert metadata.address(app, "book/index.html") == "book/index.html"
     app.config.html_baseurl = "https://example.org/gpbnb/"
     assert metadata.address(app, "book/index.html") == "https://example.org/gpbnb/book/index.html"
+
+
+@pytest.fixture
+def build(tmp_path, monkeypatch):
+    """Build a book of two pages with the address in the environment, in the configuration, both or neither."""
+
+    def build(variable=None, setting=""):
+        monkeypatch.delenv("BOOK_ADDRESS", raising=False)
+        if variable is not None:
+            monkeypatch.setenv("BOOK_ADDRESS", variable)
+        source = tmp_path / "source"
+        (source / "book").mkdir(parents=True, exist_ok=True)
+        (source / "index.rst").write_text("First\n=====\n\n.. toctree::\n\n   book/second\n", encoding="utf-8")
+        (source / "book" / "second.rst").write_text("Second\n======\n", encoding="utf-8")
+        settings = {"extensions": ["gpbnb_metadata"], "html_baseurl": setting, "html_theme": "basic"}
+        monkeypatch.syspath_prepend(str(FOLDER))
+        folders = (str(source), None, str(tmp_path / "html"), str(tmp_path / "doctrees"))
+        with docutils_namespace():
+            Sphinx(*folders, "html", confoverrides=settings, status=None, warning=None).build(force_all=True)
+        return tmp_path / "html"
+
+    return build
+
+
+@pytest.mark.parametrize(
+    "given", [{"variable": "https://example.org/gpbnb"}, {"setting": "https://example.org/gpbnb/"}]
+)
+def test_a_published_book_has_full_addresses(build, given):
+    html = build(**given)
+    page = (html / "book" / "second.html").read_text(encoding="utf-8")
+    there = "https://example.org/gpbnb"
+    assert f'<meta property="og:image" content="{there}/_static/preview.png">' in page
+    assert f'<meta property="og:url" content="{there}/book/second.html">' in page
+    assert f'<link rel="canonical" href="{there}/book/second.html"' in page
+    assert f"<loc>{there}/book/second.html</loc>" in (html / "sitemap.xml").read_text(encoding="utf-8")
+
+
+def test_the_environment_has_priority_and_no_address_is_needed(build):
+    page = build("https://new.example.org", "https://old.example.org") / "book" / "second.html"
+    assert 'content="https://new.example.org/_static' in page.read_text(encoding="utf-8")
+    page = build() / "book" / "second.html"
+    text = page.read_text(encoding="utf-8")
+    assert '<meta property="og:image" content="../_static/preview.png">' in text
+    assert "og:url" not in text
+    assert "canonical" not in text
+
+
+@pytest.mark.parametrize("given", ["example.org", "/srv/book", "https://", "https://example.org/?page=1"])
+def test_an_address_that_is_none_is_refused(monkeypatch, given):
+    monkeypatch.setenv("BOOK_ADDRESS", given)
+    with pytest.raises(ConfigError, match="needed one such as https://"):
+        metadata.read_address(None, SimpleNamespace(html_baseurl=""))
 
 
 def test_the_sitemap_lists_every_page(tmp_path):

@@ -14,7 +14,11 @@ ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 # Each file that pins, and the groups of requirements that it pins; "" is the package itself.
 GROUPS = set(PROJECT["dependency-groups"])
-LOCKS = {"environment.txt": {"", *GROUPS} - {"bench"}, "benchmarks/environment.txt": {"", "bench"}}
+LOCKS = {
+    "environment.txt": {"", *GROUPS} - {"bench", "mutants"},
+    "benchmarks/environment.txt": {"", "bench"},
+    "tests/mutants/environment.txt": {"", "mutants"},
+}
 
 every_lock = pytest.mark.parametrize("name", LOCKS)
 

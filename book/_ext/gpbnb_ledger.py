@@ -26,6 +26,7 @@ class Ledger(SphinxDirective):
 
     ``page NAME`` is a page of the complete ledger; ``errors TOPIC`` the errors in the statements of a chapter;
     ``verdict NAME`` the statements with one verdict; ``undone NAME`` what the documents leave undone, with one verdict;
+    ``printed TITLE: IDS`` some statements as printed, collapsed;
     ``roots`` the root errors; ``claims`` the principal claims; ``counts BY`` counts by document, chapter or kind.
     """
 
@@ -37,7 +38,7 @@ class Ledger(SphinxDirective):
         package = Path(gpbnb.__file__).parent
         for path in (*package.rglob("*.py"), *package.rglob("*.csv")):
             self.env.note_dependency(str(path))
-        what, *detail = self.arguments
+        what, *detail = (" ".join(argument.split()) for argument in self.arguments)
         if what == "counts":
             parsed = self.parse_text_to_nodes(ledger.count_table(all_rows(), detail[0]).markdown())
             for table in (found for node in parsed for found in node.findall(nodes.table)):
@@ -53,6 +54,12 @@ class Ledger(SphinxDirective):
                 return ledger.ledger_page(rows, page).html
             case "errors":
                 return ledger.error_table(ledger.select_topic(rows, detail, *ERRORS)).html
+            case "printed":
+                title, _, names = detail.rpartition(": ")
+                chosen_rows = [row for row in rows if row.statement.id in names.split()]
+                if len(chosen_rows) != len(names.split()):
+                    raise self.error(f"unknown statement in {names!r}")
+                return ledger.printed_table(chosen_rows, title).html
             case "verdict":
                 chosen = Verdict(detail)
                 return ledger.note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html

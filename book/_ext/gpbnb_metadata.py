@@ -1,18 +1,24 @@
 """What search engines and link previews read: a description of every page, Open Graph tags and a sitemap.
 
-Link previews and sitemaps need full addresses. Set ``html: baseurl:`` in ``_config.yml`` to the address of the
-published book; without it, addresses are relative to the book.
+Link previews, canonical links and sitemaps need full addresses. Set the environment variable ``BOOK_ADDRESS`` or
+``html: baseurl:`` in ``_config.yml`` to the address of the published book, as in
+``BOOK_ADDRESS=https://example.org/gpbnb make book``; the variable has priority. Without either, addresses are relative.
 """
 
+import os
 import re
 from html import escape
 from pathlib import Path
+from urllib.parse import urlsplit
 from xml.sax.saxutils import escape as escape_xml
 
 from docutils import nodes
 from PIL import Image
 from sphinx.application import Sphinx
+from sphinx.config import Config
+from sphinx.errors import ConfigError
 
+VARIABLE = "BOOK_ADDRESS"
 PREVIEW = "_static/preview.png"
 SIZE = (1200, 630)
 """Size of the preview picture in pixels, as link previews expect it."""
@@ -35,6 +41,18 @@ def description(doctree: nodes.document) -> str:
         if len(kept) >= SHORTEST:
             return kept.rstrip(":")
     return ""
+
+
+def read_address(app: Sphinx, config: Config) -> None:
+    """Take the address of the published book from the environment, or else from the configuration."""
+    given = (os.environ.get(VARIABLE) or config.html_baseurl or "").strip()
+    if not given:
+        return
+    parts = urlsplit(given)
+    if parts.scheme not in ("http", "https") or not parts.netloc or parts.query or parts.fragment:
+        raise ConfigError(f"got the address {given!r} for the book; needed one such as https://example.org/gpbnb/")
+    # Sphinx joins addresses: without the last slash it would drop the last folder.
+    config.html_baseurl = given.rstrip("/") + "/"
 
 
 def address(app: Sphinx, place: str) -> str:
@@ -89,6 +107,7 @@ def write_sitemap(app: Sphinx, error: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict:
+    app.connect("config-inited", read_address)
     app.connect("html-page-context", add_tags)
     app.connect("build-finished", write_preview)
     app.connect("build-finished", write_sitemap)

@@ -18,7 +18,7 @@ const OPENS = ":scope > mjx-c:is(.mjx-c28, .mjx-c5B, .mjx-c7B)";
 const CLOSES = ":is(:scope, :scope:is(mjx-msup, mjx-msub, mjx-msubsup) > mjx-mo) > mjx-c:is(.mjx-c29, .mjx-c5D, .mjx-c7D)";
 const COMMA = ":scope > mjx-c:is(.mjx-c2C, .mjx-c3B)";
 
-function breakFormulas(boxes = document.querySelectorAll("article mjx-container")) {
+function breakFormulas(boxes) {
   // All is measured before anything is changed: each change would have the page laid out anew.
   const plans = [...boxes].flatMap((box) => (isLong(box, LONG) ? planRow(box.firstElementChild) : []));
   plans.forEach(breakRow);
@@ -98,20 +98,74 @@ function shrinkToCells() {
     box.style.setProperty("--on-paper", `${sizes[i]}%`);
   });
 }
-window.addEventListener("beforeprint", shrinkToCells);
-window.addEventListener("load", async () => {
-  await window.MathJax?.startup?.promise;
-  breakFormulas();
-  // Not when the window is resized: the sidebars slide, and the text has its width only after that.
-  let width = null;
-  const marked = new ResizeObserver(([{ contentRect }]) => {
-    if (contentRect.width !== width) markScrolling();
-    width = contentRect.width;
+
+// MathJax takes seconds for a chapter. Formulas near the window are typeset first, so that the reader can begin; the
+// others follow in batches between which the page answers. Formulas that are not shown, in closed details or filtered
+// rows, wait until they are, and everything is typeset before the page is printed.
+const NEARBY = "50%"; // of the window's height, above and below
+const BATCH = 40;
+const waiting = new Set();
+let typesetting = Promise.resolve();
+window.formulas = { near: null, shown: null, count: () => document.querySelectorAll("mjx-container").length };
+
+function take(formulas) {
+  const taken = formulas.filter((formula) => waiting.delete(formula));
+  for (const formula of taken) nearby.unobserve(formula);
+  return taken;
+}
+function settle(formulas) {
+  const boxes = formulas.map((formula) => formula.querySelector("mjx-container")).filter(Boolean);
+  breakFormulas(boxes);
+  markScrolling(boxes);
+}
+function typeset(formulas) {
+  const taken = take(formulas);
+  if (taken.length) typesetting = typesetting.then(() => MathJax.typesetPromise(taken)).then(() => settle(taken));
+  return typesetting;
+}
+const nearby = new IntersectionObserver(
+  (seen) => typeset(seen.filter((each) => each.isIntersecting).map((each) => each.target)),
+  { rootMargin: `${NEARBY} 0px` },
+);
+const pause = () => new Promise((resolve) => (window.requestIdleCallback ?? setTimeout)(resolve, { timeout: 100 }));
+
+async function typesetShown() {
+  const limit = (1 + 2 * (parseFloat(NEARBY) / 100)) * innerHeight;
+  const all = [...waiting];
+  const places = all.map((formula) => formula.getBoundingClientRect());
+  const shown = all.map((formula) => formula.checkVisibility());
+  const near = (i) => shown[i] && places[i].bottom > innerHeight - limit && places[i].top < limit;
+  await typeset(all.filter((_, i) => near(i)));
+  window.formulas.near = { time: performance.now(), count: window.formulas.count() };
+  for (const formula of all) if (waiting.has(formula)) nearby.observe(formula);
+  const rest = all.filter((_, i) => shown[i]);
+  while (rest.length) {
+    await pause();
+    await typeset(rest.splice(0, BATCH));
+  }
+  window.formulas.shown = { time: performance.now(), count: window.formulas.count() };
+}
+
+// Once all formulas that are shown have been typeset.
+window.formulasTypeset = new Promise((resolve) => {
+  window.addEventListener("load", async () => {
+    if (window.MathJax?.startup) {
+      await MathJax.startup.promise;
+      for (const formula of document.querySelectorAll("article .math")) waiting.add(formula);
+      await typesetShown();
+    }
+    resolve();
+    // Not when the window is resized: the sidebars slide, and the text has its width only after that.
+    let width = null;
+    const marked = new ResizeObserver(([{ contentRect }]) => {
+      if (contentRect.width !== width) markScrolling();
+      width = contentRect.width;
+    });
+    for (const article of document.querySelectorAll("article")) marked.observe(article);
   });
-  for (const article of document.querySelectorAll("article")) marked.observe(article);
 });
 
-// A collapsed derivation has no width to break its formulas at until it is opened. On paper all of them are open.
+// What was collapsed had no width to break its formulas at. On paper everything is open.
 document.addEventListener(
   "toggle",
   ({ target }) => {
@@ -120,4 +174,10 @@ document.addEventListener(
   },
   true,
 );
-window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((each) => (each.open = true)));
+window.addEventListener("beforeprint", () => {
+  for (const each of document.querySelectorAll("details")) each.open = true;
+  const formulas = take([...waiting]);
+  if (formulas.length) MathJax.typeset(formulas);
+  settle(formulas);
+  shrinkToCells();
+});

@@ -1,5 +1,5 @@
-// Search and filters above the tables of the ledger, and formulas typeset when they come into view. Without this script
-// the page shows every row. The script runs before MathJax, which removes the source of formulas from the text.
+// Search and filters above the tables of the ledger. Without this script the page shows every row. The script runs
+// before formulas are typeset, which removes their source from the text.
 const GREEK = { α: "alpha", β: "beta", γ: "gamma", δ: "delta", ε: "epsilon", η: "eta", θ: "theta", μ: "mu", σ: "sigma", φ: "varphi", ω: "omega" };
 const plain = (text) => text.toLowerCase().replace(/[α-ω]/g, (letter) => GREEK[letter] ?? letter);
 
@@ -44,50 +44,5 @@ for (const form of document.querySelectorAll("form.ledger-form")) {
     if (form.elements[name]) form.elements[name].value = value;
   }
   show();
-  setFormulas(rows.map(({ row }) => row), lead);
-}
-
-// Typesetting a thousand formulas at once blocks the page for seconds: the formulas of a row are typeset when it comes
-// near the window, and all of them before the page is printed.
-function setFormulas(rows, whenReady) {
-  const waiting = new Map();
-  for (const row of rows) {
-    const formulas = [...row.querySelectorAll("span.math")];
-    for (const formula of formulas) formula.classList.remove("math");
-    if (formulas.length) waiting.set(row, formulas);
-  }
-  const take = (near) => {
-    const formulas = near.flatMap((row) => waiting.get(row) ?? []);
-    for (const row of near) {
-      waiting.delete(row);
-      watch.unobserve(row);
-    }
-    for (const formula of formulas) formula.classList.add("math");
-    return formulas;
-  };
-  const reach = (formulas) => {
-    const boxes = formulas.map((formula) => formula.firstElementChild).filter(Boolean);
-    breakFormulas(boxes);
-    markScrolling(boxes);
-  };
-  let last = Promise.resolve();
-  const watch = new IntersectionObserver(
-    (seen) => {
-      const formulas = take(seen.filter((each) => each.isIntersecting).map((each) => each.target));
-      if (formulas.length) last = last.then(() => MathJax.typesetPromise(formulas)).then(() => reach(formulas));
-    },
-    { rootMargin: "150%" },
-  );
-  window.addEventListener("load", async () => {
-    await window.MathJax?.startup?.promise;
-    if (!window.MathJax?.typesetPromise) return;
-    whenReady();
-    for (const row of waiting.keys()) watch.observe(row);
-    window.addEventListener("beforeprint", () => {
-      const formulas = take([...waiting.keys()]);
-      MathJax.typeset(formulas);
-      reach(formulas);
-      shrinkToCells();
-    });
-  });
+  window.addEventListener("load", lead);
 }

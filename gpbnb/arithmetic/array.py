@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.conversion import entries, exact_ratio, single
+from gpbnb.arithmetic.conversion import entries, exact_ratio
 from gpbnb.arithmetic.functions import power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
@@ -22,13 +22,21 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.formats import FloatFormat
 
 
+class NegativeRootError(ValueError):
+    """The square root of a negative number."""
+
+
 class FloatArray(NumPyProtocols):
     """An immutable n-dimensional array of numbers of one format; make one with ``fmt.array``.
 
     ``+ - * / @``, ``-x``, ``abs(x)``, ``np.sqrt(x)`` and the sums and products round after each
-    single operation, in the order stated by each. Shapes broadcast as in NumPy. The other operand
-    may be a plain number or array if each entry is a number of the format: nothing is rounded
-    unseen. Indexing with NumPy's rules gives a FloatArray; comparing gives booleans, exact.
+    single operation, in the order that each documents. Shapes broadcast as in NumPy. The other operand
+    may be a plain number or array if each entry is a number of the format, so that nothing is rounded
+    silently. Indexing follows NumPy's rules and gives a FloatArray. Comparisons are exact and give booleans.
+
+    Conversion to other number types is explicit. ``x.to_float()`` gives the nearest float64, ``x.to_fractions()`` the
+    exact value. Whatever asks for an array or a float by itself, as ``np.asarray(x)``, ``float(x[0])``,
+    ``math.sqrt(x[0])``, ``np.save`` or ``scipy.linalg.solve``, gets float64 if that is exact, or else an error.
 
     Raises
     ------
@@ -36,6 +44,13 @@ class FloatArray(NumPyProtocols):
         operand is not a number of the format; the square root of a negative number.
     ZeroDivisionError : a divisor is zero; the message gives the place.
     TypeError : an operand is not a number; an entry is assigned to.
+
+    Examples
+    --------
+    >>> from gpbnb.arithmetic.formats import FloatFormat
+    >>> x = FloatFormat(10, 4).array(["0.1", "0.5"])
+    >>> float(x[1]), x.to_float()
+    (0.5, array([0.1, 0.5]))
 
     References
     ----------
@@ -46,9 +61,9 @@ class FloatArray(NumPyProtocols):
     __hash__ = None  # type: ignore[assignment]
 
     _format: FloatFormat
-    #: What computes with the entries.
+    #: The backend, which computes with the entries.
     backend: Backend
-    #: The entries, as the backend holds them.
+    #: The entries, in the representation of the backend.
     components: Components
 
     def __init__(self) -> None:
@@ -56,7 +71,7 @@ class FloatArray(NumPyProtocols):
 
     @classmethod
     def from_pairs(cls, m: Any, e: Any, fmt: Any) -> Self:
-        """Hold significands and exponents that are already normalized numbers of `fmt`."""
+        """Make an array from significands and exponents that are already normalized numbers of `fmt`."""
         pair = _frozen(m, object), _frozen(e, object)
         components = fmt.backend.from_exact(*pair)
         return (
@@ -67,7 +82,7 @@ class FloatArray(NumPyProtocols):
 
     @classmethod
     def from_components(cls, backend: Backend, components: Any, fmt: Any) -> Self:
-        """Hold what a backend has made, or moved."""
+        """Make an array from components that a backend has computed or moved."""
         self = object.__new__(cls)
         self._format = fmt
         self.backend = backend
@@ -75,11 +90,11 @@ class FloatArray(NumPyProtocols):
         return self
 
     def on_exact_backend(self) -> FloatArray:
-        """The same numbers, on the backend that holds every exponent."""
+        """Return the same numbers on the backend that can store every exponent."""
         return self.from_components(self.format.exact_backend, self.backend.to_exact(self.components), self.format)
 
     def to_pairs(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Significands and exponents, Python's integers: each entry is ``m * base**e``, normalized."""
+        """Return significands and exponents as Python integers; each entry is ``m * base**e``, normalized."""
         m, e = self.on_exact_backend().components
         return m, e
 
@@ -149,7 +164,7 @@ class FloatArray(NumPyProtocols):
         return self.moved(np.transpose)
 
     def reshape(self, *shape: Any) -> FloatArray:
-        """The same entries in another shape."""
+        """Return the same entries in another shape."""
         return self.moved(lambda a: a.reshape(*shape))
 
     def __len__(self) -> int:
@@ -188,7 +203,7 @@ class FloatArray(NumPyProtocols):
     # -- arithmetic ----------------------------------------------------------------------------
 
     def operand(self, other: Any) -> FloatArray:
-        """The other operand of an operation: a FloatArray of this format, or numbers that the format holds exactly."""
+        """Return the other operand, a FloatArray of this format or numbers that are exact in the format."""
         if isinstance(other, FloatArray):
             if other.format != self.format:
                 raise ValueError(
@@ -215,7 +230,7 @@ class FloatArray(NumPyProtocols):
         )
 
     def multiply_add(self, factor: Any, addend: Any) -> FloatArray:
-        """``self * factor + addend``, rounded once for each entry: the fused multiply-add of a processor."""
+        """Return ``self * factor + addend``, rounded once for each entry, as a processor's fused multiply-add does."""
         arrays = [self, self.operand(factor), self.operand(addend)]
         broadcast("multiply_add", arrays[0].shape, arrays[1].shape)
         broadcast("multiply_add", np.broadcast_shapes(arrays[0].shape, arrays[1].shape), arrays[2].shape)
@@ -229,7 +244,7 @@ class FloatArray(NumPyProtocols):
     def _unary(self, name: str) -> FloatArray:
         if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
             at = f" at {_place(negative)}" if negative else ""
-            raise ValueError(
+            raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
         components = self.backend.apply(name, self.components)
@@ -285,7 +300,7 @@ class FloatArray(NumPyProtocols):
         return self._unary("absolute")
 
     def sqrt(self) -> FloatArray:
-        """The square root of each entry, correctly rounded; also ``np.sqrt(x)``."""
+        """Return the correctly rounded square root of each entry; also ``np.sqrt(x)``."""
         return self._unary("sqrt")
 
     def sum(self, axis: int | None = None) -> FloatArray:
@@ -369,16 +384,16 @@ class FloatArray(NumPyProtocols):
     # -- conversion ----------------------------------------------------------------------------
 
     def to_float(self) -> Any:
-        """The nearest float64 of each entry: an array, or a float for a single number.
+        """Return the nearest float64 of each entry, as an array, or as a float for a single number.
 
         Raises
         ------
-        OverflowError : an entry would become infinite, or is not zero and would become so.
+        OverflowError : an entry would become infinite, or a nonzero entry would become zero.
         """
         return self.backend.to_float(self.components)[()]
 
     def to_fractions(self) -> Any:
-        """The exact value of each entry: an object array of Fractions, or one Fraction.
+        """Return the exact value of each entry, as an object array of Fractions or as one Fraction.
 
         Raises
         ------
@@ -387,38 +402,10 @@ class FloatArray(NumPyProtocols):
         to_fraction = np.frompyfunc(self.format.kernel.to_fraction, 2, 1)
         return np.asarray(to_fraction(*self.to_pairs()), dtype=object)[()]
 
-    def __float__(self) -> float:
-        if self.size != 1:
-            raise TypeError(f"got float() of a FloatArray of shape {self.shape}; needed one number; use x.to_float()")
-        return float(self.reshape(()).to_float())
-
-    def astype(self, dtype: Any) -> NDArray[Any]:
-        """A NumPy array of dtype float64, the nearest, or object, the exact Fractions.
-
-        Raises
-        ------
-        TypeError : another dtype.
-        OverflowError : as :meth:`to_float`.
-        """
-        dtype = np.dtype(dtype)
-        if dtype == np.float64:
-            return np.asarray(self.to_float(), dtype=np.float64)
-        if dtype == np.dtype(object):
-            return single(self.to_fractions()) if not self.ndim else self.to_fractions()
-        raise TypeError(
-            f"got a conversion to dtype {dtype}; needed float64 (nearest) or object (exact Fractions); "
-            "use x.to_float().astype(...)"
-        )
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        if copy is False:
-            raise ValueError("got copy=False; needed True or None: a FloatArray becomes an array by conversion only")
-        return self.astype(np.float64 if dtype is None else dtype)
-
     # -- text ----------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        """Code that makes the same array; with ``...`` in it for more entries than NumPy prints."""
+        """Return code that makes the same array, with ``...`` if there are more entries than NumPy prints."""
         start = f"{self.format}.array("
         shape = "" if self.size or self.shape == (0,) else f".reshape{self.shape}"
         return f"{start}{self._text(quote=chr(39), separator=', ', prefix=start)}){shape}"
@@ -426,11 +413,8 @@ class FloatArray(NumPyProtocols):
     def __str__(self) -> str:
         return self._text(quote="", separator=" ", prefix="")
 
-    def __format__(self, spec: str) -> str:
-        return format(float(self), spec) if spec else str(self)
-
     def _text(self, quote: str, separator: str, prefix: str) -> str:
-        """Decimal digits from which ``fmt.array`` makes the same numbers again, in columns."""
+        """Return decimal digits, in columns, from which ``fmt.array`` makes the same numbers again."""
         flat = self.reshape(-1)
 
         def text(i: int) -> str:
@@ -441,14 +425,14 @@ class FloatArray(NumPyProtocols):
 
 
 def _frozen(a: Any, dtype: Any) -> NDArray[Any]:
-    """An array that cannot be written to."""
+    """Return a read-only array."""
     array = a if isinstance(a, np.ndarray) else np.asarray(a, dtype=dtype)
     array.flags.writeable = False
     return array
 
 
 def _common(arrays: Sequence[FloatArray]) -> tuple[Backend, Sequence[FloatArray]]:
-    """One backend that holds all the arrays."""
+    """Return one backend that can store all the arrays."""
     backend = arrays[0].backend
     if all(array.backend is backend for array in arrays):
         return backend, arrays
@@ -456,7 +440,7 @@ def _common(arrays: Sequence[FloatArray]) -> tuple[Backend, Sequence[FloatArray]
 
 
 def _first(condition: Any) -> tuple[int, ...] | None:
-    """Index of the first place where `condition` holds."""
+    """Return the index of the first place where `condition` holds."""
     condition = np.asarray(condition, dtype=bool)
     if not condition.any():
         return None
@@ -468,7 +452,7 @@ def _place(index: tuple[int, ...]) -> str:
 
 
 def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Products of rows and columns, each summed from left to right, as (26) and (27)."""
+    """Multiply rows and columns, each product summed from left to right, as in (26) and (27)."""
     if not a.ndim or not b.ndim:
         raise ValueError(f"matmul: got shapes {a.shape} and {b.shape}; needed at least one axis each; use *")
     rows = a if a.ndim > 1 else a[np.newaxis, :]
@@ -495,5 +479,5 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _product(rows: FloatArray, columns: FloatArray) -> Components | None:
-    """The components of the product of two matrices, where their backend can form it."""
+    """Return the components of the product of two matrices if their backend can compute it."""
     return rows.backend.matmul(rows.components, columns.components) if rows.backend is columns.backend else None

@@ -1,4 +1,4 @@
-"""An error beside the bounds of it."""
+"""An error together with its bounds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 
 class BoundedError:
-    """The error of one computed result, and bounds of it by their names: what the trials of each topic share.
+    """The error of one computed result, and its bounds by name; the base class of the trials in each topic.
 
     Attributes
     ----------
@@ -21,13 +21,13 @@ class BoundedError:
     bounds: Mapping[str, Any]
 
     def ratio(self, bound: str) -> float:
-        """Error over bound; 0 for an exact result, infinity for an error with a bound of zero."""
+        """Return error / bound: 0 for an exact result, infinity for an error with a bound of zero."""
         if not self.error:
             return 0.0
         return float(self.error / Fraction(self.bounds[bound])) if self.bounds[bound] else math.inf
 
     def overestimation(self, bound: str) -> float:
-        """Bound over error; infinity for an exact result with a bound above zero, 1 if both are zero."""
+        """Return bound / error: infinity for an exact result with a bound above zero, 1 if both are zero."""
         if not self.error:
             return math.inf if self.bounds[bound] else 1.0
         return float(Fraction(self.bounds[bound]) / self.error)

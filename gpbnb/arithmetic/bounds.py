@@ -1,4 +1,4 @@
-"""Error constants and norms that every bound is made of."""
+"""Error constants and norms from which every bound is built."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def column_sum(a: NDArray[Any]) -> Any:
 
 
 def gamma(n: int, unit_roundoff: Fraction) -> Fraction:
-    r"""Bound of the relative error of n roundings on top of each other, to every order.
+    r"""Bound of the relative error of n roundings in a row, to every order.
 
     .. math:: \Bigl|\prod_{i=1}^n (1+\epsilon_i)^{\pm1} - 1\Bigr| \le \gamma_n
         = \frac{n\beta}{1 - n\beta}, \qquad |\epsilon_i| \le \beta,\ n\beta < 1
@@ -27,7 +27,7 @@ def gamma(n: int, unit_roundoff: Fraction) -> Fraction:
 
     Raises
     ------
-    ValueError : nβ ≥ 1; so many roundings in so few digits have no such bound.
+    ValueError : nβ ≥ 1; with so few digits, so many roundings have no such bound.
 
     References
     ----------
@@ -45,16 +45,16 @@ def gamma(n: int, unit_roundoff: Fraction) -> Fraction:
 
 
 def gamma_probabilistic(n: int, unit_roundoff: Fraction, failure: float = 1e-2) -> float:
-    r"""As :func:`gamma`, but exceeded with at most the probability `failure`: of size √n β.
+    r"""Probabilistic form of :func:`gamma`, about √n β, exceeded at most with the probability `failure`.
 
     .. math:: \tilde\gamma_n(\lambda) = \exp\Bigl(\lambda\sqrt n\,\beta
         + \frac{n\beta^2}{1-\beta}\Bigr) - 1, \qquad
         \text{failure} = 2\exp\Bigl(-\frac{\lambda^2(1-\beta)^2}{2}\Bigr)
 
-    It rests on roundings that are independent with mean zero: a fair model of rounding to nearest
-    of data that have many digits, and wrong for chopping. Then :math:`\sum\log(1+\epsilon_i)` is a
-    sum of independent terms of at most :math:`\beta/(1-\beta)` in size, whose mean is at most
-    :math:`n\beta^2/(1-\beta)`; Hoeffding's inequality says how far it strays.
+    It assumes that rounding errors are independent with mean zero. This is a fair model of rounding to nearest
+    for data with many digits, but wrong for chopping. Then :math:`\sum\log(1+\epsilon_i)` is a
+    sum of independent terms of size at most :math:`\beta/(1-\beta)`, and its mean is at most
+    :math:`n\beta^2/(1-\beta)`. Hoeffding's inequality bounds its deviation from the mean.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
         return _read(value)
     if isinstance(value, (bool, np.bool_)):
         raise TypeError(f"got the truth value {value!r}; needed {_ACCEPTED}; write 1 or 0")
-    if isinstance(value, np.timedelta64):  # an np.integer, yet with a unit
+    if isinstance(value, np.timedelta64):  # a subclass of np.integer, but with a unit
         raise TypeError(f"got {value!r} of type timedelta64; needed {_ACCEPTED}")
     if isinstance(value, (int, np.integer)):
         return int(value), 1, 0
@@ -46,7 +46,7 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
         return (-p if sign else p), 1, exponent
     if (pair := _of_mpmath_or_flint(value)) is not None:
         return pair
-    # Python's and NumPy's floats, those of gmpy2 and sympy, and whatever else converts exactly
+    # floats of Python, NumPy, gmpy2 and sympy, and everything else that converts exactly
     if hasattr(value, "as_integer_ratio"):
         try:
             p, q = value.as_integer_ratio()
@@ -57,11 +57,11 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
 
 
 def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:
-    """A number of mpmath (``man_exp``) or python-flint (``man_exp()``, ``p`` and ``q``), or None for others.
+    """Read a number of mpmath (``man_exp``) or python-flint (``man_exp()``, ``p`` and ``q``); None for other types.
 
     Raises
     ------
-    ValueError : NaN, infinity, or a ball that is not one number.
+    ValueError : NaN, infinity, or a ball with a radius above zero.
     """
     home = type(value).__module__.partition(".")[0]
     if home not in ("mpmath", "flint"):
@@ -112,7 +112,7 @@ def _not_finite(value: object) -> str:
 
 
 def entries(values: Any) -> NDArray[Any]:
-    """An object array of the numbers in `values`, whatever holds them."""
+    """Return an object array of the numbers in `values`, a container of any type."""
     if isinstance(values, np.ma.MaskedArray):
         raise TypeError("got a masked array; needed every entry; fill it first: a.filled(...)")
     if hasattr(values, "to_fractions"):  # an array of a format
@@ -137,7 +137,7 @@ def entries(values: Any) -> NDArray[Any]:
             )
         array = np.empty((len(components), *(shapes.pop() if components else ())), object)
         for i, part in enumerate(components):
-            array[i] = part[()]  # of a single number: itself, not an array of it
+            array[i] = part[()]  # for a single number, the number itself, not an array of it
         return array
     if isinstance(values, (Set, Mapping, Iterator)):
         raise TypeError(
@@ -147,7 +147,7 @@ def entries(values: Any) -> NDArray[Any]:
 
 
 def single(value: Any) -> NDArray[Any]:
-    """An object array of no axes that holds `value`, whatever it is."""
+    """Return an object array without axes that holds `value`, an object of any type."""
     array = np.empty(1, object)
     array[0] = value
     return array.reshape(())

@@ -1,4 +1,4 @@
-"""Fixed point: multiples of one unit between two limits, as digital signal processors compute."""
+"""Fixed-point arithmetic as in digital signal processors, on multiples of one unit between two limits."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FixedArray(FloatArray):
     """An immutable n-dimensional array of fixed-point numbers; make one with ``fmt.array``.
 
     Its operations are those of :class:`gpbnb.arithmetic.array.FloatArray`: each rounds its exact result once, to a
-    multiple of the unit, and treats a result beyond the limits as the format says.
+    multiple of the unit. The format determines what happens to a result beyond the limits.
     """
 
     __slots__ = ()
@@ -47,11 +47,11 @@ class FixedFormat:
     Parameters
     ----------
     integer_bits : i, bits before the binary point, without the sign.
-    fraction_bits : f, bits behind it; the word has 1 + i + f bits.
-    rounding : of every stored number and every result.
+    fraction_bits : f, bits after it; the word has 1 + i + f bits.
+    rounding : applied to every stored number and every result.
     overflow : "raise" an OverflowError that names the operation and the entry, "saturate" at the nearest limit, or
         "wrap" around as two's complement does.
-    seed : of stochastic rounding.
+    seed : seed for stochastic rounding.
 
     Raises
     ------
@@ -98,7 +98,7 @@ class FixedFormat:
 
     @property
     def unit(self) -> Fraction:
-        """The distance of neighbouring numbers, exact. The error of a rounding is at most half of it, to nearest."""
+        """The exact distance between neighbouring numbers. Rounding to nearest has an error of at most half of it."""
         return Fraction(1, 2) ** self.fraction_bits
 
     @property
@@ -123,21 +123,21 @@ class FixedFormat:
 
     @property
     def backend(self) -> Backend:
-        """What holds the numbers of an array of this format."""
+        """The backend that stores the numbers of an array of this format."""
         return limited_backend(self._rules)
 
     @property
     def exact_backend(self) -> LimitedExact:
-        """What holds every number of this format, slowly."""
+        """The slow backend that can store every number of this format."""
         return limited_exact(self._rules)
 
     def run_tag(self, fused: bool = False, sums: Accumulator | None = None) -> Tag:
-        """The arithmetic for a compiled loop of its own; random roundings begin with the first number of the seed.
+        """Return the arithmetic for one compiled loop; random roundings start with the first number of the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
-        sums : the format that keeps sums of products until they are stored; this one, if none is given.
+        sums : the format that keeps sums of products until they are stored; by default this one.
 
         Raises
         ------
@@ -148,11 +148,11 @@ class FixedFormat:
         return run_tag(self.backend, self._rules, fused)
 
     def round(self, value: Any) -> Fraction:
-        """Round one number into the format; as :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""
+        """Round one number into the format; see :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""
         return self.kernel.to_fraction(*self.kernel.from_decimal(*exact_ratio(value)))
 
     def array(self, values: Any) -> FixedArray:
-        """Round numbers into a :class:`FixedArray`; as :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
+        """Round numbers into a :class:`FixedArray`; see :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
         return FixedArray.from_values(values, self)
 
 
@@ -161,8 +161,8 @@ def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overf
 
     Parameters
     ----------
-    values : the numbers that occur, of any shape: the range of a variable in a reference run, with a margin.
-    bits : of the word, its sign included.
+    values : numbers that occur, of any shape, such as the range of a variable in a reference run, with a margin.
+    bits : bits of the word, including its sign.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overf
     largest = max(abs(exact(values)).ravel(), default=Fraction(0))
     if not largest:
         raise ValueError("got values that are all zero; needed one that is not; leave the variable out")
-    integer_bits = math.frexp(float(largest))[1]  # largest < 2**integer_bits, but for the last rounding
+    integer_bits = math.frexp(float(largest))[1]  # largest < 2**integer_bits, apart from the last rounding
     while True:
         fmt = FixedFormat(integer_bits, bits - 1 - integer_bits, rounding, overflow)
         if largest <= fmt.largest:

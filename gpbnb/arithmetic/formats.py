@@ -1,4 +1,4 @@
-"""What a t-digit number is: base, precision, and how the digits beyond are dropped.
+"""Formats of t-digit numbers: base, precision, and the rounding of further digits.
 
 Source: hung1984, ch. II, sections 2-4; the same in hung1982, ch. III.
 """
@@ -45,17 +45,17 @@ class FloatFormat:
     rounding : applied to every stored number and every result.
     emin, emax : exponents of the least normal and of the largest number, as IEEE 754 counts them:
         :math:`b^{\text{emin}}` and :math:`d.dd\dots\times b^{\text{emax}}`. Give both or neither.
-    subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Else
+    subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Otherwise
         results that are below it after rounding become zero.
-    largest : the largest number, where it is not the one with t digits b - 1.
-    seed : of stochastic rounding. A filter run starts its random numbers with the seed; operations on arrays continue
-        one sequence, which :meth:`restart` begins again.
+    largest : the largest number, if it is not the one whose t digits are all b - 1.
+    seed : seed for stochastic rounding. Each filter run starts its random numbers from the seed; operations on arrays
+        continue one sequence, which :meth:`restart` restarts.
 
     Raises
     ------
     TypeError : a parameter is not of its type.
     ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; one of `emin` and `emax` without the
-        other, or ``emin > emax``; a largest number that the format does not hold.
+        other, or ``emin > emax``; a largest number that is not in the format.
 
     Notes
     -----
@@ -146,7 +146,7 @@ class FloatFormat:
 
     @property
     def limits(self) -> Limits | None:
-        """How far the numbers reach; None if their exponents are unlimited."""
+        """The limits of the range; None if exponents are unlimited."""
         if self.emin is None or self.emax is None:
             return None
         nines = (self.base**self.precision - 1) * Fraction(self.base) ** (self.emax - self.precision + 1)
@@ -155,7 +155,7 @@ class FloatFormat:
 
     @cached_property
     def _rules(self) -> Rules | None:
-        """The rules of the format; None for the two roundings of the reports without a range."""
+        """The rules of the format; None for the reports' two roundings with unlimited range."""
         if self.emin is None and self.rounding in Rounding.documented():
             return None
         return Rules(self.base, self.precision, self.rounding, self.limits, self.seed)
@@ -168,12 +168,12 @@ class FloatFormat:
         return kernel(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
     def run_tag(self, fused: bool = False, sums: Accumulator | None = None) -> Tag:
-        """The arithmetic for a compiled loop of its own; random roundings begin with the first number of the seed.
+        """Return the arithmetic for one compiled loop; random roundings start with the first number of the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
-        sums : the format that keeps sums of products until they are stored; this one, if none is given.
+        sums : the format that keeps sums of products until they are stored; by default this one.
 
         Raises
         ------
@@ -184,21 +184,21 @@ class FloatFormat:
         return run_tag(self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused)
 
     def restart(self) -> None:
-        """Begin the random numbers of stochastic rounding again."""
+        """Restart the random numbers of stochastic rounding."""
         for part in (self.kernel, self.backend):
             if isinstance(part, (LimitedKernel, LimitedFloats)):
                 part.restart()
 
     @property
     def backend(self) -> Backend:
-        """What holds the numbers of an array of this format, compiled where the format allows."""
+        """The backend that stores the numbers of an array of this format, compiled if the format allows it."""
         if self._rules is not None:
             return limited_backend(self._rules)
         return backend(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
     @property
     def exact_backend(self) -> Exact:
-        """What holds every number of this format, slowly."""
+        """The slow backend that can store every number of this format."""
         if self._rules is not None:
             return limited_exact(self._rules)
         return exact(self.base, self.precision, self.rounding is Rounding.NEAREST)
@@ -209,7 +209,7 @@ class FloatFormat:
 
         .. math:: \beta = \tfrac12 b^{1-t} \text{ (to nearest)}, \qquad \beta_c = b^{1-t} \text{ (otherwise)}
 
-        With a range it holds for results that are not below the least normal number.
+        If the range is limited, it holds for results that are not below the smallest normal number.
 
         References
         ----------
@@ -259,7 +259,7 @@ class FloatFormat:
         m, exponent = chop.from_decimal(p, q, k)
         if m == 0:
             return Fraction(0), Fraction(0), 0
-        chopped = chop.to_fraction(m, exponent)  # first: it refuses exponents too long to write out
+        chopped = chop.to_fraction(m, exponent)  # comes first, because it rejects exponents too long to write out
         u = Fraction(m, self.base**self.precision)
         rest = Fraction(p, q) * Fraction(10) ** k - chopped
         return u, rest / Fraction(self.base) ** exponent, exponent + self.precision
@@ -281,11 +281,11 @@ class FloatFormat:
 
 
 def prints_as(value: Any, printed: str, *roundings: Rounding) -> bool:
-    """Whether a number, fitted into as many decimal digits as `printed` has, is `printed`.
+    """Whether a number, rounded to as many decimal digits as `printed` has, equals `printed`.
 
     Parameters
     ----------
-    roundings : the ways in which it may have been fitted; to nearest alone by default.
+    roundings : the ways in which it may have been rounded; by default only to nearest.
     """
     figures = len(printed.lower().partition("e")[0].replace(".", "").lstrip("+-0"))
     formats = (FloatFormat(10, figures, rounding) for rounding in roundings or (Rounding.NEAREST,))

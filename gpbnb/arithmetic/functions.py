@@ -1,8 +1,8 @@
 """NumPy's functions for arrays of a format, each with the order of its operations.
 
-Every operation is rounded once, unless a function says that it rounds nothing. Sums run from left to right. The
-elementary functions, such as the exponential, are enclosed by Arb in balls that shrink until every number in one rounds
-alike: their results are correctly rounded too.
+Every operation is rounded once, unless a function says that it rounds nothing. Sums run from left to right. For
+elementary functions, such as the exponential, Arb computes an enclosing ball and shrinks it until all numbers in the
+ball round to the same result, so these results are correctly rounded, too.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from flint import arb, ctx
 ELEMENTARY = (
     "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh",
 )  # fmt: skip
-"""Functions of one number that are correctly rounded through Arb."""
+"""Functions of one number that Arb allows to round correctly."""
 
 _ARB_NAMES = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 _MOST_BITS = 1 << 16
 
 
 def elementary(name: str, x: Any) -> Any:
-    """A function of :data:`ELEMENTARY` of each entry, correctly rounded.
+    """Apply a function of :data:`ELEMENTARY` to each entry, correctly rounded.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def _exactly(end: Any) -> Fraction:
 
 
 def kept(x: Any, found: Any, axis: Any, keepdims: bool) -> Any:
-    """The result of a reduction, with the axis kept at length 1 on demand."""
+    """Return the result of a reduction; if `keepdims` is set, keep the axis with length 1."""
     if not keepdims:
         return found
     shape = [1] * x.ndim
@@ -73,7 +73,7 @@ def kept(x: Any, found: Any, axis: Any, keepdims: bool) -> Any:
 
 
 def mean(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
-    """The sum from left to right, divided by the number of entries, which is rounded into the format first."""
+    """Return the sum from left to right, divided by the number of entries, which is first rounded into the format."""
     count = x.size if axis is None else x.shape[operator.index(axis)]
     if not count:
         raise ValueError("got the mean of no entries; needed at least one")
@@ -81,12 +81,12 @@ def mean(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
 
 
 def largest(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
-    """The largest entry; nothing is rounded."""
+    """Return the largest entry; nothing is rounded."""
     return kept(x, _chosen(x, axis, operator.gt), axis, keepdims)
 
 
 def smallest(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
-    """The smallest entry; nothing is rounded."""
+    """Return the smallest entry; nothing is rounded."""
     return kept(x, _chosen(x, axis, operator.lt), axis, keepdims)
 
 
@@ -102,13 +102,13 @@ def _chosen(x: Any, axis: int | None, better: Callable[[Any, Any], Any]) -> Any:
 
 
 def sort(x: Any, axis: int = -1) -> Any:
-    """Entries in rising order along an axis; nothing is rounded."""
+    """Sort entries in ascending order along an axis; nothing is rounded."""
     order = np.argsort(np.asarray(x.to_fractions(), dtype=object), axis=axis, kind="stable")
     return x.moved(lambda a: np.take_along_axis(a, order, axis=axis))
 
 
 def clip(x: Any, low: Any = None, high: Any = None) -> Any:
-    """Entries below `low` become `low`, above `high` become `high`; nothing is rounded."""
+    """Replace entries below `low` by `low` and above `high` by `high`; nothing is rounded."""
     if low is not None:
         x = np.where(x < low, x.operand(low), x)
     if high is not None:
@@ -117,7 +117,7 @@ def clip(x: Any, low: Any = None, high: Any = None) -> Any:
 
 
 def cumsum(x: Any, axis: int | None = None) -> Any:
-    """Sums of the first entries, from left to right: each adds one entry to the sum before."""
+    """Return partial sums from left to right; each adds one entry to the sum before."""
     lines = x.reshape(-1) if axis is None else x.moved(lambda a: np.moveaxis(a, axis, 0))
     if not len(lines):
         return x
@@ -129,14 +129,14 @@ def cumsum(x: Any, axis: int | None = None) -> Any:
 
 
 def trace(x: Any) -> Any:
-    """The sum of the diagonal, from left to right."""
+    """Return the sum of the diagonal, from left to right."""
     if x.ndim != 2:
         raise ValueError(f"trace: got shape {x.shape}; needed a matrix")
     return np.diagonal(x).sum()
 
 
 def kron(x: Any, a: Any, b: Any) -> Any:
-    """The Kronecker product of two matrices, one product for each entry."""
+    """Return the Kronecker product of two matrices, with one multiplication for each entry."""
     a, b = x.operand(a), x.operand(b)
     if a.ndim != 2 or b.ndim != 2:
         raise ValueError(f"kron: got shapes {a.shape} and {b.shape}; needed two matrices")
@@ -145,11 +145,11 @@ def kron(x: Any, a: Any, b: Any) -> Any:
 
 
 def power(x: Any, exponent: Any) -> Any:
-    r"""Entries to a whole power, multiplied from left to right: :math:`((x x)x)\cdots`; a negative one divides 1 by it.
+    r"""Raise entries to a whole power, from left to right, :math:`((x x)x)\cdots`; for a negative one, divide 1 by it.
 
     Raises
     ------
-    TypeError : an exponent that is no whole number.
+    TypeError : an exponent that is not a whole number.
     """
     try:
         if isinstance(exponent, bool):
@@ -170,10 +170,10 @@ def power(x: Any, exponent: Any) -> Any:
 
 
 def norm(x: Any, order: Any = None, axis: int | None = None) -> Any:
-    """A norm: by default the root of the sum of squares, of all entries or along an axis.
+    """Return a norm, by default the root of the sum of squares, of all entries or along an axis.
 
-    With `order` 1 or infinity: of a vector, the sum or the largest of the absolute values; of a matrix, the largest sum
-    of a column or of a row. Sums run from left to right.
+    With `order` 1 or infinity, the norm of a vector is the sum or the largest of the absolute values; that of a matrix
+    is the largest column sum or row sum. Sums run from left to right.
 
     Raises
     ------
@@ -190,10 +190,10 @@ def norm(x: Any, order: Any = None, axis: int | None = None) -> Any:
 
 
 def einsum(x: Any, subscripts: Any, *operands: Any) -> Any:
-    """Products of entries, multiplied and then summed from left to right.
+    """Multiply entries, and sum the products from left to right.
 
-    The products are formed in the order of the operands. The sum runs over the indices that the result lacks, in the
-    order in which they first appear, the last one fastest.
+    Products are formed in the order of the operands. The sum runs over the indices that do not appear in the result, in
+    the order in which they first appear; the last index runs fastest.
 
     Raises
     ------

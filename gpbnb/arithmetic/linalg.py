@@ -1,8 +1,8 @@
-"""Linear algebra in t-digit arithmetic, each result with its order of operations stated.
+"""Linear algebra in t-digit arithmetic, with a documented order of operations for each result.
 
-The order is the content: another order gives other digits. It is the order of hung1984, ch. II.
-Operands are FloatArrays of one format, and so are results. Where their backend has compiled loops, elimination runs in
-:mod:`gpbnb.arithmetic.kernels.elimination`; the loops here serve every format and every exponent, with the same digits.
+The order matters, because another order gives other digits. It is the order of hung1984, ch. II.
+Operands are FloatArrays of one format, and so are results. If their backend has compiled loops, elimination runs in
+:mod:`gpbnb.arithmetic.kernels.elimination`; the loops here work for every format and exponent and give the same digits.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def dot(
     block: int = 32,
     sums: FloatFormat | FixedFormat | None = None,
 ) -> FloatArray:
-    r"""Inner product, from left to right unless another order is asked for.
+    r"""Inner product, summed from left to right unless `order` says otherwise.
 
     .. math:: \mathrm{fl}(\dots\mathrm{fl}(\mathrm{fl}(x_1 y_1) + \mathrm{fl}(x_2 y_2)) + \dots)
 
@@ -74,17 +74,17 @@ def matmul(
     block: int = 32,
     sums: FloatFormat | FixedFormat | None = None,
 ) -> FloatArray:
-    """Matrix product; each entry is :func:`dot` of a row and a column. By default the same as ``a @ b``.
+    """Matrix product, by default the same as ``a @ b``; each entry is :func:`dot` of a row and a column.
 
     Parameters
     ----------
     a, b : (..., m, n) and (..., n, p), or a vector (n,) on either side.
-    order : of the additions. "left": from left to right. "pairwise": the sum of the first half, rounded down, plus
-        that of the second, and each of them likewise. "blocked": sums of `block` products from left to right, then
-        these sums from left to right, as in the inner loops of optimized BLAS.
-    fused : each product is added by a fused multiply-add, which rounds once; not with "pairwise", where products are
-        not added to sums.
-    block : products in a block.
+    order : of the additions. "left": from left to right. "pairwise": the sum of the first half plus
+        that of the second, each formed in the same way; the first half is the shorter one. "blocked": sums of `block`
+        products from left to right, then these sums from left to right, as in the inner loops of optimized BLAS.
+    fused : whether each product is added by a fused multiply-add, which rounds once; not with "pairwise", where
+        products are not added to sums.
+    block : number of products in a block.
     sums : the format in which products and sums are computed; each entry is then rounded once into the format of the
         operands. Tensor cores keep sums of bfloat16 products in binary32, signal processors keep them in a long
         accumulator.
@@ -116,7 +116,7 @@ def matmul(
         return a.format.array(matmul(sums.array(a), sums.array(b), order, fused, block))
     n = a.shape[-1] if a.ndim else 0
     if not b.ndim or n == 0 or (order == "left" and not fused) or n != b.shape[max(b.ndim - 2, 0)]:
-        return a @ b  # which also names shapes that do not fit
+        return a @ b  # this error also names shapes that do not fit
     a.operand(b)
     rows = a if a.ndim > 1 else a[np.newaxis, :]
     columns = b if b.ndim > 1 else b[:, np.newaxis]
@@ -167,13 +167,13 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
     Parameters
     ----------
     a : (n, n).
-    pivot : partial pivoting: swap into row k the row from k on with the largest
-        :math:`|a_{ik}|`, the first of equals.
+    pivot : whether to use partial pivoting: among rows k and below, the row with the largest
+        :math:`|a_{ik}|`, the first of equals, is swapped into row k.
 
     Returns
     -------
     lower, upper : (n, n); `lower` has ones on its diagonal and holds :math:`-m_{ik}`.
-    permutation : (n,); ``a[permutation]`` is what was factored.
+    permutation : (n,); the factors are those of ``a[permutation]``.
 
     Raises
     ------
@@ -286,7 +286,7 @@ def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
 
 
 def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
-    """Both factors in one array, and the order of the rows; None where the backend cannot do it."""
+    """Return both factors in one array and the order of the rows; None if the backend cannot compute them."""
     backend = a.backend
     if not isinstance(backend, Compiled):
         return None
@@ -301,7 +301,7 @@ def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]]
 
 
 def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
-    """Solutions for the columns of b (n, p); None where the backend cannot do it."""
+    """Return solutions for the columns of b (n, p); None if the backend cannot compute them."""
     backend = a.backend
     if not isinstance(backend, Compiled) or b.backend is not backend:
         return None
@@ -319,7 +319,7 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
 
 @lru_cache(maxsize=1)
 def _loops() -> Any:
-    # Here, and not above: numba takes a second to import, and exact arithmetic does not need it.
+    # Imported here, because numba takes a second to import and exact arithmetic does not need it.
     from gpbnb.arithmetic.kernels import elimination
 
     return elimination

@@ -1,8 +1,8 @@
 """The formats of processors, by name: IEEE 754, accelerators, IBM's hexadecimal floating point and the IBM 704.
 
-All IEEE and accelerator formats round to nearest, ties to even, with gradual underflow; write
+All IEEE and accelerator formats round to nearest, ties to even, with gradual underflow; use
 ``dataclasses.replace(BINARY32, rounding=Rounding.UP)`` for another rounding. There is no infinity, NaN or negative
-zero: overflow is an error. IBM's machines chop, and what falls below their least number becomes zero.
+zero: overflow is an error. IBM's machines chop, and a result below their smallest number becomes zero.
 
 References
 ----------
@@ -29,7 +29,7 @@ BINARY128 = _ieee(2, 113, 16383)
 
 #: binary32 with its last 16 bits cut off.
 BFLOAT16 = _ieee(2, 8, 127)
-#: The 19 bits that tensor cores take of a binary32 operand.
+#: The 19 bits of a binary32 operand that tensor cores use.
 TF32 = _ieee(2, 11, 127)
 FP8_E5M2 = _ieee(2, 3, 15)
 #: Its largest number is 1.75 * 2**8, since the significand of all ones means NaN there.

@@ -1,4 +1,4 @@
-"""NumPy's array protocols for arrays of a format: which of its functions they take, and what each does."""
+"""NumPy's array protocols for arrays of a format: the NumPy functions that they support, and their meaning."""
 
 from __future__ import annotations
 
@@ -7,12 +7,18 @@ import inspect
 import operator
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from functools import partial
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpbnb.arithmetic import functions
+from gpbnb.arithmetic.conversion import single
+
+_EXACT = {2: 53, 16: 13}  # digits of float64
+_LEAST_NORMAL = 2.0**-1022
 
 _JOINERS = frozenset(("concatenate", "hstack", "stack", "vstack"))
 
@@ -25,16 +31,18 @@ _MOVERS = frozenset((
 
 
 class NumPyProtocols:
-    """What an array of a format needs so that NumPy's own functions take it."""
+    """Methods that let NumPy's own functions accept an array of a format."""
 
     __slots__ = ()
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
-        near = difflib.get_close_matches(name, [each for each in dir(type(self)) if not each.startswith("_")], 1)
-        hint = f"; the nearest is x.{near[0]}" if near else ""
-        raise AttributeError(f"a {type(self).__name__} has no attribute {name!r}{hint}")
+        known = [each for each in dir(type(self)) if not each.startswith("_")]
+        raise AttributeError(
+            f"a {type(self).__name__} has no attribute {name!r}{_nearest(name, known, 'x.')}; for NumPy's other "
+            "attributes convert: x.to_float()"
+        )
 
     # -- methods of NumPy's arrays ------------------------------------------------------------------------
 
@@ -63,43 +71,43 @@ class NumPyProtocols:
         return functions.trace(self)
 
     def dot(self, other: Any) -> Any:
-        """As ``np.dot``: entries of products are summed from left to right."""
+        """Compute ``np.dot``, with products summed from left to right."""
         return _dot(self, self, other)
 
     def copy(self) -> Any:
-        """The same array: it does not change, and needs no copy."""
+        """Return the array itself, which is immutable and needs no copy."""
         return self
 
     def ravel(self) -> Any:
-        """The entries in one row."""
+        """Return the entries in one row."""
         return self.moved(np.ravel)
 
     def flatten(self) -> Any:
-        """The entries in one row."""
+        """Return the entries in one row."""
         return self.moved(np.ravel)
 
     def transpose(self, *axes: Any) -> Any:
-        """The axes in another order; by default in reverse."""
+        """Return the array with its axes in another order, by default reversed."""
         order = axes[0] if len(axes) == 1 and not isinstance(axes[0], int) else axes or None
         return self.moved(lambda a: np.transpose(a, order))
 
     @abstractmethod
     def to_fractions(self) -> Any:
-        """The exact value of each entry."""
+        """Return the exact value of each entry."""
 
     def tolist(self) -> Any:
-        """Exact Fractions in nested lists, or one Fraction."""
+        """Return exact Fractions in nested lists, or one Fraction."""
         found = self.to_fractions()
         return found.tolist() if isinstance(found, np.ndarray) else found
 
     def item(self, *index: Any) -> Any:
-        """One entry as an exact Fraction."""
+        """Return one entry as an exact Fraction."""
         found = np.asarray(self.to_fractions(), dtype=object)
         return found.item(*index)
 
     @abstractmethod
     def operand(self, other: Any) -> Any:
-        """The other operand of an operation, as an array of the same format."""
+        """Return the other operand of an operation as an array of the same format."""
 
     @abstractmethod
     def moved(self, move: Callable[[Any], Any]) -> Any:
@@ -108,6 +116,70 @@ class NumPyProtocols:
     @abstractmethod
     def joined(self, join: Callable[[Sequence[Any]], Any], arrays: Sequence[Any]) -> Any:
         """Apply to each component of several arrays a function that only moves entries."""
+
+    # -- leaving the format --------------------------------------------------------------------------------
+
+    @abstractmethod
+    def to_float(self) -> Any:
+        """Return the nearest float64 of each entry."""
+
+    def _exact_float(self, what: str) -> NDArray[np.float64]:
+        """Return each entry as float64 if that is exact."""
+        given: Any = self
+        nearest = np.asarray(given.to_float(), dtype=np.float64)
+        sizes = np.abs(nearest[nearest != 0])
+        short = given.format.precision <= _EXACT.get(given.format.base, 0)
+        if short and (not sizes.size or sizes.min() >= _LEAST_NORMAL):
+            return nearest
+        exact = np.asarray(given.to_fractions(), dtype=object)
+        for index in np.ndindex(nearest.shape):
+            if Fraction(float(nearest[index])) != exact[index]:
+                where = f" at {list(index)}" if index else ""
+                raise ValueError(
+                    f"got {what} of a {type(self).__name__} in {given.format}, whose entry{where} is no float64; "
+                    "needed an explicit conversion: x.to_float() for the nearest float64, x.to_fractions() for exact "
+                    "values, pickle to save an array as it is"
+                )
+        return nearest
+
+    def __float__(self) -> float:
+        given: Any = self
+        if given.size != 1:
+            raise TypeError(
+                f"got float() of a {type(self).__name__} of shape {given.shape}; needed one number; use x.to_float()"
+            )
+        return float(given.reshape(())._exact_float("float()").item())
+
+    def astype(self, dtype: Any) -> NDArray[Any]:
+        """Return a NumPy array of the nearest float64 numbers, or of exact Fractions for dtype object.
+
+        Raises
+        ------
+        TypeError : another dtype.
+        OverflowError : as ``to_float``.
+        """
+        dtype = np.dtype(dtype)
+        if dtype == np.float64:
+            return np.asarray(self.to_float(), dtype=np.float64)
+        if dtype == np.dtype(object):
+            found = self.to_fractions()
+            return found if isinstance(found, np.ndarray) else single(found)
+        raise TypeError(
+            f"got a conversion to dtype {dtype}; needed float64 (nearest) or object (exact Fractions); "
+            "use x.to_float().astype(...)"
+        )
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        if copy is False:
+            raise ValueError(
+                f"got copy=False; needed True or None: a {type(self).__name__} becomes an array by conversion only"
+            )
+        if dtype is None or np.dtype(dtype) == np.float64:
+            return self._exact_float("an array")
+        return self.astype(dtype)
+
+    def __format__(self, spec: str) -> str:
+        return format(float(self.to_float()), spec) if spec else str(self)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         name = ufunc.__name__
@@ -119,9 +191,10 @@ class NumPyProtocols:
                 return _REDUCTIONS[name](inputs[0], axis)
         options = f" with {', '.join(kwargs)}" if kwargs else ""
         called = f"np.{name}" if method == "__call__" else f"np.{name}.{method}"
+        near = "" if name in _UFUNCS else _nearest(name, sorted(_UFUNCS))
         raise TypeError(
             f"got {called}{options} of a {type(self).__name__}; needed one of {', '.join(sorted(_UFUNCS))}, "
-            "add.reduce, multiply.reduce, without further options; or convert: x.to_float()"
+            f"add.reduce, multiply.reduce, without further options{near}; or convert: x.to_float()"
         )
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
@@ -136,14 +209,14 @@ class NumPyProtocols:
                 taken = ", ".join(list(signature.parameters)[1:])
                 raise TypeError(f"np.{name} of a {type(self).__name__}: {error}; needed np.{name}({taken})") from None
             return _FUNCTIONS[name](self, *args, **kwargs)
+        known = sorted((*_JOINERS, *_MOVERS, *_FUNCTIONS))
         raise TypeError(
-            f"got np.{name} of a {type(self).__name__}; needed one of "
-            f"{', '.join(sorted((*_JOINERS, *_MOVERS, *_FUNCTIONS)))}; for linear algebra see gpbnb.linalg; "
-            "or convert: x.to_float()"
+            f"got np.{name} of a {type(self).__name__}; needed one of {', '.join(known)}{_nearest(name, known)}; for "
+            "linear algebra see gpbnb.linalg; or convert: x.to_float()"
         )
 
     def _rearrange(self, func: Any, args: Any, kwargs: Any) -> Any:
-        """Call a NumPy function that only moves entries, on each component."""
+        """Apply a NumPy function that only moves entries to each component."""
         if refused := {"out", "dtype", "casting", "like"} & kwargs.keys():
             raise TypeError(
                 f"got np.{func.__name__} of a {type(self).__name__} with {', '.join(sorted(refused))}; "
@@ -160,8 +233,22 @@ class NumPyProtocols:
         return first.moved(lambda a: func(a, *rest, **kwargs))
 
 
+_OTHER_NAMES = {
+    "argmax": "max", "argmin": "min", "argsort": "sort", "std": "mean", "var": "mean", "exp2": "exp", "log2": "log",
+    "log10": "log", "float_power": "power", "cumprod": "prod", "inner": "dot", "vdot": "dot", "tensordot": "einsum",
+    "average": "mean", "hypot": "sqrt", "cbrt": "sqrt", "conjugate": "copy", "conj": "copy", "real": "copy",
+    "det": "trace", "flat": "ravel", "nbytes": "size", "dtype": "format",
+}  # fmt: skip
+
+
+def _nearest(name: str, known: Sequence[str], prefix: str = "np.") -> str:
+    """Return a hint at the intended function or the most similar name; empty if there is none."""
+    near = [_OTHER_NAMES[name]] if _OTHER_NAMES.get(name) in known else difflib.get_close_matches(name, known, 1)
+    return f"; the nearest is {prefix}{near[0]}" if near else ""
+
+
 def broadcast(name: str, a: tuple[int, ...], b: tuple[int, ...]) -> None:
-    """ValueError if two shapes do not broadcast."""
+    """Raise ValueError if two shapes do not broadcast."""
     if a == b:
         return
     try:
@@ -233,7 +320,7 @@ def _append(x: NumPyProtocols, a: Any, values: Any, axis: int | None) -> Any:
 
 
 def _exponent(value: Any) -> Any:
-    """A plain exponent: NumPy hands it over as an array of a format."""
+    """Return a plain exponent, which NumPy passes as an array of a format."""
     if not value.ndim and (exact := value.to_fractions()).denominator == 1:
         return int(exact)
     raise TypeError("got an exponent that is no single whole number; needed one, as in np.power(x, 3)")
@@ -257,6 +344,7 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "norm": lambda x, a, ord=None, axis=None: functions.norm(a, ord, axis),
     "ones_like": lambda x, a: a * 0 + 1,
     "prod": lambda x, a, axis=None, keepdims=False: functions.kept(a, a.prod(axis), axis, keepdims),
+    "save": lambda x, file, arr, **options: np.save(file, np.asarray(arr), **options),
     "sort": lambda x, a, axis=-1: functions.sort(a, axis),
     "shape": lambda x, a: a.shape,
     "size": lambda x, a: a.size,

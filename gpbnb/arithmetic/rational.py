@@ -1,6 +1,6 @@
 """Exact matrices of Fractions: conversion, inverse, norms.
 
-Entries may be Fractions, ints, floats (taken at their exact binary value) or an array of a format.
+Entries may be Fractions, ints, floats (with their exact binary value) or an array of a format.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gpbnb.arithmetic.conversion import exact_ratio
 
 
 def exact(values: Any) -> NDArray[Any]:
-    """Entries as exact Fractions, in an object array of the same shape.
+    """Return entries as exact Fractions, in an object array of the same shape.
 
     Raises
     ------
@@ -42,15 +42,15 @@ def exact(values: Any) -> NDArray[Any]:
 
 
 def integers(fractions: NDArray[Any]) -> tuple[NDArray[Any], Fraction]:
-    """Integers, and the one unit that they count, of exact Fractions: sums and products of integers are much faster."""
+    """Write exact Fractions as integers times one unit; sums and products of integers are much faster."""
     common = math.lcm(*(entry.denominator for entry in fractions.flat))
     counts = [entry.numerator * (common // entry.denominator) for entry in fractions.flat]
     return np.array(counts, dtype=object).reshape(fractions.shape), Fraction(1, common)
 
 
 def rationals(a: Any) -> Any:
-    """A matrix (m, n) of exact numbers, or an array of a format, as a matrix of python-flint's rationals."""
-    if hasattr(a, "to_pairs"):  # an array of a format: faster than through Fractions
+    """Convert a matrix (m, n) of exact numbers, or an array of a format, to a matrix of python-flint's rationals."""
+    if hasattr(a, "to_pairs"):  # for an array of a format, this is faster than conversion through Fractions
         base = a.format.base
         pairs = zip(*(part.ravel() for part in a.to_pairs()), strict=True)
         entries = [(m * base**e, 1) if e >= 0 else (m, base**-e) for m, e in pairs]
@@ -62,7 +62,7 @@ def rationals(a: Any) -> Any:
 
 
 def true_inverse(a: Any) -> Any:
-    """The exact inverse of a square matrix (n, n), as a matrix of python-flint's rationals.
+    """Return the exact inverse of a square matrix (n, n), as a matrix of python-flint's rationals.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def true_inverse(a: Any) -> Any:
 
 
 def inverse_of(a: Any) -> NDArray[Any]:
-    """The exact inverse of a square matrix (n, n), as Fractions.
+    """Return the exact inverse of a square matrix (n, n), as Fractions.
 
     Raises
     ------
@@ -106,7 +106,7 @@ def column_sum_norm(a: Any) -> Fraction:
 
 
 def row_sum_norm(a: Any) -> Fraction:
-    r"""Largest row sum, :math:`\max_i \sum_j |a_{ij}|`: the matrix norm that belongs to (21)."""
+    r"""Largest row sum, :math:`\max_i \sum_j |a_{ij}|`, the matrix norm that is compatible with (21)."""
     return max(_sizes(a).sum(axis=1), default=Fraction(0))
 
 

@@ -1,4 +1,4 @@
-"""The search for the smallest precision that suffices."""
+"""Search for the smallest precision that is sufficient."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 
 CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
-"""Precisions, those of binary32 and binary64 and their like, that are always tried when they are above the answer."""
+"""Precisions like those of binary32 and binary64, which are always tried if they are above the answer."""
 
 
 def smallest_precision(
@@ -32,11 +32,11 @@ def smallest_precision(
     Parameters
     ----------
     meets : whether a format meets the requirement; called at most once per format.
-    base, rounding : of the formats.
+    base, rounding : base and rounding of the formats.
     least, largest : range of the precisions. Without `largest`, the range doubles until a precision meets the
         requirement; use this only if some precision does.
-    monotone : every precision above one that meets the requirement meets it too, as for a bound proportional to the
-        unit roundoff; the next higher precision is then not tried.
+    monotone : whether every precision above one that meets the requirement meets it, too, as for a bound proportional
+        to the unit roundoff; the next higher precision is then not tried.
 
     Returns
     -------
@@ -70,15 +70,15 @@ def smallest_precision(
 
 
 class Search:
-    """The smallest precision that meets a tolerance and above which no precision tried misses it.
+    """The smallest precision that meets a tolerance, and above which every precision tried meets it.
 
     Parameters
     ----------
-    error : gives the error over the tolerance in a format, and why it is infinite.
+    error : function that returns error / tolerance in a format, and why it is infinite.
     checks : precisions that are tried if they lie above the answer.
     tick : called after each run.
-    bounds : whether the errors are bounds, which need not exist: precisions above the answer that have none are then
-        listed as undecided, and do not count against it.
+    bounds : whether the errors are bounds, which may not exist. Precisions above the answer that have no bound are
+        then listed as undecided and do not invalidate the answer.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Search:
         self._ratios, self._why = dict[int, float](), dict[int, str]()
         #: Precisions above the answer for which there is no bound.
         self.undecided: tuple[int, ...] = ()
-        #: Precisions that met the tolerance although a higher one missed it; empty if all is regular.
+        #: Precisions that met the tolerance although a higher one missed it; usually empty.
         self.irregular: tuple[int, ...] = ()
         largest = LARGEST_PRECISION[base]
 
@@ -117,17 +117,17 @@ class Search:
         every = [FloatFormat(base, digits, rounding) for digits in range(self.fmt.precision, largest + 1)]
         most = max(fmt.precision for fmt in every if not meets(fmt))
         self.irregular = tuple(digits for digits, ratio in self.tried if ratio <= 1 and digits < most)
-        # a single precision above would be luck
+        # a single precision above could be chance
         self.fmt = FloatFormat(base, most + 1, rounding) if most + 1 < largest else None
 
     @property
     def tried(self) -> tuple[tuple[int, float], ...]:
-        """Each precision tried, and its error over the tolerance."""
+        """Return each precision tried, and its error / tolerance."""
         return tuple(sorted(self._ratios.items()))
 
     @property
     def why(self) -> str:
-        """Why the largest precision below the answer without a number for its error has none."""
+        """Return why, below the answer, the largest precision without a finite error has none."""
         below = math.inf if self.fmt is None else self.fmt.precision
         reasons = [
             f"in {digits} digits {reason}" for digits, reason in sorted(self._why.items()) if reason and digits < below

@@ -1,4 +1,4 @@
-"""The decimal text of numbers, from which their format makes the same numbers again."""
+"""Decimal text of numbers, which their format converts back to the same numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gpbnb.arithmetic.kernels.rules import Rounding
 
 
 def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:
-    """Lay out an array of texts as NumPy lays out numbers, leaving out what NumPy would leave out.
+    """Lay out an array of texts as NumPy lays out numbers, with the same omissions.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: s
     if not shape:
         return entry(0)
     places = np.arange(math.prod(shape)).reshape(shape)
-    np.array2string(places, formatter={"int": entry})  # to see which are shown and how wide they are
+    np.array2string(places, formatter={"int": entry})  # to find which entries are shown and how wide they are
     width = max(map(len, shown.values()), default=0)
     return np.array2string(
         places, separator=separator, prefix=prefix, suffix=")", formatter={"int": entry}, max_line_width=120
@@ -40,7 +40,7 @@ def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: s
 
 
 def decimal_text(m: int, e: int, form: ExactKernel) -> str:
-    """Decimal digits that round to ``m * base**e`` in the format of a kernel: exact in base 10."""
+    """Return decimal digits that round to ``m * base**e`` in the format of a kernel, exact in base 10."""
     if m == 0:
         return "0"
     if form.base == 10:
@@ -48,7 +48,7 @@ def decimal_text(m: int, e: int, form: ExactKernel) -> str:
     else:
         try:
             digits, exponent = _shortened(abs(m), e, form)
-        except OverflowError:  # the decimal exponent has millions of digits to compute
+        except OverflowError:  # otherwise the decimal exponent would have millions of digits
             return f"{integer_text(m)}*{integer_text(form.base)}**{integer_text(e)}"
     digits, exponent = digits.rstrip("0"), exponent + len(digits) - len(digits.rstrip("0"))
     sign = "-" if m < 0 else ""
@@ -64,10 +64,10 @@ def decimal_text(m: int, e: int, form: ExactKernel) -> str:
 
 
 def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int]:
-    """Enough decimal digits to tell ``m * base**e`` from its neighbours in the format.
+    """Return enough decimal digits to distinguish ``m * base**e`` from its neighbours in the format.
 
-    Rounded up when the format chops, so that chopping them gives the number and not the one below. A format that may
-    round a number away from its nearest neighbour gets all digits.
+    If the format chops, the digits are rounded up, so that chopping gives this number and not the one below. For a
+    format that may round to a number other than the nearest, the function returns all digits.
     """
     value = form.to_fraction(m, e)
     if isinstance(form, LimitedKernel) and form.rounding not in (*Rounding.documented(), Rounding.EVEN):

@@ -1,4 +1,4 @@
-"""The algebra behind hung1982, ch. II: sums of errors, and how averaging reduces each kind of error."""
+"""Derive the algebra behind hung1982, ch. II: sums of errors, and how averaging reduces each kind of error."""
 
 from __future__ import annotations
 

@@ -22,11 +22,11 @@ class Draws:
 
     @property
     def deviation(self) -> float:
-        """Root mean square of the errors; its relative standard error is 1 over the root of twice the trials."""
+        """Root mean square of the errors; its relative standard error is one over the square root of 2 · trials."""
         return float(np.sqrt(np.mean(self.errors**2)))
 
     def beyond(self, limit: float) -> float:
-        """Return the fraction of the trials whose total exceeds `limit` in size."""
+        """Return the fraction of trials whose total is larger in size than `limit`."""
         return float(np.mean(np.abs(self.errors) > limit))
 
 
@@ -59,7 +59,7 @@ SAMPLES = 400
 def correlated_means(time: float, correlation_time: float, trials: int, rng: np.random.Generator) -> Floats:
     r"""Simulate means (trials,) of unit noise with an exponential correlation, by the trapezoidal rule.
 
-    The samples are exact; the rule overestimates the variance of the mean by a fraction :math:`(T/(400\tau))^2/12`.
+    The samples are exact. The rule overestimates the variance of the mean by a fraction :math:`(T/(400\tau))^2/12`.
     """
     keep = math.exp(-time / SAMPLES / correlation_time)
     value = rng.standard_normal(trials)

@@ -19,7 +19,7 @@ def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes
 
     Parameters
     ----------
-    printed : number of sources and error of each that the report states; milliarcseconds per year.
+    printed : number of sources and error of each source in the report; milliarcseconds per year.
     totals : two root-sum-squares, in milliarcseconds per year; the first is the goal.
     most : largest number of sources.
     """
@@ -71,7 +71,7 @@ def distribution(result: Draws, ax: Axes) -> list[Artist]:
     for value, style, height, text in (
         (total, "-", 1.3, "root-sum-square"),
         (theory.GOAL, ":", 1.08, "goal"),
-        (worst, "--", 0.7, "sum of all"),
+        (worst, "--", 0.7, "sum of all errors"),
     ):
         colour = REFERENCE if text == "goal" else BLACK
         artists.append(ax.vlines((-value, value), 0, height * top, color=colour, ls=style, lw=1.4))

@@ -44,5 +44,5 @@ def curve(rows: Sequence[tuple[str, int, float]]) -> Table:
         (name, str(count), f"{each:.4f}", f"{each * count**0.5:.4f}", f"{each * count:.3f}")
         for name, count, each in rows
     )
-    header = ("case", "sources", "each (mas)", "root-sum-square (mas)", "all of the same sign (mas)")
+    header = ("case", "sources", "error of each (mas)", "root-sum-square (mas)", "sum if all have the same sign (mas)")
     return Table(f"{len(body)} cases", header, body)

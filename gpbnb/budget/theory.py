@@ -110,7 +110,7 @@ class Source:
 
     @property
     def unforeseen(self) -> tuple[str, ...]:
-        """The methods used that ch. II does not name for such an error."""
+        """The methods in use that ch. II does not name for this kind or form of error."""
         allowed = foreseen(self.kind, self.form)
         return tuple(method for method in METHODS if getattr(self, method) < 1 and method not in allowed)
 
@@ -143,7 +143,7 @@ class Budget:
 
     @cached_property
     def _sums(self) -> dict[str, float]:
-        """By name of a source, the sum over its group."""
+        """Map the name of each source to the sum over its group."""
         return {source.name: total for group in self.groups() for total in (_sum(group),) for source in group}
 
     @cached_property
@@ -197,7 +197,7 @@ def equal_error(total: float, sources: float) -> float:
 
 
 def equal_sources(total: float, each: float) -> float:
-    """Return how many equal, independent errors of size `each` have the root-sum-square `total`; a real number."""
+    """Return the number, not rounded, of equal independent errors of size `each` whose root-sum-square is `total`."""
     if not (total >= 0 and each > 0):
         raise ValueError(f"got a total of {total} from errors of {each}; needed total >= 0 and each > 0")
     return (total / each) ** 2
@@ -207,28 +207,28 @@ def equal_sources(total: float, each: float) -> float:
 
 
 def cycles_factor(cycles: float) -> float:
-    r"""Return the largest fraction of a rotating constant left by a mean over `cycles`: :math:`|\sin\pi c|/(\pi c)`.
+    r"""Return the largest fraction of a cyclic error that remains in a mean over `cycles`: :math:`|\sin\pi c|/(\pi c)`.
 
-    The constant is fixed in the spacecraft and rolls with it, or it repeats with the orbit. A mean over whole cycles
+    The error is a constant that rolls with the spacecraft, or it repeats with the orbit. A mean over whole cycles
     removes it.
     """
     if not cycles >= 0:
         raise ValueError(f"got {cycles} cycles; needed 0 or more")
     if cycles == 0:
         return 1.0
-    # the remainder is exact in float64: sin(pi c) of a large c is not
+    # the remainder is exact in float64; sin(pi c) of a large c is not accurate
     return abs(math.sin(math.pi * math.remainder(cycles, 1.0))) / (math.pi * cycles)
 
 
 def white_factor(readings: float) -> float:
-    r"""Return the fraction of noise that a mean of N independent readings leaves: :math:`1/\sqrt N`."""
+    r"""Return the fraction of noise that remains in a mean of N independent readings: :math:`1/\sqrt N`."""
     if not readings >= 1:
         raise ValueError(f"got {readings} readings; needed 1 or more")
     return 1 / math.sqrt(readings)
 
 
 def correlated_factor(time: float, correlation_time: float) -> float:
-    r"""Return the fraction of noise with the correlation :math:`\mathrm e^{-u/\tau}` that a mean over T leaves.
+    r"""Return the fraction of noise with the correlation :math:`\mathrm e^{-u/\tau}` that remains in a mean over T.
 
     .. math:: \sqrt{2(h - 1 + \mathrm e^{-h})}\,/\,h, \qquad h = T/\tau
 
@@ -371,7 +371,7 @@ _FORMULA = re.compile(r"'*[=+\-@]")
 
 
 def _guarded(text: str) -> str:
-    """Text that no spreadsheet takes for a formula."""
+    """Return text that no spreadsheet mistakes for a formula."""
     return f"'{text}" if _FORMULA.match(text) else text
 
 

@@ -1,4 +1,4 @@
-"""The expressions behind the calculators, taken from the derivations of the chapters; and what is new, derived here."""
+"""The expressions behind the calculators, taken from the chapters' derivations or derived here."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from gpbnb.rounding import derivation as rounding
 Definitions = tuple[Definition, ...]
 
 DAY = 86400
-"""In seconds."""
+"""One day in seconds."""
 
 
 def step(derivation: Derivation, begins: str) -> Step:
-    """Return the one step whose name begins so.
+    """Return the one step whose name starts with `begins`.
 
     Raises
     ------
-    ValueError : there is none, or more than one.
+    ValueError : there is no such step, or more than one.
     """
     found = [each for each in derivation.steps if each.name.startswith(begins)]
     if len(found) != 1:
@@ -35,11 +35,11 @@ def step(derivation: Derivation, begins: str) -> Step:
 
 
 def named(expression: Any, **names: str) -> Any:
-    """Return the expression with all of its symbols, found by their own names, under the names of a calculator.
+    """Rename all symbols of an expression to the names of a calculator.
 
     Raises
     ------
-    ValueError : a symbol is not there, or one that is there has got no name.
+    ValueError : a symbol is not in the expression, or a symbol of the expression gets no new name.
     """
     old = {each.name: each for each in expression.free_symbols}
     if old.keys() != names.keys():
@@ -53,18 +53,18 @@ def _either(nearest: sp.Expr, chopped: sp.Expr) -> sp.Expr:
     return sp.Piecewise((nearest, sp.Eq(symbol("chop"), 0)), (chopped, True))
 
 
-# -- the unit of rounding --------------------------------------------------------------------------
+# -- the unit roundoff -----------------------------------------------------------------------------
 
 
 @cache
 def unit() -> sp.Expr:
-    """Return β of (8) and (13), of b, t and chop."""
+    """Return β of (8) and (13) as a function of b, t and chop."""
     steps = rounding.one_rounding()
     return _either(*(named(step(steps, number).right, b="b", t="t") for number in ("(8)", "(13)")))
 
 
 def chopped() -> Derivation:
-    """The sharper bound of one rounding for chopping, which drops :math:`v b^{e-t}`, v < 1, written as 1/(1 + s)."""
+    """Derive the sharper bound for chopping, which drops :math:`v b^{e-t}` with v = 1/(1 + s) < 1."""
     b, t, e, beta, s = sp.symbols("b t e beta s", positive=True)
     v = 1 / (1 + s)
     return Derivation(
@@ -86,7 +86,7 @@ def chopped() -> Derivation:
 
 @cache
 def rounding_unit() -> Definitions:
-    """β of one rounding, the sharper bound, and n roundings: to first order, then to every order."""
+    """Define β of one rounding, the sharper bound, and the bounds of n roundings to first and to every order."""
     b, t, beta = symbol("b"), symbol("t"), symbol("beta")
     sharper = named(step(rounding.one_rounding(), "sharper").right, b="b", t="t").subs(b ** (1 - t), 2 * beta)
     steps = rounding.roundings()
@@ -104,7 +104,7 @@ def rounding_unit() -> Definitions:
 
 
 def forgotten() -> Derivation:
-    r"""Inputs that a closed loop of norm f < 1 forgets: :math:`\|T_i\| \le f^{k-i}\|u\|`, and no a_i is above a_0."""
+    r"""Derive the effect of a closed loop of norm f < 1, :math:`\|T_i\| \le f^{k-i}\|u\|`, and a_0 ≥ a_i."""
     k, f = sp.Symbol("k", integer=True, positive=True), sp.Symbol("f", positive=True)
     j = sp.Symbol("j", integer=True, nonnegative=True)
     start = kalman.count_start(kalman.ONCE[0], kalman.GROWTH)
@@ -121,9 +121,9 @@ CORRECTED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
     (name, sp.factor(kalman.count_start(c, g)), sp.factor(kalman.second_coefficient(c, d, g, sign)))
     for name, (c, d), g, sign in (
         ("as printed", kalman.TWICE, sp.S.Zero, -1),
-        ("counted once", kalman.ONCE, sp.S.Zero, -1),
-        ("and signs free", kalman.ONCE, sp.S.Zero, 1),
-        ("and errors carried on", kalman.ONCE, kalman.GROWTH, 1),
+        ("roundings counted once", kalman.ONCE, sp.S.Zero, -1),
+        ("and errors of either sign", kalman.ONCE, sp.S.Zero, 1),
+        ("and covariance errors carried on", kalman.ONCE, kalman.GROWTH, 1),
     )
 )
 """The name in ``gpbnb.kalman.report_bounds.CORRECTIONS``, then the coefficients of ‖x‖ and of B."""
@@ -131,7 +131,7 @@ CORRECTED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
 
 @cache
 def kalman_bound() -> Definitions:
-    """(125) as printed, corrected, and with inputs forgotten: coefficients, bound, and digits for a tolerance."""
+    """Define (125) as printed, corrected, and with forgotten inputs: coefficients, bound, digits for a tolerance."""
     f, k, x, u, beta, digits = map(symbol, ("f", "k", "x", "u", "beta", "digits"))
     result = [Definition("beta", unit())]
     pairs = [(named(a, k="k", n="n", m="m"), named(b, k="k", n="n", m="m")) for _, a, b in CORRECTED]
@@ -155,9 +155,9 @@ def kalman_bound() -> Definitions:
 
 @cache
 def across() -> sp.Expr:
-    """Return the drift across a drift of 1 that a least-squares fit finds, of the phase error at the end.
+    """Return the cross drift that a least-squares fit finds for a drift of 1, as a function of the final phase error.
 
-    It is the step of the chapter, with :math:`\\sin\\Delta t` for its first order :math:`\\Delta t`.
+    This is the step of the chapter, with :math:`\\sin\\Delta t` in place of its first order :math:`\\Delta t`.
     """
     fit = step(rolling.fits(), "off-tuned").left
     (k,) = (each for each in fit.function.free_symbols if each.name == "k")
@@ -168,19 +168,19 @@ def across() -> sp.Expr:
 
 @cache
 def strength() -> sp.Expr:
-    """Return what is left at the end of a signal in one dimension, (11), over what there was."""
+    """Return the fraction of a signal in one dimension, (11), that is left at the end."""
     low = sp.Add(*(term for term in step(rolling.one_dimension(), "(10)").right.args if not term.has(rolling.ROLL)))
     return (low / low.subs(rolling.OFF, 0)).subs(rolling.OFF * rolling.TIME, symbol("phase"))
 
 
 def lost() -> Derivation:
-    """The share that is lost, without a difference of numbers that are nearly equal."""
+    """Derive the lost share in a form that does not subtract nearly equal numbers."""
     return Derivation((Step("the share lost", 1 - strength(), 2 * sp.sin(symbol("phase") / 2) ** 2),))
 
 
 @cache
 def off_tuned() -> Definitions:
-    """The error of a roll rate kept in t digits, at worst, and what a deroll with it does to a record."""
+    """Define the worst error of a roll rate stored in t digits, and its effect on a derolled record."""
     period, duration, drift, b, rate, error, phase = map(
         symbol, ("period", "duration", "drift", "b", "rate", "error", "phase")
     )
@@ -202,7 +202,7 @@ def off_tuned() -> Definitions:
 
 @cache
 def random_walk() -> Definitions:
-    """(35), (39) and their quotient."""
+    """Define (35), (39) and their quotient."""
     sigma, omega, rate, mu, walk, exact, printed = map(
         symbol, ("sigma", "omega", "rate", "mu", "walk", "exact", "printed")
     )

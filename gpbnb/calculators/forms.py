@@ -1,4 +1,4 @@
-"""What each calculator asks and shows; and the functions of the chapters that compute the same in Python."""
+"""Inputs and results of each calculator, and the chapters' functions that compute the same results in Python."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Input:
-    """A number that is asked.
+    """A number that the reader enters.
 
     Parameters
     ----------
-    name : in the formulas.
-    label : what a reader calls it, letter and unit included.
-    least, most : what is taken.
-    slider : the same for the slider, which may reach less far; if `log`, it moves in decades.
+    name : its name in the formulas.
+    label : its name for the reader, including letter and unit.
+    least, most : accepted range.
+    slider : range of the slider, which may be smaller; if `log`, the slider moves in decades.
     whole : whether it must be a whole number.
-    choices : names of 0, 1, …, if these are all there is.
-    cure : what to do instead, at the end of the message that refuses a number.
+    choices : names for 0, 1, …, if only these values are accepted.
+    cure : advice at the end of the message that rejects a number.
     """
 
     name: str
@@ -63,13 +63,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: results against one input.
+    """A figure of results against one input.
 
     Parameters
     ----------
     sweep : name of the input.
-    title, axis : of the whole, and of the vertical axis, unit included.
-    curves : names of results and what to call them; vertical axis and that of a `log` input are logarithmic.
+    title, axis : title of the figure, and label of the vertical axis with its unit.
+    curves : names of results and their labels. The vertical axis and the axis of a `log` input are logarithmic.
     """
 
     sweep: str
@@ -80,22 +80,22 @@ class Figure:
 
 @dataclass(frozen=True)
 class Calculator:
-    """A calculator; notebooks show it as HTML.
+    """A calculator, which notebooks display as HTML.
 
     Parameters
     ----------
-    id : unique, of small letters.
-    title : of the form.
-    inputs : their names are those of the definitions.
-    definitions : from :mod:`gpbnb.calculators.derivation`, when needed.
-    columns, lines : of the results; one header more than a line has names.
-    sentence : the result in words, names in braces.
-    figure : what is drawn.
-    examples : label → value of each input as typed; the first is what the form begins with.
+    id : unique name in lower-case letters.
+    title : title of the form.
+    inputs : inputs, with the names that the definitions use.
+    definitions : function that returns the definitions from :mod:`gpbnb.calculators.derivation`.
+    columns, lines : headers and rows of the results; there is one header more than a row has names.
+    sentence : the result in words, with names in braces.
+    figure : the figure.
+    examples : label → value of each input as typed; the form starts with the first example.
     shown : names in the table of examples, and their headers.
-    reference : the same from the chapters' functions in Python.
-    formulas : names whose formulas a reader sees; `letters` has their TeX, and that of what they are made of.
-    missing : name → why there may be no such result.
+    reference : function that computes the results with the chapters' Python functions.
+    formulas : names whose formulas are displayed; `letters` holds the TeX of these names and of the symbols in them.
+    missing : name → why this result may not exist.
     """
 
     id: str
@@ -133,7 +133,7 @@ def _format(given: Values) -> FloatFormat:
     return FloatFormat(int(given["b"]), int(given["t"]), Rounding.CHOP if given["chop"] else Rounding.NEAREST)
 
 
-# -- the unit of rounding --------------------------------------------------------------------------
+# -- the unit roundoff -----------------------------------------------------------------------------
 
 
 def _unit_reference(given: Values) -> dict[str, Any]:
@@ -148,7 +148,7 @@ def _unit_reference(given: Values) -> dict[str, Any]:
 
 ROUNDING = Calculator(
     id="rounding",
-    title="The unit of rounding",
+    title="Unit roundoff",
     inputs=(_BASE, _PLACES, _RULE, Input("n", "Roundings in a row n", 1, 1e12, (1, 1e9), whole=True, log=True)),
     definitions=derivation.rounding_unit,
     columns=("relative error", "at most"),
@@ -158,7 +158,7 @@ ROUNDING = Calculator(
         Line("n roundings, to first order: nβ", ("total",)),
         Line("n roundings, always: γₙ", ("gamma",)),
     ),
-    sentence="One rounding is off by at most β = {beta} of the result, {n} on top of each other by at most {gamma}.",
+    sentence="One rounding is off by at most β = {beta} of the result, {n} in a row by at most {gamma}.",
     figure=Figure(
         "t",
         "Relative error against digits",
@@ -225,7 +225,7 @@ KALMAN = Calculator(
         _BASE,
         _PLACES,
         _RULE,
-        Input("goal", "Error granted, unit of the state", 1e-30, 1e30, (1e-6, 1e6), log=True),
+        Input("goal", "Allowed error, unit of the state", 1e-30, 1e30, (1e-6, 1e6), log=True),
     ),
     definitions=derivation.kalman_bound,
     columns=("(125)", "times β‖xₖ‖", "times β‖u‖", "error", "digits needed"),
@@ -238,14 +238,14 @@ KALMAN = Calculator(
         "k",
         "Bound against steps",
         "error, unit of the state",
-        (*((f"bound{i}", name) for i, name in enumerate(_KALMAN_NAMES, 1)), ("goal", "error granted")),
+        (*((f"bound{i}", name) for i, name in enumerate(_KALMAN_NAMES, 1)), ("goal", "allowed error")),
     ),
     examples={
         "the closing example": {
             "k": "3153600", "n": "10", "m": "2", "x": "1", "u": "1", "f": "1",
             "b": "10", "t": "17", "chop": "to nearest", "goal": "1",
         },
-        "its closed loop forgets": {
+        "the same with a closed loop that forgets": {
             "k": "3153600", "n": "10", "m": "2", "x": "1", "u": "1", "f": "0.999",
             "b": "10", "t": "17", "chop": "to nearest", "goal": "1",
         },
@@ -259,7 +259,7 @@ KALMAN = Calculator(
         },
     },
     shown={
-        "k": "k", "n": "n", "m": "m", "x": "‖xₖ‖", "u": "‖u‖", "f": "‖F‖", "b": "b", "t": "t", "goal": "granted",
+        "k": "k", "n": "n", "m": "m", "x": "‖xₖ‖", "u": "‖u‖", "f": "‖F‖", "b": "b", "t": "t", "goal": "allowed",
         "bound1": "as printed", "digits1": "digits", "bound4": "corrected", "digits4": "digits",
         "bound5": "forgotten", "digits5": "digits",
     },
@@ -300,22 +300,22 @@ DEROLL = Calculator(
         Input("drift", "Drift (mas a year)", 1e-9, 1e9, (1, 10000), log=True),
     ),
     definitions=derivation.off_tuned,
-    columns=("of the roll rate, at worst", ""),
+    columns=("quantity (worst case)", "value"),
     lines=(
         Line("roll rate (rad/s)", ("rate",)),
         Line("its error Δω (rad/s)", ("error",)),
         Line("period of the off-tuned signal, 2π/Δω (years)", ("beat",)),
         Line("phase at the end (rad)", ("phase",)),
-        Line("share of strength lost at the end, one dimension", ("lost",)),
-        Line("drift across, two dimensions (mas a year)", ("across",)),
+        Line("share of the signal lost at the end, one dimension", ("lost",)),
+        Line("cross drift, two dimensions (mas a year)", ("across",)),
     ),
     sentence="The roll rate may be off by {error} rad/s. After {duration} days the phase is off by {phase} rad; in one "
-    "dimension a share of {lost} is lost, in two a drift of {across} mas a year appears across.",
+    "dimension a share of {lost} of the signal is lost; in two, a cross drift of {across} mas a year appears.",
     figure=Figure(
         "t",
-        "Strength lost at the end against places of the register",
+        "Share of the signal lost at the end, against the places of the register",
         "share lost",
-        (("lost", "share of strength lost, one dimension"),),
+        (("lost", "share of the signal lost, one dimension"),),
     ),
     examples={
         "sample calculation 1": {
@@ -324,22 +324,22 @@ DEROLL = Calculator(
         "sample calculation 2": {
             "period": "600", "b": "10", "t": "10", "chop": "to nearest", "duration": "365", "drift": "6600",
         },
-        "as flown, 24 bits": {
+        "roll period as flown, 24 bits": {
             "period": "77.5", "b": "2", "t": "24", "chop": "to nearest", "duration": "365", "drift": "6600",
         },
-        "as flown, IEEE double": {
+        "roll period as flown, IEEE double": {
             "period": "77.5", "b": "2", "t": "53", "chop": "to nearest", "duration": "365", "drift": "6600",
         },
     },
     shown={
         "period": "roll period (s)", "b": "b", "t": "t", "error": "Δω (rad/s)", "beat": "2π/Δω (years)",
-        "phase": "phase (rad)", "lost": "share lost", "across": "drift across (mas a year)",
+        "phase": "phase (rad)", "lost": "share lost", "across": "cross drift (mas a year)",
     },
     reference=_deroll_reference,
     formulas=("rate", "e", "error", "phase", "lost", "across"),
     letters={
         "period": "T_r", "rate": r"\omega_r", "error": r"\Delta\omega", "phase": r"\psi", "duration": "T", "drift": "k",
-        "lost": r"\text{share lost}", "across": r"\text{drift across}", "chop": r"\text{chop}",
+        "lost": r"\text{share lost}", "across": r"\text{cross drift}", "chop": r"\text{chop}",
     },
 )  # fmt: skip
 
@@ -367,14 +367,14 @@ INTEGRATION = Calculator(
         Input("rate", "Iteration rate f (Hz)", 1e-15, 1e15, (1e-3, 1e6), log=True),
     ),
     definitions=derivation.random_walk,
-    columns=("of the integral", ""),
+    columns=("quantity", "value"),
     lines=(
         Line("μ = ω/f", ("mu",)),
         Line("random walk, (35) (u s per √s)", ("exact",)),
         Line("random walk, (39) (u s per √s)", ("printed",)),
-        Line("(39) over (35)", ("ratio",)),
+        Line("(39) / (35)", ("ratio",)),
     ),
-    sentence="The error walks by {exact} u s per √s; (39) says {printed}, which is {ratio} times this.",
+    sentence="The random walk is {exact} u s per √s. Equation (39) gives {printed}, which is {ratio} times as much.",
     figure=Figure(
         "rate",
         "Random walk against iteration rate",
@@ -383,9 +383,9 @@ INTEGRATION = Calculator(
     ),
     examples={
         "fast sampling": {"sigma": "1", "omega": "1", "rate": "100"},
-        "bandwidth and rate alike": {"sigma": "1", "omega": "100", "rate": "100"},
+        "equal bandwidth and rate": {"sigma": "1", "omega": "100", "rate": "100"},
         "slow sampling": {"sigma": "1", "omega": "10000", "rate": "100"},
-        "where (35) as printed has no digit": {"sigma": "1", "omega": "1e-9", "rate": "100"},
+        "where (35) as printed has no correct digit": {"sigma": "1", "omega": "1e-9", "rate": "100"},
     },
     shown={
         "sigma": "σₓ (u)", "omega": "ω (rad/s)", "rate": "f (Hz)", "mu": "μ", "exact": "(35)", "printed": "(39)",

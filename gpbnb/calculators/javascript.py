@@ -1,4 +1,4 @@
-"""Print sympy expressions as JavaScript, and rewrite them first where float64 would lose digits."""
+"""Print SymPy expressions as JavaScript, after rewriting them where float64 would lose digits."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.jscode import JavascriptCodePrinter
 
 MOST_DIGITS = 2000
-"""Where the search of a :class:`Definition` for the smallest whole number ends; it then gives NaN."""
+"""Largest whole number that the search of a :class:`Definition` tries; beyond it, the result is NaN."""
 
 
 @dataclass(frozen=True)
 class Definition:
-    """A name and how it is computed from names before it.
+    """A name, and its computation from earlier names.
 
     Parameters
     ----------
     name : an identifier of JavaScript.
-    expression : of symbols, each an input or defined before; with `smallest`, a condition.
-    smallest : if given, the name stands for the smallest whole number from 1 on that fulfils the condition in the
-        place of this symbol.
-    shown : the formula as a reader sees it, if the expression is one that keeps more digits.
+    expression : expression of symbols that are inputs or defined before; with `smallest`, a condition.
+    smallest : if given, the name stands for the smallest whole number from 1 on that satisfies the condition when
+        substituted for this symbol.
+    shown : the formula for display, if the expression is a rewritten one that keeps more digits.
     """
 
     name: str
@@ -35,12 +35,12 @@ class Definition:
 
 
 def symbol(name: str) -> sp.Symbol:
-    """Return the symbol of an input or a definition: none is negative."""
+    """Return the symbol of an input or a definition, which are never negative."""
     return sp.Symbol(name, nonnegative=True)
 
 
 class _Printer(JavascriptCodePrinter):  # type: ignore[misc]
-    """What sympy's own printer leaves out, or prints with too many digits."""
+    """Printer for expressions that SymPy's own printer does not support or prints with too many digits."""
 
     def _print_Rational(self, expr: sp.Rational) -> str:
         if max(abs(expr.p), expr.q) < 2**53:  # both exact, so that the quotient is the nearest float64
@@ -65,7 +65,7 @@ def print_expression(expression: Any) -> str:
 
     Raises
     ------
-    ValueError : something has no counterpart in JavaScript.
+    ValueError : part of the expression has no counterpart in JavaScript.
     """
     try:
         source = str(_Printer().doprint(sp.sympify(expression).doit()))
@@ -78,11 +78,11 @@ def print_expression(expression: Any) -> str:
 
 
 def print_function(inputs: Sequence[str], definitions: Iterable[Definition]) -> str:
-    """Return a function of JavaScript, from an object with the inputs to one with inputs and definitions.
+    """Return a JavaScript function from an object with the inputs to an object with inputs and definitions.
 
     Raises
     ------
-    ValueError : a name is used before it is defined, or defined twice; and as :func:`print_expression`.
+    ValueError : a name is used before it is defined, or defined twice; or an expression cannot be printed.
     """
     known = list(inputs)
     lines = []
@@ -111,12 +111,12 @@ _CYCLES = {sp.exp: (1, 1, 1, 1), sp.sin: (0, 1, 0, -1), sp.cos: (1, 0, -1, 0)}
 
 
 def taylor(expression: sp.Expr, x: sp.Symbol, terms: int) -> list[Fraction]:
-    """Return the coefficients of x, x³, x⁵, … of an odd function, which may be a quotient that is 0/0 at 0; exact.
+    """Return the exact coefficients of x, x³, x⁵, … of an odd function, which may be a quotient that is 0/0 at 0.
 
     Raises
     ------
-    ValueError : the function is not odd, infinite at 0, or of something else than powers, exp, sin and cos of rational
-        multiples of x.
+    ValueError : the function is not odd, is infinite at 0, or contains anything but powers, exp, sin and cos of
+        rational multiples of x.
     """
     order = 2 * terms + 8
     above, below = (_coefficients(part, x, order) for part in sp.fraction(sp.together(expression)))
@@ -157,7 +157,7 @@ def _coefficients(expression: sp.Expr, x: sp.Symbol, order: int) -> list[Fractio
 
 
 def fraction_coefficients(series: Sequence[Fraction]) -> list[Fraction]:
-    r"""Return the continued fraction of a power series in z, :math:`\cfrac{a_0}{1+\cfrac{a_1z}{1+\dots}}`; exact.
+    r"""Return the exact continued fraction of a power series in z, :math:`\cfrac{a_0}{1+\cfrac{a_1z}{1+\dots}}`.
 
     Raises
     ------
@@ -170,7 +170,7 @@ def fraction_coefficients(series: Sequence[Fraction]) -> list[Fraction]:
         if not first:
             raise ValueError(f"got a series whose fraction ends after {len(result)} terms; needed one that goes on")
         result.append(first)
-        # Of first / (1 + z g), the series of g.
+        # The series of g in first / (1 + z g).
         inverse = [Fraction(1)]
         for k in range(1, len(rest)):
             inverse.append(-sum(inverse[j] * rest[k - j] for j in range(k)) / first)
@@ -179,13 +179,13 @@ def fraction_coefficients(series: Sequence[Fraction]) -> list[Fraction]:
 
 
 def stable(expression: sp.Expr, x: sp.Symbol, up_to: int) -> sp.Expr:
-    """Return an odd function that cancels near 0 as its continued fraction up to a point, and as it stands beyond.
+    """Replace an odd function that cancels near 0 by its continued fraction up to a point; keep it unchanged beyond.
 
-    The fraction is cut where it differs from the function by less than 1e-18 of it at `up_to`.
+    The fraction is truncated where its relative difference from the function is below 1e-18 at `up_to`.
 
     Raises
     ------
-    ValueError : as :func:`taylor` and :func:`fraction_coefficients`; or the fraction converges too slowly.
+    ValueError : :func:`taylor` or :func:`fraction_coefficients` fails, or the fraction converges too slowly.
     """
     first, *others = fraction_coefficients(taylor(expression, x, 30))
     exact = Fraction(str(expression.subs(x, up_to).evalf(40)))

@@ -1,4 +1,4 @@
-"""Write a calculator as HTML: a form, which a script shows, and a table of examples, which needs none."""
+"""Write a calculator as HTML: a form, which a script shows, and a table of examples, which needs no script."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Runtime:
-    """What all calculators of a page share, style and script; shown once, before the first."""
+    """Style and script that all calculators of a page share; shown once, before the first."""
 
     def _repr_html_(self) -> str:
         style, script = ((files(__package__) / f"calculators.{kind}").read_text("utf-8") for kind in ("css", "js"))
@@ -33,7 +33,7 @@ class Runtime:
 
 
 def show(value: Any) -> str:
-    """Write a number with four significant digits, a whole number below a million with all of them."""
+    """Write a number with four significant digits, or with all digits if it is a whole number below a million."""
     if not math.isfinite(value):
         return "—" if math.isnan(value) else "∞"
     if value == int(value) and abs(value) < 1e6:
@@ -59,7 +59,7 @@ def form(calculator: Calculator) -> str:
         "</div>",
         f'<figure class="calculator-figure"><div class="calculator-drawing" role="img" aria-label=""></div>'
         f'<ul class="calculator-legend"></ul><figcaption>{escape(calculator.figure.title)}; '
-        "circles are at your numbers.</figcaption></figure>",
+        "circles mark your numbers.</figcaption></figure>",
         "</form>",
         f'<div class="calculator-scroll">{_examples(calculator)}</div>',
         f"<script>\n{script(calculator)}\n</script>",
@@ -68,7 +68,7 @@ def form(calculator: Calculator) -> str:
 
 
 def script(calculator: Calculator) -> str:
-    """Return the script that brings a form to life, formulas included."""
+    """Return the script that makes a form interactive, including the formulas."""
     spec = {
         "id": calculator.id,
         "inputs": [asdict(each) for each in calculator.inputs],
@@ -143,7 +143,7 @@ def _examples(calculator: Calculator) -> str:
 
 
 class Formulas:
-    """The formulas of a calculator, typeset from the expressions that its script is made of."""
+    """The formulas of a calculator, typeset from the expressions in its script."""
 
     def __init__(self, calculator: Calculator) -> None:
         self.calculator = calculator

@@ -1,4 +1,4 @@
-"""Steps of a derivation that check themselves, and first-order error algebra."""
+"""Derivation steps that check themselves, and first-order error algebra."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ _ORDER = sp.Symbol("h")
 
 
 def errors(count: int, letter: str = "epsilon") -> tuple[sp.Symbol, ...]:
-    """Symbols of relative rounding errors, ε_1 … ε_count."""
+    """Return symbols for relative rounding errors, ε_1 … ε_count."""
     return tuple(sp.symbols(f"{letter}_1:{count + 1}"))
 
 
 def first_order(expression: sp.Expr, eps: Sequence[sp.Symbol]) -> sp.Expr:
-    """The part of `expression` linear in the rounding errors `eps`."""
+    """Return the part of `expression` that is linear in the rounding errors `eps`."""
     scaled = expression.subs({e: _ORDER * e for e in eps}, simultaneous=True)
     return sp.expand(sp.diff(scaled, _ORDER).subs(_ORDER, 0))
 
 
 def unevaluated(expression: sp.Expr) -> sp.Expr:
-    """Keep a factor together, so that a step shows where it comes from."""
+    """Keep a factor unevaluated, so that a step shows its origin."""
     return sp.UnevaluatedExpr(expression)
 
 
 def together(*terms: sp.Expr) -> sp.Expr:
-    """A sum whose terms stay apart, so that a step shows where they come from."""
+    """Return a sum whose terms stay separate, so that a step shows their origin."""
     return sp.Add(*terms, evaluate=False)
 
 
 def over(numerator: sp.Expr, denominator: sp.Expr) -> sp.Expr:
-    """A quotient that is not simplified."""
+    """Return a quotient without simplifying it."""
     return sp.Mul(numerator, sp.Pow(denominator, -1, evaluate=False), evaluate=False)
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step, ``left = right``; or ``left = right + rest >= right``.
+    """One step of a derivation, ``left = right`` or ``left = right + rest >= right``.
 
     Parameters
     ----------
-    name : what the step shows, a few words; ``$...$`` is typeset.
-    left, right : sympy expressions; what is kept unevaluated (UnevaluatedExpr, Sum,
-        Limit) is shown so, and evaluated for the check.
-    rest : an expression that is seen to be nonnegative under the assumptions of its symbols.
+    name : a few words on what the step shows; ``$...$`` is typeset.
+    left, right : sympy expressions. Unevaluated parts (UnevaluatedExpr, Sum, Limit) are displayed
+        unevaluated and evaluated for the check.
+    rest : an expression that SymPy recognizes as nonnegative under the assumptions on its symbols.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Step:
 
     @property
     def holds(self) -> bool:
-        """Whether sympy finds both sides equal, and `rest` nonnegative."""
+        """Whether SymPy finds both sides equal and `rest` nonnegative."""
         return _holds(self.left, self.right, self.rest)
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Derivation:
-    """Steps in order; a notebook shows them as a collapsed list, and fails to show a step that does not hold."""
+    """Steps in order. A notebook displays them as a collapsed list, and raises an error if a step does not hold."""
 
     steps: tuple[Step, ...]
 
@@ -82,14 +82,14 @@ class Derivation:
         return all(step.holds for step in self.steps)
 
     def holds_at(self, *places: int) -> bool:
-        """Whether the steps at some places, counted from 0, hold."""
+        """Whether the steps at the given places, counted from 0, hold."""
         return all(self.steps[place].holds for place in places)
 
     def __repr__(self) -> str:
         return "\n".join(f"{_mark(step)} {step}" for step in self.steps)
 
     def _repr_markdown_(self) -> str:
-        """A collapsed list of the steps.
+        """Return a collapsed list of the steps.
 
         Raises
         ------
@@ -103,14 +103,14 @@ class Derivation:
         return f'<details class="derivation"><summary>SymPy confirms {count}</summary>\n\n{steps}\n\n</details>'
 
 
-@cache  # a chapter, its checks and its tests ask again and again
+@cache  # a chapter, its checks and its tests evaluate the same steps repeatedly
 def _holds(left: sp.Expr, right: sp.Expr, rest: sp.Expr) -> bool:
     difference = (left - right - rest).doit().expand().simplify()
     return bool(difference == 0 and (rest == 0 or rest.is_nonnegative is True))
 
 
 def _latex(expression: sp.Expr) -> str:
-    # Rising powers read better for 1 - kβ, falling ones for n - 1: the shorter is the better.
+    # Rising powers read better for 1 - kβ, falling powers for n - 1. The shorter text is the better one.
     return min((str(sp.latex(expression, order=order)) for order in ("lex", "rev-lex")), key=len)
 
 

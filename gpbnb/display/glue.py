@@ -1,4 +1,4 @@
-"""Numbers that a notebook computes and its prose, or that of another chapter, shows."""
+"""Store numbers that a notebook computes, for display in its own text or in other chapters."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _RECORD = "application/papermill.record/"
 
 
 def glue(name: str, value: Any, display: bool = False) -> None:
-    """Store a value under a name in the notebook, for ``{glue:text}`` of MyST-NB, which need not be installed.
+    """Store a value under a name in the notebook, for MyST-NB's ``{glue:text}``; MyST-NB need not be installed.
 
     A float is stored with six significant digits, because later digits can differ between processors. A whole
     number is stored as it is.
 
     Parameters
     ----------
-    name : by which the prose asks for it.
+    name : the name that the text uses.
     value : a number or a text.
     display : whether to show it below the cell, too.
     """
@@ -31,7 +31,7 @@ def glue(name: str, value: Any, display: bool = False) -> None:
 
 
 def rounded(value: Any) -> Any:
-    """Round a float that is no whole number to six significant digits; anything else stays as it is."""
+    """Round a float that is not a whole number to six significant digits; return anything else unchanged."""
     if not isinstance(value, float):
         return value
     exact = not math.isfinite(value) or value.is_integer()

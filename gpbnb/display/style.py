@@ -3,7 +3,7 @@
 Every figure uses the same three colours: :data:`OBSERVED` for errors that were measured or simulated, :data:`VALID` for
 bounds and formulas that hold, :data:`REFUTED` for printed formulas that fail. Points show observations, a solid line
 a valid formula, a dashed line a refuted one. The background is transparent. In dark mode the style sheet of the book
-inverts the lightness of a picture and keeps its hues, so that a figure needs no second version.
+inverts the lightness of a picture and keeps its hues, so a figure needs no second version.
 """
 
 from __future__ import annotations
@@ -59,25 +59,25 @@ _STYLE: dict[Any, Any] = {
 
 
 def figure(columns: int = 1, height: float = 3.6, rows: int = 1) -> tuple[Figure, NDArray[Any]]:
-    """Start a figure of panels, side by side or one below the other.
+    """Create a figure with panels side by side or one below the other.
 
     Parameters
     ----------
-    columns, rows : number of panels; rows suit a phone better than columns.
-    height : of the whole figure in inches; its width is that of a page of the book.
+    columns, rows : number of panels; rows fit a phone better than columns.
+    height : height of the whole figure in inches; the width is that of a page of the book.
 
     Returns
     -------
     figure, axes : `axes` is an array (rows · columns,), row by row.
     """
-    plt.draw_if_interactive()  # loads the backend: what it sets inside rc_context would be undone
+    plt.draw_if_interactive()  # loads the backend now, because rc_context would undo the settings that it makes
     with plt.rc_context(_STYLE):
         fig, axes = plt.subplots(rows, columns, figsize=(WIDTH, height), squeeze=False)
     return fig, axes.ravel()
 
 
 def colours(count: int, palette: Sequence[str] = COLOURS) -> Sequence[str]:
-    """A colour for each of some curves.
+    """Return a colour for each of `count` curves.
 
     Raises
     ------
@@ -89,7 +89,7 @@ def colours(count: int, palette: Sequence[str] = COLOURS) -> Sequence[str]:
 
 
 def line_styles(count: int, markers: str = MARKERS) -> list[tuple[str, str]]:
-    """Marker and colour of each of some curves; see :func:`colours`."""
+    """Return a marker and a colour for each of `count` curves; see :func:`colours`."""
     return list(zip(markers, colours(count), strict=False))
 
 
@@ -118,8 +118,8 @@ def name(
     Parameters
     ----------
     at : point of the curve, in data coordinates.
-    shift : of the text from that point, in points; the text grows away from the point.
-    options : of :meth:`matplotlib.axes.Axes.annotate`.
+    shift : offset of the text from that point, in typographic points; the text extends away from the curve.
+    options : passed to :meth:`matplotlib.axes.Axes.annotate`.
     """
     across, up = shift
     options.setdefault("ha", "left" if across > 0 else "right" if across < 0 else "center")
@@ -131,11 +131,11 @@ def name(
 def name_ends(ax: Axes, ends: Mapping[str, tuple[float, str]]) -> list[Annotation]:
     """Write names to the right of a panel, each at the height where its curve ends; move colliding names apart.
 
-    Call it last, when scales, limits and axis labels are set.
+    Call this function last, when scales, limits and axis labels are set.
 
     Parameters
     ----------
-    ends : height in data coordinates and colour, for each name.
+    ends : for each name, the height in data coordinates and the colour.
     """
     ax.figure.draw_without_rendering()  # type: ignore[union-attr]
     points = 72 / ax.figure.dpi

@@ -19,11 +19,11 @@ POWER = re.compile(r"(?<![\w.])(\d[\d.]*)e([+-]?\d+)(?!\w)")
 
 @dataclass(frozen=True)
 class Table:
-    """A table that notebooks show as Markdown, math included.
+    """A table that notebooks display as Markdown, with math.
 
     Parameters
     ----------
-    title : its short plain-text form.
+    title : short plain text that stands for the table.
     header, body : cells; prose with math between single dollar signs.
     """
 
@@ -74,13 +74,13 @@ def arithmetic(fmt: FloatFormat | FixedFormat) -> str:
 
 
 def scientific(value: Fraction | float, figures: int) -> str:
-    r"""A number with so many digits and a power of ten, ``$2.5860\times10^{8}$``."""
+    r"""Format a number with `figures` digits and a power of ten, as in ``$2.5860\times10^{8}$``."""
     mantissa, _, power = f"{float(value):.{figures - 1}e}".partition("e")
     return f"${mantissa}\\times10^{{{int(power)}}}$" if int(power) else f"${mantissa}$"
 
 
 def short(value: float, figures: int = 2) -> str:
-    """A number in a cell: plain, or with a power of ten where it is large or small."""
+    """Format a number for a cell: plain, or with a power of ten if it is very large or small."""
     rounded = float(f"{value:.{figures - 1}e}")
     if rounded == 0 or not math.isfinite(value):
         return f"{rounded:g}"

@@ -1,1 +1,1 @@
-"""Measurement geometry: six frames, deroll, and what misalignments do to the drift (hung1982, ch. IV; ch. I)."""
+"""Measurement geometry: six frames, deroll, and how misalignments affect the drift (hung1982, ch. I and IV)."""

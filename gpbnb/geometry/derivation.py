@@ -1,7 +1,7 @@
-r"""The algebra of hung1982, ch. IV, derived again: exact rotations first, small angles second.
+r"""Derive the algebra of hung1982, ch. IV, again: exact rotations first, then small angles.
 
-A set of angles is turned about the axes 3, 2, 1 in this order, :math:`C = R_1 R_2 R_3`; the document does not say
-which order it means. Where it matters, all six are looked at.
+A set of three angles rotates about the axes 3, 2, 1 in this order, :math:`C = R_1 R_2 R_3`. The document does not state
+its order. Where the order matters, all six are examined.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class RollStep(Step):
 
 
 def turn(axis: int, angle: sp.Expr) -> sp.Matrix:
-    """Matrix to a frame turned by `angle` about `axis`, from Rodrigues' formula."""
+    """Return the matrix to a frame rotated by `angle` about `axis`, from Rodrigues' formula."""
     e = sp.zeros(3, 1)
     e[axis - 1] = 1
     cross = sp.Matrix([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
@@ -47,7 +47,7 @@ def turn(axis: int, angle: sp.Expr) -> sp.Matrix:
 
 
 def exact(angles: Sequence[sp.Expr], sequence: Sequence[int] = (3, 2, 1)) -> sp.Matrix:
-    """Matrix to a frame turned by three angles, the first turn of `sequence` on the right."""
+    """Return the matrix to a frame rotated by three angles; the rightmost factor is the first rotation."""
     matrix = sp.eye(3)
     for axis in sequence:
         matrix = turn(axis, angles[axis - 1]) * matrix
@@ -55,20 +55,20 @@ def exact(angles: Sequence[sp.Expr], sequence: Sequence[int] = (3, 2, 1)) -> sp.
 
 
 def printed_small(angles: Sequence[sp.Expr]) -> sp.Matrix:
-    """The small-angle matrix as (1) to (4) print it."""
+    """Return the small-angle matrix as printed in (1) to (4)."""
     a1, a2, a3 = angles
     return sp.Matrix([[1, a3, -a2], [-a3, 1, a1], [a2, -a1, 1]])
 
 
 def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Expr:
-    """`expression` expanded up to products of `order` of the `small` symbols."""
+    """Expand `expression` and keep products of at most `order` of the `small` symbols."""
     scaled = expression.subs({symbol: H * symbol for symbol in small}, simultaneous=True)
     terms = (sp.diff(scaled, H, k).subs(H, 0) / sp.factorial(k) for k in range(order + 1))
     return sp.expand(sum(terms, start=sp.Integer(0)))
 
 
 def orders_agree() -> bool:
-    """Whether every order of turns has the printed matrix as its first order."""
+    """Whether the printed matrix is the first order of the exact one, for every order of rotations."""
     return all(
         (exact(ALPHA, sequence).applyfunc(lambda entry: up_to(1, entry, ALPHA)) - printed_small(ALPHA)).is_zero_matrix
         for sequence in SEQUENCES
@@ -76,7 +76,7 @@ def orders_agree() -> bool:
 
 
 def turns() -> Derivation:
-    """From the exact matrix to the printed one: the entries that (3) and (4) use."""
+    """Derive the printed matrix from the exact one, for the entries that (3) and (4) use."""
     matrix = exact(ALPHA).applyfunc(sp.expand)
     names = {
         (0, 0): "first column, first row: 1",
@@ -96,34 +96,34 @@ def turns() -> Derivation:
 
 
 def star(small: bool = True) -> sp.Matrix:
-    """The star in the telescope frame: (1), with small-angle matrices or exact ones."""
+    """Return the star in the telescope frame, (1), with small-angle or exact matrices."""
     matrix = printed_small if small else exact
     return matrix(BETA) * turn(1, P) * matrix(ALPHA) * E1
 
 
 def spin(small: bool = True) -> sp.Matrix:
-    """The spin axis in the readout frame: (2), with small-angle matrices or exact ones."""
+    """Return the spin axis in the readout frame, (2), with small-angle or exact matrices."""
     matrix = printed_small if small else exact
     return matrix(GAMMA) * matrix(BETA) * turn(1, P) * matrix(THETA) * E1
 
 
 def aligned(vector: sp.Matrix) -> sp.Matrix:
-    """Without misalignments: (1) becomes (3), and (2) becomes (4)."""
+    """Set the misalignments to zero: (1) becomes (3), and (2) becomes (4)."""
     return vector.subs(dict.fromkeys((*BETA, *GAMMA), 0)).applyfunc(sp.expand)
 
 
 def derolled(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """The left sides of (5) and (6)."""
+    """Return the left sides of (5) and (6)."""
     return C * y - S * z, S * y + C * z
 
 
 def printed_estimates(y: sp.Expr, z: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Third and second angle as (8) and (9) print them, the minus of the second moved over."""
+    """Return the third and second angle by (8) and (9) as printed; the minus sign of the second is moved over."""
     return C * y + S * z, -(-S * y + C * z)
 
 
 def deroll() -> Derivation:
-    """(3) to (7): without misalignments the readings, turned back, are the angles."""
+    """Derive (3) to (7): without misalignments, the derolled readings are the angles."""
     t, r = aligned(star()), aligned(spin())
     y, z = r[1] - t[1], r[2] - t[2]
     return Derivation(
@@ -156,12 +156,12 @@ def deroll() -> Derivation:
 
 
 def mean(expression: sp.Expr) -> sp.Expr:
-    """The mean over a roll, not yet evaluated."""
+    """Return the mean over a roll, unevaluated."""
     return over(sp.Integral(expression, (P, 0, 2 * sp.pi)), 2 * sp.pi)
 
 
 def printed_deroll() -> Derivation:
-    """What (8) makes of the aligned telescope's readings: it rolls them once more. (9) does the same with θ."""
+    """Apply (8) to the readings of an aligned telescope: it rolls them a second time, as does (9) with θ."""
     _, y, z = aligned(star())
     third, second = printed_estimates(y, z)
     twice = sp.cos(2 * P), sp.sin(2 * P)
@@ -190,7 +190,7 @@ def printed_deroll() -> Derivation:
 
 
 def fewest_signs() -> tuple[tuple[int, ...], ...]:
-    r"""All smallest sets of the six signs of (8) whose change makes it deroll.
+    r"""Find all smallest sets of the six signs in (8) whose change turns it into a deroll.
 
     The signs are counted as printed: 0, 1 before :math:`\hat\alpha_3, \hat\alpha_2` on the left; 2 to 5 before the
     C, S, S, C of the matrix, row by row.
@@ -213,9 +213,9 @@ def fewest_signs() -> tuple[tuple[int, ...], ...]:
 
 
 def drift_errors(order: int) -> tuple[sp.Expr, sp.Expr]:
-    """Errors of the derolled difference, y and z, up to `order`, with exact rotations; true drift taken off.
+    """Return the errors y, z of the derolled difference up to `order`, for exact rotations, without the true drift.
 
-    The gyro is turned by φ (φ1 = 0) against the absolute frame, so that the matrix of θ is that of α times that of φ.
+    The gyro is rotated by φ (φ1 = 0) against the absolute frame, so the matrix of θ is the product of those of α and φ.
     """
     small = (*ALPHA, *BETA, *GAMMA, *PHI)
     c, s = sp.symbols("c s")  # sympy is slow with sine and cosine
@@ -243,7 +243,7 @@ def drift_errors(order: int) -> tuple[sp.Expr, sp.Expr]:
 
 
 def first_order_effects() -> Derivation:
-    """Misalignments to first order: (1) and (2) with β and γ, turned back as in (5)-(7)."""
+    """Derive the effect of misalignments to first order: (1) and (2) with β and γ, derolled as in (5)-(7)."""
     small = (*ALPHA, *BETA, *GAMMA, *THETA)
     t, r = (vector.applyfunc(lambda e: up_to(1, e, small)) for vector in (star(), spin()))
     drift = {theta: phi + alpha for theta, phi, alpha in zip(THETA, PHI, ALPHA, strict=True)}
@@ -279,7 +279,7 @@ def first_order_effects() -> Derivation:
 
 
 def second_order_effects() -> Derivation:
-    """What is left of the misalignments in the mean over a roll, to second order, with exact rotations."""
+    """Derive the effect of misalignments that survives the mean over a roll, to second order, with exact rotations."""
     errors = drift_errors(2)
     twist = ALPHA[0] + BETA[0] + GAMMA[0]
     return Derivation(
@@ -298,7 +298,7 @@ def second_order_effects() -> Derivation:
 
 
 def one_ring() -> Derivation:
-    """A ring with the normal z_r reads z alone: means over a roll still tell both angles, without β and γ."""
+    """Derive both angles from one ring, which reads only z_r, by means over a roll, without β and γ."""
     small = (*BETA, *GAMMA, *THETA)
     z = up_to(1, spin()[2], small)
     return Derivation(
@@ -313,11 +313,11 @@ def one_ring() -> Derivation:
 
 
 def precessions() -> Derivation:
-    r"""Directions of the two drifts for a polar orbit (Figure I-1).
+    r"""Derive the directions of the two drifts for a polar orbit (Figure I-1).
 
-    The Earth turns about z, the orbit lies in the x-z plane, the star stands at the declination δ and by ε off this
-    plane. Both precessions are those of Schiff: geodetic about the orbit's normal n, motional about the mean over
-    an orbit of :math:`3\hat r(\hat r\cdot\omega) - \omega`.
+    The Earth rotates about z, and the orbit lies in the x-z plane. The star has the declination δ and lies at an angle
+    ε from this plane. Both precessions are those of Schiff. The geodetic one is about the normal n of the orbit, the
+    motional one about the mean over an orbit of :math:`3\hat r(\hat r\cdot\omega) - \omega`.
     """
     u, d, e = sp.symbols("u delta epsilon", real=True)
     w = sp.Symbol("omega_E", positive=True)

@@ -1,4 +1,4 @@
-"""Simulated readings of telescope and gyro over a year, with exact rotations, and the drift derived from them."""
+"""Simulate the readings of telescope and gyro over a year, with exact rotations, and derive the drift from them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Year:
     case : its angles; radians.
     roll_period : seconds; None if the spacecraft does not roll.
     step : seconds between samples.
-    block : number of samples in one mean: the fewest that fill whole rolls.
+    block : number of samples in one mean, the smallest number that fills whole rolls.
     time : (k,), time of the middle of each mean; years.
     phi : (k, 2), means of the derolled difference, as φ2 and φ3; radians.
     first : (j, 2), derolled samples of the first rolls before averaging.
@@ -103,7 +103,7 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
     centre = (count - 1) / 2
     for start, stop in tqdm(_chunks(count, block), desc="a year", disable=not progress, ncols=80):
         index = np.arange(start, stop)
-        # the phase modulo a block, exactly: over a year a float64 phase of 3e5 rolls has lost seven digits
+        # compute the phase modulo a block, exactly: a float64 phase of 3e5 rolls, a year, has lost seven digits
         phase = rate * step * (index % block)
         samples = difference(case, index * (step / YEAR), phase)
         means.append(samples.reshape(-1, block, 2).mean(axis=1))
@@ -144,7 +144,7 @@ def years(
 
 @dataclass(frozen=True)
 class Part:
-    """Error of one reading over a roll, in radians: size of its mean, and amplitude at the roll frequency."""
+    """Error of one reading over a roll, in radians: the size of its mean and its amplitude at the roll frequency."""
 
     mean: float
     turning: float
@@ -159,7 +159,7 @@ def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
     Parameters
     ----------
     case : the angles.
-    years : time since the start, at which angles and drift are taken.
+    years : time since the start at which angles and drift are evaluated.
     samples : number per roll, at least 3.
 
     Raises
@@ -188,7 +188,7 @@ def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
 
 
 def misalignment_cases(size: float) -> dict[str, Case]:
-    """Return cases with one angle of `size` radians, with pairs of angles, and with angles growing by `size` a year."""
+    """Return cases with one angle of `size` radians, pairs of angles, and angles that grow by `size` per year."""
     none = Case()
     single = {name: none.with_angle(name, size) for which in ("alpha", "beta", "gamma") for name in _three(which)}
     pairs = {

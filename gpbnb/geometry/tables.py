@@ -15,11 +15,11 @@ from gpbnb.measurement import ARCSEC, MAS
 
 
 def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
-    """Tabulate the effect of each misalignment in milliarcseconds: from the theory, and the drift also from simulation.
+    """Tabulate the effect of each misalignment in milliarcseconds, from theory; for the drift, also from simulation.
 
     Parameters
     ----------
-    results : from :func:`gpbnb.geometry.experiment.years`: without and with roll, by angle.
+    results : for each angle, the results of :func:`gpbnb.geometry.experiment.years` without and with roll.
     """
     body = []
     for name, (still, rolled) in results.items():
@@ -52,7 +52,7 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
 
     Parameters
     ----------
-    results : from :func:`gpbnb.geometry.experiment.parts`, by angle.
+    results : for each angle, the result of :func:`gpbnb.geometry.experiment.parts`.
     """
     body = tuple(
         (
@@ -63,12 +63,14 @@ def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:
         for name, parts in results.items()
     )
     readings = next(iter(results.values()), {})
-    header = ("angle", *readings, "fate")
-    return Table(f"{len(body)} angles, errors in milliarcseconds: mean; turning with the roll", header, body)
+    header = ("angle", *readings, "outcome")
+    return Table(
+        f"{len(body)} angles, errors in milliarcseconds: mean; oscillation at the roll frequency", header, body
+    )
 
 
 def fate(parts: Mapping[str, Part]) -> str:
-    """Say whether an error stays, averages out, cancels, or is measured; errors below 0.001 mas count as 0."""
+    """State whether an error stays, averages out, cancels, or is measured; errors below 0.001 mas count as 0."""
 
     def seen(radians: float) -> bool:
         return number(radians) != "0"
@@ -86,7 +88,7 @@ def fate(parts: Mapping[str, Part]) -> str:
 def reach(rows: Iterable[tuple[str, float]], allowed: float) -> Table:
     """Tabulate how large each angle may be before its small-angle form causes an error of `allowed` radians."""
     body = tuple((_symbols(name), _two(size / ARCSEC), f"{math.degrees(size):.2g}") for name, size in rows)
-    return Table(f"angles that cost {allowed / MAS:g} milliarcsecond", ("angle", "in arcseconds", "in degrees"), body)
+    return Table(f"angles that cause an error of {allowed / MAS:g} mas", ("angle", "in arcseconds", "in degrees"), body)
 
 
 def number(radians: float) -> str:
@@ -104,7 +106,7 @@ def pair(angles: Sequence[float]) -> str:
 
 
 def _two(value: float) -> str:
-    """Format with two digits; the expansion has no more correct digits at the largest angles."""
+    """Format with two digits, because the expansion has no more correct digits at the largest angles."""
     return f"{float(f'{value:.2g}'):,.0f}"
 
 

@@ -170,7 +170,7 @@ def measured(case: Case, rolling: bool, years: ArrayLike = 0.0, phase: float = 0
 
 
 def standing(beta: ArrayLike, gamma: ArrayLike) -> Floats:
-    """Return the part fixed in the spacecraft: exact readings y, z of gyro minus telescope along the roll axis."""
+    """Return the exact readings y, z of gyro minus telescope for the roll axis, which are fixed in the spacecraft."""
     boresight = rotation(beta)[..., 0]
     return np.asarray((apply(rotation(gamma), boresight) - boresight)[..., 1:])
 
@@ -234,20 +234,20 @@ SINGLE = ("alpha1", "alpha2", "alpha3", "beta1", "beta2", "beta3", "gamma1", "ga
 
 
 def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> Floats:
-    r"""Return the error of φ in a mean over whole rolls if products of small angles are dropped; one angle x alone.
+    r"""Return the error of φ in a mean over whole rolls if products of small angles with one angle x are dropped.
 
-    To third order, with the worse sign of x, the error for rotations about the roll axis, for the other angles β and γ,
-    and for α2 is
+    To third order and for the worse sign of x, the errors are as follows: for rotations about the roll axis, for the
+    other angles β and γ, and for α2,
 
     .. math:: |x|\,|\varphi| + \dots, \qquad \tfrac14 x^2|\varphi|, \qquad
         \tfrac12 x^2|\varphi_2| + \tfrac12|x|\,|\varphi|^2
 
-    each plus the error due to the drift alone, :math:`\varphi^3/6`.
+    To each is added the error due to the drift alone, :math:`\varphi^3/6`.
 
     Parameters
     ----------
     name : one of `SINGLE`.
-    size : (...), size of that angle; radians.
+    size : (...), size of this angle; radians.
     drift : true φ2, φ3; radians.
 
     Returns
@@ -274,7 +274,7 @@ def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (G
 
 
 def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
-    """Return the size of an angle whose :func:`small_angle_loss` is `allowed`; radians, at most half a turn."""
+    """Return the size of an angle whose :func:`small_angle_loss` equals `allowed`, in radians, at most half a turn."""
     if not 0 < allowed < small_angle_loss(name, math.pi, drift):
         raise ValueError(f"got allowed = {allowed}; needed an angle above 0 that half a turn of {name} exceeds")
     low, high = 0.0, math.pi

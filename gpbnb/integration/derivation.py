@@ -1,4 +1,4 @@
-"""The algebra of savage2016, derived again from (1) and (2); and what each slip of the print would have led to.
+"""Derive the algebra of savage2016 again from (1) and (2), and the consequence that each misprint would have.
 
 Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\\infty} = \\sigma_x^2`.
 """
@@ -29,17 +29,17 @@ DECAY = sp.exp(-OMEGA * T)
 
 @cache
 def transition_matrix() -> sp.ImmutableMatrix:
-    """The matrix exponential of A T, from (4) alone."""
+    """Return the matrix exponential of A T, from (4) alone."""
     return sp.ImmutableMatrix((sp.Matrix([[-OMEGA, 0], [1, 0]]) * T).exp().applyfunc(sp.simplify))
 
 
 def printed_transition() -> sp.Matrix:
-    """(7)."""
+    """Return the matrix as printed in (7)."""
     return sp.Matrix([[DECAY, 0], [(1 - DECAY) / OMEGA, 1]])
 
 
 def transition_residual(identity: bool) -> sp.Matrix:
-    r"""(7) less :math:`\int_0^T A\Phi\,d\tau`, the right side of (6); and less the identity that (6) lacks."""
+    r"""Return (7) minus :math:`\int_0^T A\Phi\,d\tau`, the right side of (6), and minus the identity that (6) omits."""
     a = sp.Matrix([[-OMEGA, 0], [1, 0]])
     integrand = (a * printed_transition()).subs(T, TAU)
     integral = integrand.applyfunc(lambda entry: sp.integrate(entry, (TAU, 0, T)))
@@ -47,7 +47,7 @@ def transition_residual(identity: bool) -> sp.Matrix:
 
 
 def transition() -> Derivation:
-    """From (6), with the identity that it lacks, to (7) and (9)."""
+    """Derive (7) and (9) from (6), with the identity that (6) omits."""
     ours = transition_matrix()
     integral = sp.Integral(sp.exp(-OMEGA * TAU), (TAU, 0, T))
     return Derivation(
@@ -65,7 +65,7 @@ def transition() -> Derivation:
 
 @cache
 def noise(kernel: str = "right") -> sp.ImmutableMatrix:
-    r"""Covariance of q_n of (6), from white noise of density :math:`N = 2\omega P`.
+    r"""Return the covariance of q_n in (6), from white noise of density :math:`N = 2\omega P`.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def noise(kernel: str = "right") -> sp.ImmutableMatrix:
 
 
 def discretization() -> Derivation:
-    r"""The joint covariance of process and integral over a cycle, which the document does not need."""
+    r"""Derive the joint covariance of process and integral over a cycle, which the document does not need."""
     q = noise()
     lost = 1 - DECAY
     kernel = (1 - sp.exp(-OMEGA * TAU)) / OMEGA
@@ -110,7 +110,7 @@ def discretization() -> Derivation:
 
 
 def expected(expression: sp.Expr) -> sp.Expr:
-    """Expected value of a product of states before a step and noises of the step; noises are new in every step."""
+    """Return the expected value of a product of states before a step and noises of this step, which are independent."""
     moments = {
         (2, 0, 0, 0, 0): P11,
         (1, 1, 0, 0, 0): P12,
@@ -127,13 +127,13 @@ def expected(expression: sp.Expr) -> sp.Expr:
 
 
 def after() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """The states after a step, (10)."""
+    """Return the states after a step, (10)."""
     x1 = PHI11 * X1 + Q1
     return x1, X2 + PHI21 * X1 + Q2, X3 + (x1 + X1) * T / 2
 
 
 def printed_18(half: bool) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """P31, P32 and P33 after a step as in (18), the last term of P32 with the half that it lacks, or as printed."""
+    """Return P31, P32 and P33 after a step by (18), as printed or with the missing 1/2 in the last term of P32."""
     weight = sp.Rational(1, 2) if half else sp.Integer(1)
     quarter = sp.Rational(1, 4)
     return (
@@ -144,7 +144,7 @@ def printed_18(half: bool) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 
 
 def covariances() -> Derivation:
-    """(16)-(18): products of (10), expected values, and what is left."""
+    """Derive (16)-(18): products of (10), expected values, and the remaining terms."""
     x1, x2, x3 = after()
     printed = printed_18(half=True)
     names = (
@@ -164,23 +164,23 @@ def covariances() -> Derivation:
 
 
 def p12(t: sp.Expr) -> sp.Expr:
-    """P12 of (23) at the time t."""
+    """Return P12 of (23) at the time t."""
     return P * (1 - sp.exp(-OMEGA * t)) / OMEGA
 
 
 def p22(t: sp.Expr) -> sp.Expr:
-    """P22 of (23) at the time t."""
+    """Return P22 of (23) at the time t."""
     return 2 * P / OMEGA * (t - (1 - sp.exp(-OMEGA * t)) / OMEGA)
 
 
 def p22_change(printed: bool) -> sp.Expr:
-    r"""(25) less :math:`P_{22_{n-1}}`, t = t_{n-1}; as printed it lacks a factor :math:`1/\omega`."""
+    r"""Return (25) minus :math:`P_{22_{n-1}}`, t = t_{n-1}; as printed it lacks a factor :math:`1/\omega`."""
     factor = 1 if printed else 1 / OMEGA
     return 2 * P / OMEGA * (T - factor * (1 - DECAY) * sp.exp(-OMEGA * TIME))
 
 
 def continuous() -> Derivation:
-    """(19)-(25): the covariance equation in components, and its solution from zero."""
+    """Derive (19)-(25): the covariance equation in components, and its solution from zero."""
     a = sp.Matrix([[-OMEGA, 0], [1, 0]])
     covariance = sp.Matrix([[P11, P12], [P12, P22]])
     density = sp.Symbol("N_P11")
@@ -206,7 +206,7 @@ def continuous() -> Derivation:
 
 
 def steady_changes(half: bool = True) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
-    """ΔP32, ΔP33 and ΔP22 of (32) from (18) and (25) for large n."""
+    """Return ΔP32, ΔP33 and ΔP22 of (32), from (18) and (25) for large n."""
     p31 = P * T / 2 * (1 + DECAY) / (1 - DECAY)
     steady = {P11: P, P11N: P, P12: P / OMEGA, P12N: P / OMEGA, P31: p31, PHI11: DECAY, PHI21: (1 - DECAY) / OMEGA}
     _, second, third = printed_18(half)
@@ -214,12 +214,12 @@ def steady_changes(half: bool = True) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
 
 
 def walk() -> sp.Expr:
-    """(35) squared, over P T, in μ."""
+    """Return the square of (35), divided by P T, as a function of μ."""
     return (1 + sp.exp(-MU)) / (1 - sp.exp(-MU)) - 2 / MU
 
 
 def steady_state() -> Derivation:
-    """(30)-(35), each as printed."""
+    """Derive (30)-(35), each as printed."""
     quotient = (1 + DECAY) / (1 - DECAY)
     phi21 = (1 - DECAY) / OMEGA
     p31 = P * T / 2 * quotient
@@ -247,11 +247,11 @@ def steady_state() -> Derivation:
 
 
 def independent() -> Derivation:
-    r"""The same from the errors of single cycles, without (10)-(34).
+    r"""Derive (35) from the errors of single cycles, without (10)-(34).
 
-    With :math:`R(\tau) = Pe^{-\omega|\tau|}`, the error of one cycle has the variance r_0; the error that follows k
-    cycles later has the covariance :math:`r_1e^{-\omega(k-1)T}` with it; and the variance of the sum grows by
-    :math:`r_0 + 2r_1 + 2r_2 + \dots` in a cycle.
+    With :math:`R(\tau) = Pe^{-\omega|\tau|}`, the error of one cycle has the variance r_0. Its covariance with the
+    error k cycles later is :math:`r_k = r_1e^{-\omega(k-1)T}`. The variance of the sum therefore grows by
+    :math:`r_0 + 2r_1 + 2r_2 + \dots` per cycle.
     """
     s = sp.Symbol("s", positive=True)
     along = sp.Integral(P * sp.exp(-OMEGA * TAU), (TAU, 0, T))
@@ -282,7 +282,7 @@ def independent() -> Derivation:
 
 
 def transient() -> Derivation:
-    r"""The variance at every n, for an input in its steady state; L is the Langevin function, φ is :math:`e^{-\mu}`."""
+    r"""Derive the variance at every n for an input in its steady state, with Langevin's L and :math:`φ = e^{-\mu}`."""
     pee = N * L - L**2 / 2 * (1 - PHI**N)
     c = L / 2 * (1 - PHI**N)
     g = (1 - PHI) * L / 2
@@ -314,7 +314,7 @@ def transient() -> Derivation:
 
 
 def expansion(terms: int) -> list[sp.Expr]:
-    """Coefficients of μ⁻¹ … of the walk, from power series of e^{-μ} alone: the first `terms` from μ¹ on."""
+    """Return coefficients of the walk from μ⁻¹ on, by power series of e^{-μ}, with `terms` of them from μ¹ on."""
     order = terms + 3
     numerator = [sp.Rational((-1) ** k, sp.factorial(k)) + int(k == 0) for k in range(order)]
     denominator = [-sp.Rational((-1) ** (k + 1), sp.factorial(k + 1)) for k in range(order)]
@@ -327,14 +327,14 @@ def expansion(terms: int) -> list[sp.Expr]:
 
 
 def printed_37(cubic: sp.Expr) -> sp.Expr:
-    r"""The walk from the quotient in (37), its numerator :math:`1-\frac12\mu+\frac14\mu^2-c\mu^3`, to order μ²."""
+    r"""Return the walk to order μ² from (37) with the numerator :math:`1-\frac12\mu+\frac14\mu^2-c\mu^3`."""
     numerator = 1 - MU / 2 + MU**2 / 4 - cubic * MU**3
     denominator = 1 - MU / 2 + MU**2 / 6 - MU**3 / 24
     return sp.series(2 / MU * (numerator / denominator - 1), MU, 0, 3).removeO()
 
 
 def small_mu() -> Derivation:
-    """(36)-(39), term by term."""
+    """Derive (36)-(39), term by term."""
     cubic = 1 - MU + MU**2 / 2 - MU**3 / 6
     sigma, f = sp.symbols("sigma_x f_c", positive=True)
     return Derivation(
@@ -360,10 +360,10 @@ def small_mu() -> Derivation:
 
 
 def misprints() -> dict[str, sp.Expr]:
-    """The steady-state rate, over P T, in μ, had the print been used: 0 where the document uses it and is right.
+    """Return, as a function of μ, the steady-state rate over P T that each misprint would give.
 
-    "(12)": without P22, of which the print takes the square of a mean. "(18)": with the full last term of P32. "(25)":
-    large n. "(34)": without T, taken in seconds as 1. "(37)": its expansion to μ².
+    "(12)" omits P22, for which the print has the square of a mean. "(18)" has the full last term of P32. "(25)" is
+    taken for large n. "(34)" omits T, which is set to 1 s. "(37)" is expanded to μ².
     """
     d32, d33, d22 = steady_changes()
     wrong32 = steady_changes(half=False)[0]

@@ -1,4 +1,4 @@
-"""Simulations: integrals that are exact at the sampling times, and integrators run in t-digit arithmetic."""
+"""Simulate integrals that are exact at the sampling times, and run integrators in t-digit arithmetic."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from gpbnb.integration.theory import Process, Rule, Step
 
 Floats = NDArray[np.float64]
 
-CHUNK = 1 << 20  # normal numbers held at a time
-BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # of progress: on a terminal, after two seconds
+CHUNK = 1 << 20  # normal numbers in memory at a time
+BAR: dict[str, Any] = {"disable": None, "delay": 2, "leave": False}  # progress bar: on a terminal, after two seconds
 
 # -- how exactly the closed form is evaluated -----------------------------------------------------
 
@@ -124,8 +124,8 @@ def advance(step: Step, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
     Parameters
     ----------
     step : from ``exact_step``.
-    state : (paths, m), at the start; at the end afterwards.
-    normal : (cycles, paths, m + 1).
+    state : (paths, m), at the start; overwritten with the state at the end.
+    normal : (cycles, paths, m + 1), standard normal numbers.
 
     Returns
     -------
@@ -433,7 +433,7 @@ def emulate(
 
 @dataclass(frozen=True)
 class RateSweep:
-    """Both errors over the iteration rate, in several formats: what was observed, (formats, rates)."""
+    """Both observed errors against the iteration rate in several formats, (formats, rates)."""
 
     omega_bw: float
     duration: float
@@ -446,21 +446,21 @@ class RateSweep:
 
     @property
     def standard_error(self) -> float:
-        r"""Relative, of a rounding error's rms over the paths.
+        r"""Relative standard error of the rms of a rounding error over the paths.
 
-        Given its path an error is normal, with a variance V that goes with :math:`\int x_3^2dt`. For a random walk
-        :math:`E(V^2) = \frac73E(V)^2`, so that the mean square has the relative variance
+        For a given path the error is normal, with a variance V proportional to :math:`\int x_3^2dt`. For a random walk,
+        :math:`E(V^2) = \frac73E(V)^2`, so the mean square has the relative variance
         :math:`(3\cdot\frac73-1)/\mathrm{paths}`.
         """
         return math.sqrt(6 / self.paths) / 2
 
     def theory(self, fmt: FloatFormat, rates: Floats) -> Floats:
-        """Discretization, rounding and total as they may be; (3, rates)."""
+        """Return the theoretical discretization, rounding and total errors, (3, rates)."""
         found = [theory.two_errors(1.0, self.omega_bw, f, self.duration, fmt) for f in rates.tolist()]
         return np.array([(e.discretization, e.rounding, e.total) for e in found]).T
 
     def ratios(self) -> Floats:
-        """Observed over theoretical rounding error, (formats, rates)."""
+        """Return observed / theoretical rounding error, (formats, rates)."""
         expected = np.array([self.theory(fmt, self.rates)[1] for fmt in self.formats])
         return np.asarray(self.rounding / expected)
 
@@ -473,7 +473,7 @@ def sweep_rates(
     rng: np.random.Generator,
     paths: int = 64,
 ) -> RateSweep:
-    """Emulate an integrator over iteration rates and formats; rates are powers of two, so that T/2 is exact."""
+    """Emulate an integrator at several rates in several formats; rates are powers of two, so that T/2 is exact."""
     bar = tqdm(rates, desc="rates", **BAR)
     runs = [emulate(omega_bw, f_c, duration, formats, rng, paths) for f_c in bar]
     table = np.array([[(*run.rms, run.rms_total) for run in at_rate] for at_rate in runs]).transpose(2, 1, 0)

@@ -206,7 +206,7 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
     loglog(ax)
     low = float(min(np.sqrt(run.variance).min() for run in runs)) / unit
     ax.set_ylim(low / 3, 10 ** np.ceil(np.log10(np.sqrt(walk[-1])) + 0.3))
-    title = rf"$\mu = {mu:g}$; green: theory; dashed: random walk alone"
+    title = rf"$\mu = {mu:g}$; green: theory; dashed: random walk only"
     label(ax, "cycles $n$", r"rms error ($\sigma_xT$)", title)
     return artists
 
@@ -223,7 +223,7 @@ def rules_first_order(rules: Sequence[str], ax: Axes) -> list[Artist]:
         artists.append(write(ax, rule, (mu[15 * k], 1.45), colour, (0, 0), ha="left"))
     best = [theory.best_possible_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
     bound = np.sqrt(np.array(best) / least)
-    artists += ax.plot(mu, bound, color=BLACK, ls=":", label="scaled samples (bound)")
+    artists += ax.plot(mu, bound, color=BLACK, ls=":", label="scaled samples (lower bound)")
     artists.append(write(ax, "scaled samples", (mu[45], bound[45]), BLACK, (-6, -4)))
     ax.set_xscale("log")
     ax.set_ylim(0, 1.6)
@@ -338,7 +338,7 @@ def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequ
 
 
 def needed_bits(omega_bw: float, durations: Mapping[str, float], rates: Sequence[float], ax: Axes) -> list[Artist]:
-    """Draw the bits for which rounding is a tenth of the discretization error, against the rate, for durations in s."""
+    """Draw the bits at which the rounding error is a tenth of the discretization error, for durations in s."""
     ends: list[float] = []
     artists: list[Artist] = []
     for (duration, seconds), colour in zip(durations.items(), colours(len(durations), SERIES), strict=True):

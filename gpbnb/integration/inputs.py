@@ -29,8 +29,8 @@ from gpbnb.integration.walk import discretize, walk_factor
 class Process:
     r"""A stationary Gaussian input with mean zero, :math:`R(\tau) = \sigma_x^2\,\mathrm{Re}\sum_j c_je^{-p_j|\tau|}`.
 
-    Made by :func:`first_order` and :func:`resonant`. `drift` is the matrix F of :math:`\dot z = Fz + w`, whose steady
-    state has the covariance :math:`\sigma_x^2 I`; the input is the first entry of z.
+    :func:`first_order` and :func:`resonant` create processes. `drift` is the matrix F of :math:`\dot z = Fz + w`, whose
+    steady state has the covariance :math:`\sigma_x^2 I`; the input is the first entry of z.
     """
 
     name: str
@@ -79,8 +79,8 @@ def resonant(sigma_x: float, omega_0: float, zeta: float) -> Process:
 class Step(NamedTuple):
     r"""One cycle of a process and of the error of the trapezoidal rule: :math:`(z_n, d_n) = A z_{n-1} + Bw`.
 
-    w are m + 1 independent standard normal numbers, A is (m + 1, m) and B (m + 1, m + 1), lower triangular; d is in
-    the units of x times seconds.
+    w holds m + 1 independent standard normal numbers. A is (m + 1, m), and B is (m + 1, m + 1) and lower triangular.
+    d has the unit of x times seconds.
     """
 
     a: NDArray[np.float64]
@@ -112,7 +112,8 @@ def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
 
     With T as the unit of time, :math:`\Phi = e^F` and :math:`\sigma_x = 1`, the steady state gives
     :math:`E(zz^T) = I`, :math:`E(zy) = F^{-1}(\Phi - I)\,e_1`, :math:`E(y^2) = 2e_1^TF^{-2}(\Phi - I - F)\,e_1`;
-    what the state before explains is subtracted. Nothing grows with T; for small T all cancels, hence the digits.
+    the part that follows from the previous state is subtracted. Nothing grows with T. For small T all terms cancel,
+    which is why many digits are used.
     """
     m = len(process.drift)
     small = max(1.0, 1 / (max(abs(p) for p in process.poles) * period))
@@ -243,7 +244,7 @@ def folded(process: Process, period: float, theta: Fraction = Fraction(0)) -> fl
     mu = max(abs(p) for p in process.poles) * period
     total = mpmath.mpf(0)
     with mpmath.workdps(30 + 8 * max(1, math.ceil(abs(math.log10(mu)) + 1))):
-        # The weights rounded to float64 would not cancel; of a resonance they follow from the drift.
+        # Weights rounded to float64 would not cancel; for a resonance, exact ones follow from the drift.
         for c, p in _exact_modes(process):
             z = p * mpmath.mpf(period)
             if theta == 0:

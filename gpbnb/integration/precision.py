@@ -78,10 +78,10 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
 
     - the errors of the additions to the accumulator, whose variance grows as (23); their mean square is that of a
       spacing u of the accumulator, :math:`u^2F/12`;
-    - the effect of ties in an even base: one addition in u over the spacing of the increment is a tie, and rounding
-      half away from zero moves it outwards, by :math:`\kappa_1E|p|` on average. The sum has the rms
-      :math:`\kappa_1\sigma_xt\sqrt{(1+\varphi)/2\pi}`, where 1/2 is the mean square of the difference between the
-      fractions of time that a random walk spends on either side of zero;
+    - the effect of ties in an even base: a tie occurs once in u / (spacing of the increment) additions, and rounding
+      half away from zero moves it outwards, by :math:`\kappa_1E|p|` on average. The sum of these effects has
+      the rms :math:`\kappa_1\sigma_xt\sqrt{(1+\varphi)/2\pi}`. Here 1/2 is the mean square of the difference between
+      the fractions of time that a random walk spends above and below zero;
     - the roundings of sample, sum and product, each with the mean square :math:`\kappa` relative to its result.
 
     T/2 is treated as exact: its rounding changes the integral by a fraction that does not depend on the rate.
@@ -104,7 +104,7 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
         raise ValueError(f"got a duration of {n:.3g} cycles; needed at least 2")
     discretization = sigma_x * period * math.sqrt(float(error_variance(n, mu)))
     phi = math.exp(-mu)
-    excess = mu / 2 / math.tanh(mu / 2)  # of the digital integral's variance over that of the true one
+    excess = mu / 2 / math.tanh(mu / 2)  # variance of the digital integral over that of the true integral
     share = mean_chopping(fmt)
     if fmt.rounding is Rounding.CHOP:
         leak = share * n
@@ -124,7 +124,7 @@ def _addition(spread: Floats, change: float, fmt: FloatFormat) -> Floats:
     """Mean square error, F included, of adding to normal accumulators of the standard deviations `spread`."""
     b = float(fmt.base)
     top = np.floor(np.log(spread * 8) / math.log(b)) + 1
-    # Sixteen octaves down from 8 standard deviations: what is below adds less than 2**-36 of the whole.
+    # Sixteen octaves down from 8 standard deviations; smaller values add less than 2**-36 of the whole.
     e = top - np.arange(math.ceil(16 / math.log2(b)) + 1)[:, np.newaxis]
     spacing = b ** (e - fmt.precision)
     within = erf(b**e / (spread * math.sqrt(2)))

@@ -69,7 +69,7 @@ def misprints(mu: float = 0.1, period: float = 0.01) -> Table:
         value = float(rate.subs({derivation.MU: mu, derivation.T: period}))
         spoiled = "no" if math.isclose(value, right, rel_tol=1e-9) else "yes"
         body.append((place, f"{value:.5g}", f"{right:.5g}", spoiled))
-    header = ("misprint in", f"result if used, over $\\sigma_x^2T$, $\\mu = {mu:g}$", "correct", "changes (35)")
+    header = ("misprint in", f"result as printed / ($\\sigma_x^2T$), at $\\mu = {mu:g}$", "correct", "affects (35)")
     return Table(f"{len(body)} misprints", header, tuple(body))
 
 
@@ -95,5 +95,12 @@ def design(omega_bw: float, duration: float, precisions: Sequence[int], base: in
                     f"{errors.rounding:.2g}",
                 )
             )
-    header = ("format", "rounding", "best $f_c$, Hz", "closed form, Hz", "discretization, s", "rounding, s")
+    header = (
+        "format",
+        "rounding",
+        "best $f_c$, Hz",
+        "best $f_c$ by closed form, Hz",
+        "discretization error, s",
+        "rounding error, s",
+    )
     return Table(f"{len(body)} formats", header, tuple(body))

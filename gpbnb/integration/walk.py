@@ -161,7 +161,7 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
     sigma_x, omega_bw, limit = (
         positive_number(name, value) for name, value in (("sigma_x", sigma_x), ("omega_bw", omega_bw), ("limit", limit))
     )
-    # L ≤ min(μ/6, 1), so that either law alone gives a rate that is high enough.
+    # L ≤ min(μ/6, 1), so either law alone gives a rate that is high enough.
     high = max(sigma_x * math.sqrt(omega_bw / 6) / limit, 1e-300)
     high = min(high, (sigma_x / limit) ** 2) * 2
     low = high

@@ -11,7 +11,7 @@ from gpbnb.inversion import experiment, stored
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(prog="python -m gpbnb.inversion", description=__doc__)
     parser.add_argument("sweeps", nargs="*", default=list(experiment.SWEEPS), help="variants, random; both by default")
     parser.add_argument("--folder", type=Path, default=Path(".cache/inversion"), help="where to write")

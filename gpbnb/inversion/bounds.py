@@ -2,15 +2,15 @@ r"""Proved bounds on the error of a computed inverse, from a priori to a posteri
 
 Each function bounds :math:`\|X - A^{-1}\|` in the column-sum norm (22), where X is the inverse of the t-digit matrix A
 as :func:`gpbnb.arithmetic.linalg.inv` computes it. It returns a float64 above the value of its formula, and raises
-ValueError where it proves nothing. :mod:`gpbnb.inversion.costs` compares sharpness and cost. The bounds use:
+ValueError if no bound can be proved. :mod:`gpbnb.inversion.costs` compares sharpness and cost. The bounds use:
 
 ============================  =========================================================================
 bound                         uses
 ============================  =========================================================================
-:func:`wilkinson`             the largest numbers that occurred
+:func:`wilkinson`             the largest numbers that occur
 :func:`higham`                the computed factors
-:func:`higham_probabilistic`  the same; may fail with a stated probability, if roundings are random
-:func:`rule_of_thumb`         the same, with the root of the count of roundings; proves nothing
+:func:`higham_probabilistic`  the same; may fail with a stated probability if rounding errors are random
+:func:`rule_of_thumb`         the same, with the square root of the number of roundings; not a bound
 :func:`ball`                  a second inversion of A, in ball arithmetic
 :func:`a_posteriori`          the residual of X, in ball arithmetic of more bits
 ============================  =========================================================================
@@ -44,12 +44,12 @@ def wilkinson(factors: LU, x: FloatArray) -> float:
     .. math:: \|X - A^{-1}\| \le \|X\|\,\frac{g}{1-g}, \qquad
         g = \gamma_{3n}\,n\,l\,n\,u\,\|X\|
 
-    with l and u the largest sizes of entries of the factors; with partial pivoting l = 1. A product :math:`n l\,n u`
-    bounds :math:`\||L||U|\|`.
+    where l and u are the largest sizes of entries in the factors; l = 1 with partial pivoting. The product
+    :math:`n l\,n u` bounds :math:`\||L||U|\|`.
 
     Parameters
     ----------
-    factors : what :func:`gpbnb.arithmetic.linalg.lu` made of A.
+    factors : the factors of A from :func:`gpbnb.arithmetic.linalg.lu`.
     x : (n, n), the computed inverse.
 
     Raises
@@ -91,10 +91,10 @@ def higham(factors: LU, x: FloatArray) -> float:
 
 
 def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> float:
-    r"""The same with :math:`3\tilde\gamma_n + \tilde\gamma_n^2` for :math:`\gamma_{3n}`, of size √n β.
+    r"""Bound as :func:`higham`, with :math:`3\tilde\gamma_n + \tilde\gamma_n^2`, about √n β, for :math:`\gamma_{3n}`.
 
-    Exceeded with at most the probability `failure` if the roundings are independent with mean zero: each of the
-    3n³ products in the n² inner products of the factors and the 2n² of the solutions may take its share.
+    If rounding errors are independent with mean zero, the bound fails at most with the probability `failure`. This
+    probability is shared equally by the 3n³ products in the inner products, n² of the factors and 2n² of the solutions.
 
     Raises
     ------
@@ -114,11 +114,11 @@ def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> f
 
 
 def rule_of_thumb(factors: LU, x: FloatArray) -> float:
-    r"""The same with :math:`\sqrt{3n}\,\beta` for :math:`\gamma_{3n}`: what is to be expected, and no bound.
+    r"""Estimate as in :func:`higham`, with :math:`\sqrt{3n}\,\beta` in place of :math:`\gamma_{3n}`; not a bound.
 
     References
     ----------
-    Wilkinson 1961, who puts the root in place of the count.
+    Wilkinson 1961, who uses the square root in place of the count.
     """
     return _from_factors(factors, x, math.sqrt(3 * len(x)) * float(x.format.unit_roundoff))
 
@@ -137,7 +137,7 @@ def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
 
 
 def _solved(first: float, ratio: float, n: int) -> float:
-    """First over 1 - ratio, rounded up: no number here has seen more than 8n roundings of float64."""
+    """Return first / (1 - ratio), rounded up; no number here has passed through more than 8n roundings of float64."""
     slack = 1 + 16 * n * 2.0**-53
     if not ratio * slack < 1:
         raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more digits.")
@@ -154,13 +154,13 @@ def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None =
     ----------
     a : (n, n), a FloatArray, or exact numbers.
     x : (n, n), its computed inverse, or any other guess of it.
-    preconditioned : A is first multiplied by an approximate inverse, in sums of products that are rounded once, so that
-        elimination starts near the identity; else elimination with partial pivoting of A itself.
-    bits : of the balls' midpoints; by default as many as the format has.
+    preconditioned : whether to multiply A first by an approximate inverse, in sums of products that are rounded once,
+        so that elimination starts near the identity; otherwise A itself is eliminated with partial pivoting.
+    bits : precision of the balls' midpoints; by default that of the format.
 
     Raises
     ------
-    ValueError : the balls are too wide to tell A from a singular matrix.
+    ValueError : the balls are too wide to distinguish A from a singular matrix.
 
     References
     ----------
@@ -184,17 +184,17 @@ def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
     .. math:: R = I - AX, \qquad A^{-1} - X = XR\,(I - R)^{-1}, \qquad
         \|X - A^{-1}\| \le \frac{\|XR\|}{1 - \|R\|}
 
-    Every number is a ball, and the radii go into the bound: it holds whatever computed X.
+    Every number is a ball, and the bound includes the radii, so it holds for any X, however X was computed.
 
     Parameters
     ----------
     a : (n, n), a FloatArray, or exact numbers.
     x : (n, n), its computed inverse, or any other guess of it.
-    bits : of the balls' midpoints; by default four times those of the format and 64 more, so that A X has room.
+    bits : precision of the balls' midpoints; by default four times that of the format plus 64, so that A X fits.
 
     Raises
     ------
-    ValueError : ‖R‖ < 1 could not be proved; X is no better than nothing.
+    ValueError : ‖R‖ < 1 could not be proved, so X may have no correct digit.
 
     References
     ----------
@@ -234,7 +234,7 @@ def _identity(n: int) -> Any:
 
 
 def _column_sum(a: Any) -> Any:
-    """Upper bound of the column sum norm of a matrix of balls, as an arb without radius."""
+    """Return an upper bound of the column-sum norm of a matrix of balls, as an arb without radius."""
     sums = [sum((entry.abs_upper() for entry in column), flint.arb(0)).upper() for column in a.transpose().tolist()]
     largest = sums[0]
     for one in sums[1:]:
@@ -243,7 +243,7 @@ def _column_sum(a: Any) -> Any:
 
 
 def _upper(x: Any) -> float:
-    """A float64 not below any number of the ball."""
+    """Return a float64 that is not below any number in the ball."""
     m, e = x.upper().man_exp()
     exactly = Fraction(int(m)) * Fraction(2) ** int(e)
     nearest = float(exactly)
@@ -254,7 +254,7 @@ def _upper(x: Any) -> float:
 
 
 def true_error(x: Any, inverse: Any) -> Fraction:
-    """The column sum norm of X minus the true inverse, exact."""
+    """Return the exact column-sum norm of X minus the true inverse."""
     return column_sum_norm(rationals(x) - inverse)
 
 
@@ -286,10 +286,10 @@ def smallest_precision(
 
     Parameters
     ----------
-    a : (n, n), exact: strings, ints, Fractions; a float counts with its exact binary value.
+    a : (n, n), exact: strings, ints, Fractions; a float stands for its exact binary value.
     tolerance : relative error, above 0.
-    base, rounding : of the formats.
-    pivot : whether to pivot partially.
+    base, rounding : base and rounding of the formats.
+    pivot : whether to use partial pivoting.
     largest : highest precision to try.
 
     Returns
@@ -300,7 +300,7 @@ def smallest_precision(
     Raises
     ------
     ValueError : `tolerance` is not above 0, `a` is not square, or no precision up to `largest` is enough.
-    numpy.linalg.LinAlgError : `a` is singular, so that no precision helps.
+    numpy.linalg.LinAlgError : `a` is singular, so no precision helps.
     """
     if not (isinstance(tolerance, (int, float, Fraction)) and tolerance > 0 and math.isfinite(tolerance)):
         raise ValueError(f"tolerance must be a relative error above 0, such as 1e-6; got {tolerance!r}")
@@ -316,7 +316,7 @@ def smallest_precision(
         try:
             x = linalg.inv(fmt.array(given), pivot)
             tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
-        except (np.linalg.LinAlgError, ValueError):  # singular in so few digits, or nothing proved
+        except (np.linalg.LinAlgError, ValueError):  # the matrix is singular in so few digits, or no bound was proved
             return False
         return tried[fmt].bound <= tolerance
 
@@ -332,7 +332,7 @@ def smallest_precision(
 
 
 def _relative(bound: float, x: FloatArray) -> float:
-    """From ‖X - A⁻¹‖ to a bound of it over ‖A⁻¹‖, which is at least ‖X‖ - bound."""
+    """Turn a bound of ‖X - A⁻¹‖ into a bound relative to ‖A⁻¹‖, which is at least ‖X‖ - bound."""
     with _working(128):
         norm = flint.arb(flint.fmpq(*column_sum_norm(rationals(x)).as_integer_ratio())) - flint.arb(bound)
         if not norm > 0:

@@ -1,4 +1,4 @@
-r"""Sharpness and cost of each bound on the error of an inverse, side by side.
+r"""Compare the sharpness and the cost of the bounds on the error of an inverse.
 
 The bound from the residual is within a thousandth of the error because it computes the residual with more digits than
 the inverse has. The bounds from counted roundings need no additional digits, but they are tens to thousands of times
@@ -35,7 +35,7 @@ def product(n: int) -> int:
 
 
 def _stages(n: int) -> int:
-    """Operations that add up 3|new| + 2|old| over all stages, for the matrix and for n right-hand sides."""
+    """Count the operations that sum 3|new| + 2|old| over all stages, for the matrix and for n right-hand sides."""
     return sum(4 * rows**2 + 4 * rows * n for rows in range(1, n))
 
 
@@ -47,8 +47,8 @@ class Price:
     ----------
     bound : its name.
     ratios : median of bound over error for each size of matrix.
-    operations : of the bound over those of the inverse itself, for the largest size.
-    digits : in which the bound is evaluated, as a multiple of the t digits of the inverse.
+    operations : number of operations for the bound, divided by that for the inverse itself, at the largest size.
+    digits : digits in which the bound is evaluated, as a multiple of the t digits of the inverse.
     """
 
     bound: str
@@ -69,7 +69,7 @@ KNOWN: dict[str, tuple[str, Callable[[int], int], str]] = {
 
 
 def _residual(a: FloatArray, x: FloatArray, inverse: Any) -> dict[str, tuple[float, Callable[[int], int], str]]:
-    """Bounds from the residual: (39) as printed, its computable form, and the residual itself in t, 2t and 4t bits."""
+    """Return bounds from the residual: (39) as printed, its computable form, and the residual in t, 2t and 4t bits."""
     exactly = theory.residual(a, x)
     size = float(column_sum_norm(exactly))
     known = float(column_sum_norm(inverse)) * size
@@ -93,8 +93,8 @@ def prices(
     Parameters
     ----------
     sizes : numbers of rows.
-    repeats : matrices of each size, with entries uniform between -1 and 1, inverted with pivoting.
-    fmt : of the inverses; by default 24 bits, rounded to nearest.
+    repeats : number of matrices of each size, with entries uniform between -1 and 1, inverted with pivoting.
+    fmt : format of the inverses; by default 24 bits, rounded to nearest.
 
     Returns
     -------

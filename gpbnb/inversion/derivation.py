@@ -1,4 +1,4 @@
-"""The algebra of hung1984, ch. II, sections 10-11, derived again for 3 × 3 as printed and for every n.
+"""Derive the algebra of hung1984, ch. II, sections 10-11, again: for 3 × 3 as printed, and for every n.
 
 Matrices are symbols that do not commute, so a step holds for every n. Where entries matter, a step concerns the entry
 (i, j) of any matrix, and sums over the stages of elimination follow by induction."""
@@ -14,7 +14,7 @@ from gpbnb.display.derivation import Derivation, Step, errors, first_order, over
 EPSILON = sp.Symbol("epsilon")
 N, J, K = sp.symbols("n j k", integer=True, positive=True)
 
-#: Symbols of the matrices A, its change Δ, L, A_T and the changes of (91) and (92), and of the columns u, x, r and h.
+#: Symbols of the matrices A, its change Δ, L, A_T, the changes in (91) and (92), and the columns u, x, r and h.
 A, DELTA, L, A_T = sp.symbols(r"A \Delta L A_T", commutative=False)
 A_TILDE, DELTA_A, B_TILDE, DELTA_B = sp.symbols(r"\tilde{A} {\Delta\!A} \tilde{b} {\Delta\!b}", commutative=False)
 X_HAT, X, H_HAT, H, ERROR, B, D_X = sp.symbols(r"\hat{x} x \hat{h} h E b {\Delta\!x}", commutative=False)
@@ -64,8 +64,8 @@ def first_approach() -> Derivation:
 def first_approach_norms() -> Derivation:
     r"""Derive the norms of (39)-(44) and their strict forms.
 
-    Let a = ‖A⁻¹‖, ρ = ‖R‖, d = ‖Δ‖, e = ‖E‖, and x = ‖X‖ that of the computed inverse. A norm that satisfies
-    e ≤ f + q e with q < 1 is at most the solution of e = f + q e.
+    Let a = ‖A⁻¹‖, ρ = ‖R‖, d = ‖Δ‖, e = ‖E‖, and x = ‖X‖ for the computed inverse X. A norm e with
+    e ≤ f + q e and q < 1 is at most the solution of e = f + q e.
     """
     a, rho, d, x = sp.symbols("a rho d x", positive=True)
     printed = a * rho + a**2 * d
@@ -92,7 +92,7 @@ def first_approach_norms() -> Derivation:
 
 
 class Entry(NamedTuple):
-    """Entry before and after one elimination step, the exact product of multiplier and pivot row, and three errors."""
+    """An entry before and after an elimination step, the exact product that is subtracted, and three errors."""
 
     old: sp.Symbol
     new: sp.Symbol
@@ -104,7 +104,7 @@ class Entry(NamedTuple):
 def entry() -> Entry:
     r"""Carry one entry through one step: division, multiplication and subtraction, each with its own error.
 
-    :math:`\bigl(a(0) - p\,(1+\epsilon_1)(1+\epsilon_2)\bigr)(1+\epsilon_3)` with :math:`p = a(0) - a(1)`.
+    The result is :math:`\bigl(a(0) - p\,(1+\epsilon_1)(1+\epsilon_2)\bigr)(1+\epsilon_3)` with :math:`p = a(0) - a(1)`.
     """
     old, new = sp.symbols("a(0) a(1)")
     eps = errors(3)
@@ -113,13 +113,13 @@ def entry() -> Entry:
 
 
 def entry_error() -> sp.Expr:
-    """First-order error of :func:`entry`; each rounding error can have either sign."""
+    """Return the first-order error of :func:`entry`; each rounding error can have either sign."""
     found = entry()
     return first_order(found.computed, found.errors)
 
 
 def printed_entry_error() -> sp.Expr:
-    r"""The form of (47), :math:`3\epsilon\,a(1) - 2\epsilon\,a(0)`, with one ε for all three roundings."""
+    r"""Return the form of (47), :math:`3\epsilon\,a(1) - 2\epsilon\,a(0)`, with one ε for all three roundings."""
     found = entry()
     return 3 * EPSILON * found.new - 2 * EPSILON * found.old
 
@@ -129,7 +129,7 @@ def one_step() -> Derivation:
     old, new, product, (e1, e2, e3), _ = entry()
     p, w, size = sp.symbols("p w u", nonnegative=True)
     done, exact = sp.symbols(r"\hat{a} p")
-    before = done / (1 + e3) + exact * (1 + e1) * (1 + e2)  # a(0), from what was computed
+    before = done / (1 + e3) + exact * (1 + e1) * (1 + e2)  # a(0), from computed values
     return Derivation(
         (
             Step(
@@ -168,7 +168,7 @@ def one_step() -> Derivation:
 def reductions() -> Derivation:
     r"""Show by induction that the errors of all steps, (59), add up to a change of the given matrix.
 
-    :math:`l_{ik} = \hat a_{ik}(k-1)/\hat a_{kk}(k-1)` is not rounded, and ã_ij(k) is what step k adds to
+    :math:`l_{ik} = \hat a_{ik}(k-1)/\hat a_{kk}(k-1)` is not rounded, and ã_ij(k) is the error that step k adds to
     :math:`\hat a_{ij}(k-1) - l_{ik}\hat a_{kj}(k-1)`. Then :math:`s(r) = \sum_{k\le r} l_{ik}\hat a_{kj}(k-1)`.
     """
     a, change = sp.Function(r"\hat{a}"), sp.Function(r"\tilde{a}")
@@ -209,7 +209,7 @@ class Stages(NamedTuple):
 def stages(n: int) -> Stages:
     r"""Eliminate an n × n matrix in n - 1 steps, with a separate symbol for each entry of each stage.
 
-    A change is what step k adds to the exact step: Ã(k), the sum of (53) over k.
+    The change in step k is its error, the difference from the exact step; (53) sums these changes over k.
     """
     given = sp.Matrix(n, n, lambda i, j: sp.Symbol(f"a_{i + 1}{j + 1}"))
     lower, change, now = sp.eye(n), sp.zeros(n, n), given
@@ -264,10 +264,10 @@ def perturbed_system() -> Derivation:
 
 
 def two_systems() -> Derivation:
-    r"""Show what (91) and (92) add: Ã and b̃ change the given system, ΔA and Δb the triangular one.
+    r"""Show that (91) and (92) add changes of two systems: Ã, b̃ of the given one, and ΔA, Δb of the triangular one.
 
-    :math:`L A_T = A + \tilde A` and :math:`L b_T = b + \tilde b`, all of it computed but L; back substitution solves
-    :math:`(A_T + \Delta A)\hat x = b_T + \Delta b` exactly.
+    In :math:`L A_T = A + \tilde A` and :math:`L b_T = b + \tilde b`, all but L is computed. The computed solution
+    satisfies :math:`(A_T + \Delta A)\hat x = b_T + \Delta b` exactly.
     """
     upper, right = L**-1 * unevaluated(A + A_TILDE), L**-1 * unevaluated(B + B_TILDE)
     in_a = together(B_TILDE + L * DELTA_B, minus((A_TILDE + L * DELTA_A) * X_HAT))
@@ -294,10 +294,10 @@ def two_systems() -> Derivation:
 
 
 def transfer_cost() -> Derivation:
-    r"""Bound what L can add to the absolute values of (91): at most a factor (n + 3)/2.
+    r"""Bound the increase that L can cause in the absolute values of (91), at most a factor (n + 3)/2.
 
     Entry (i, j) of :math:`|L||\Delta A|` has terms :math:`(n-j+3)\beta|l_{ik}\hat a_{kj}|`, and to first order
-    :math:`|l_{ik}\hat a_{kj}| \le |\hat a_{ij}(k)| + |\hat a_{ij}(k-1)|`: let it be less by w.
+    :math:`|l_{ik}\hat a_{kj}| = |\hat a_{ij}(k)| + |\hat a_{ij}(k-1)| - w` with w ≥ 0.
     """
     new, old, w = sp.symbols("v u w", nonnegative=True)
     m = sp.Symbol("m", integer=True, nonnegative=True)
@@ -320,7 +320,7 @@ def transfer_cost() -> Derivation:
 
 
 def inverse_norms() -> Derivation:
-    """Derive (96) and (97) from (95), and their strict form: x = ‖X‖, c = ‖E‖, e is the norm of the error."""
+    """Derive (96), (97) and their strict form from (95), with x = ‖X‖, c = ‖E‖ and the norm e of the error."""
     x, c = sp.symbols("x c", positive=True)
     strict = x * c / (1 - c)
     return Derivation(
@@ -340,7 +340,7 @@ def inverse_norms() -> Derivation:
 
 
 class Row(NamedTuple):
-    """One row of back substitution: a_kk x̂_k as computed, its coefficients, and all errors."""
+    """One row of back substitution: the computed a_kk x̂_k, its coefficients, and all errors."""
 
     value: sp.Expr
     right: sp.Symbol
@@ -349,9 +349,9 @@ class Row(NamedTuple):
 
 
 def back_row(terms: int) -> Row:
-    r"""a_kk x̂_k of a row with `terms` entries right of the diagonal, n - k of them, from left to right.
+    r"""Return the computed a_kk x̂_k of a row with `terms` = n - k entries right of the diagonal, from left to right.
 
-    Each term takes a multiplication and a subtraction; the division comes last. The x̂ are those computed before.
+    Each term requires a multiplication and a subtraction; the division comes last. The other x̂ were computed before.
     """
     right = sp.Symbol("b")
     a, x = sp.symbols(f"a_1:{terms + 1}"), sp.symbols(rf"\hat{{x}}_1:{terms + 1}")
@@ -375,7 +375,7 @@ def back_row_weights(terms: int) -> tuple[int, tuple[int, ...]]:
 
 
 def back_substitution_weights() -> Derivation:
-    """Derive the weights (85)-(88) for every n: the roundings that b_k and a_kj pass through in row k."""
+    """Derive the weights (85)-(88) for every n, the numbers of roundings that b_k and a_kj pass through in row k."""
     return Derivation(
         (
             Step("(86): $n-k$ subtractions and the division", together(N - K, 1), N - K + 1),
@@ -395,7 +395,7 @@ def back_substitution_weights() -> Derivation:
 
 
 class Triangle(NamedTuple):
-    """The 3 × 3 system (69): its entries, true solution, right sides A x, and computed solution with one ε."""
+    """The 3 × 3 system (69): its entries, true solution, right sides A x, and the solution computed with one ε."""
 
     a: sp.Matrix
     x: tuple[sp.Symbol, ...]
@@ -404,7 +404,7 @@ class Triangle(NamedTuple):
 
 
 def triangle() -> Triangle:
-    """Back substitution of (69) in three rows, all roundings with one ε as printed, nothing dropped."""
+    """Solve (69) by back substitution in three rows, with one ε for all roundings as printed, without omissions."""
     a = sp.Matrix(3, 3, lambda i, j: sp.Symbol(f"a_{i + 1}{j + 1}") if i <= j else sp.Integer(0))
     x = sp.symbols("x_1:4")
     b = tuple(a @ sp.Matrix(x))
@@ -414,30 +414,30 @@ def triangle() -> Triangle:
 
 
 def second_row(a: sp.Matrix, b: sp.Expr, third: sp.Expr) -> sp.Expr:
-    """a_22 x̂_2 as computed with one ε, from a given x̂_3."""
+    """Return a_22 x̂_2 as computed with one ε from a given x̂_3."""
     e = 1 + EPSILON
     return (b - a[1, 2] * third * e) * e * e
 
 
 def first_row(a: sp.Matrix, b: sp.Expr, second: sp.Expr, third: sp.Expr) -> sp.Expr:
-    """a_11 x̂_1 as computed with one ε, from given x̂_2 and x̂_3."""
+    """Return a_11 x̂_1 as computed with one ε from given x̂_2 and x̂_3."""
     e = 1 + EPSILON
     return ((b - a[0, 1] * second * e) * e - a[0, 2] * third * e) * e * e
 
 
 def linear(expression: sp.Expr) -> sp.Expr:
-    """Part of an expression that is linear in the single ε of the documents."""
+    """Return the part of an expression that is linear in the single ε of the documents."""
     return first_order(expression, (EPSILON,))
 
 
 def printed_75() -> sp.Expr:
-    """First-order error of x̂_2, (75)."""
+    """Return the first-order error of x̂_2, (75)."""
     a, (_, _, x3), b, _ = triangle()
     return EPSILON * (2 * unevaluated(b[1]) - 4 * a[1, 2] * x3) / a[1, 1]
 
 
 def printed_before_78() -> sp.Expr:
-    """First-order error of x̂_1, before (78)."""
+    """Return the first-order error of x̂_1, printed before (78)."""
     a, (_, x2, x3), b, _ = triangle()
     a12, a13, a22, a23 = a[0, 1], a[0, 2], a[1, 1], a[1, 2]
     inside = (
@@ -451,7 +451,7 @@ def printed_before_78() -> sp.Expr:
 
 
 def leftover(equation: int, hats: bool = True) -> sp.Expr:
-    """First-order difference between both sides of (76), (77), (78) or (79); zero if the equation holds.
+    """Return the first-order difference between both sides of (76), (77), (78) or (79), zero if the equation holds.
 
     Without `hats`, (77) has the true x_3 in place of the computed one, as printed in 1984.
     """
@@ -473,7 +473,7 @@ def leftover(equation: int, hats: bool = True) -> sp.Expr:
 
 
 def back_substitution() -> Derivation:
-    """(72)-(79): three rows with one ε; b_1 and b_2 are written with the true solution."""
+    """Derive (72)-(79): three rows with one ε; b_1 and b_2 are expressed by the true solution."""
     a, x, _, (y1, y2, _) = triangle()
     s2, s3 = sp.symbols(r"\hat{x}_2:4")
     b1, b2, b3 = sp.symbols("b_1:4")

@@ -1,8 +1,8 @@
 """The numerical example of section 11.4: Table 1 in every reading.
 
-The report gives a matrix, three wordlengths and six numbers, and leaves open what a wordlength of so many "places after
-decimal point" is, which norm was taken, and what was computed with how many digits. Here each number is computed in
-every way that comes to mind, with exact errors, and compared with the printed one.
+The report gives a matrix, three wordlengths and six numbers. It does not state the meaning of a wordlength in "places
+after decimal point", the norm, or which quantities were computed with how many digits. This module computes each number
+in every plausible way, with exact errors, and compares it with the printed one.
 
 Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
 """
@@ -46,7 +46,7 @@ class Wordlength:
     Parameters
     ----------
     kind : "t = places", as in the significand .ddd of (1); "t = places + 1", as in d.ddd, or more; "fixed point", every
-        number rounded to so many decimals.
+        number rounded to that many decimals.
     rounding : to nearest or chopped.
 
     Raises
@@ -92,7 +92,7 @@ WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KIN
 
 
 def eliminate(a: Matrix, fl: Rounder) -> Matrix:
-    """Elimination and back substitution in the order of section 11; pivoting would not change it for this matrix."""
+    """Invert by elimination and back substitution in the order of section 11; pivoting would change nothing here."""
     n = len(a)
     rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
     for k in range(n):
@@ -152,10 +152,10 @@ class Column:
     Parameters
     ----------
     column : "bound" or "error".
-    wordlength, detail : the reading: the wordlength, and everything else in words.
-    norm : of :data:`gpbnb.inversion.procedure.NORMS`.
-    relative : divided by the norm of the inverse.
-    values : for each of :data:`PLACES`.
+    wordlength, detail : the wordlength of the reading, and everything else in words.
+    norm : one of :data:`gpbnb.inversion.procedure.NORMS`.
+    relative : whether the values are divided by the norm of the inverse.
+    values : one value for each of :data:`PLACES`.
     """
 
     column: str
@@ -182,7 +182,7 @@ class Column:
 
     @property
     def same_digits(self) -> bool:
-        """Whether all values have the same four digits and differ only in the exponent."""
+        """Whether all values have the same four digits and differ only in their exponents."""
         return len({f"{v:.3e}".split("e")[0] for v in self.values}) == 1
 
     @property
@@ -192,37 +192,37 @@ class Column:
 
 
 def agree(value: float | Fraction, printed: str) -> bool:
-    """Whether a value, rounded or chopped to the printed digits, agrees with the print."""
+    """Whether a value, rounded or chopped to the printed digits, agrees with the printed number."""
     low, high = interval(printed)
     return bool(low <= Fraction(value) < high)
 
 
 def chance(printed: str) -> float:
-    """Probability that the digits of a number agree with the printed ones, if their logarithm is uniform."""
+    """Return the probability that a number with uniformly distributed logarithm agrees with the printed digits."""
     low, high = interval(printed)
     return math.log10(high / low)
 
 
 @cache
 def interval(printed: str) -> tuple[Fraction, Fraction]:
-    """Interval of the numbers that round or chop to the printed one."""
+    """Return the interval of the numbers that round or chop to the printed one."""
     digits, exponent = printed.split("e")
     unit = Fraction(10) ** (int(exponent) - len(digits.split(".")[1]))
     return Fraction(printed) - unit / 2, Fraction(printed) + unit
 
 
 def matrix() -> Matrix:
-    """The matrix of the example, exact."""
+    """Return the exact matrix of the example."""
     return exact(np.array(MATRIX))
 
 
 @cache
 def bound_readings() -> tuple[Column, ...]:
-    """Every reading of the column "By proposed method".
+    """Compute every reading of the column "By proposed method".
 
-    Two wordlengths, rounded or chopped; the quantities from the computer of that wordlength or from one that has
-    :math:`10^{-50}` as unit roundoff; every :func:`~gpbnb.inversion.procedure.readings` of the procedure in every norm;
-    absolute, (96), or relative, (97).
+    The readings combine two wordlengths, rounded or chopped; quantities computed in that wordlength or with a unit
+    roundoff of :math:`10^{-50}`; all :func:`~gpbnb.inversion.procedure.readings` of the procedure in every norm;
+    and the absolute bound (96) or the relative bound (97).
     """
     result = []
     for wordlength in WORDLENGTHS[:4]:
@@ -245,10 +245,11 @@ def bound_readings() -> tuple[Column, ...]:
 
 @cache
 def error_readings() -> tuple[Column, ...]:
-    """Every reading of the column "Actual value".
+    """Compute every reading of the column "Actual value".
 
-    Three wordlengths, rounded or chopped; three ways to invert; the error against the inverse of the matrix as given,
-    or, where three digits cannot hold it, as stored; every norm; absolute or relative.
+    The readings combine three wordlengths, rounded or chopped; three ways to invert; the error against the inverse of
+    the given matrix, or of the stored matrix if three digits cannot hold the given one; every norm; and absolute or
+    relative errors.
     """
     given = matrix()
     result = []
@@ -291,10 +292,10 @@ class Search:
 
     Parameters
     ----------
-    agreements : numbers that agree with the print in each digit; `numbers` were compared.
-    columns : readings of which all three do.
-    expected : how many agreements chance alone would give, if digits are spread as usual and each power of ten is
-        right: a generous count.
+    agreements : count of numbers that agree with the print in each digit, out of `numbers` compared.
+    columns : readings in which all three numbers agree.
+    expected : number of agreements expected by chance, if digits have their usual distribution and every power of
+        ten is right, which overestimates it.
     closest : the reading with the smallest :attr:`Column.distance`.
     """
 
@@ -334,8 +335,8 @@ class Claim:
 def claims() -> tuple[Claim, ...]:
     """Test each sentence about Table 1 in every reading.
 
-    That a bound is conservative is asked of each bound beside the error of elimination with the same wordlength and
-    norm, both absolute or both relative.
+    Whether a bound is conservative is tested against the error of elimination with the same wordlength and norm, both
+    absolute or both relative.
     """
     read, errors = bound_readings(), {}
     for one in error_readings():

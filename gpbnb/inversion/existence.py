@@ -23,9 +23,9 @@ from gpbnb.inversion.procedure import NORMS
 
 @dataclass(frozen=True)
 class Possible:
-    """Answer whether some matrix of a wordlength has a printed error, with one such matrix.
+    """Whether some matrix of a wordlength has a printed error, with one such matrix.
 
-    `reference` is the matrix whose inverse it is held against: "given", or "stored" in the wordlength.
+    `reference` is the matrix whose inverse defines the error: "given", or "stored" in the wordlength.
     """
 
     wordlength: Wordlength
@@ -37,7 +37,7 @@ class Possible:
     witness: Matrix | None
 
 
-#: Norms that are sums of sizes or squares over groups of entries, or the largest of them.
+#: Norms that are sums of sizes or squares over groups of entries, or the largest such sum.
 SEARCHED = ("column sum", "row sum", "largest entry", "Frobenius")
 
 
@@ -51,16 +51,16 @@ def possible(
 ) -> Possible:
     """Search all matrices X of a wordlength for one whose error has the printed norm.
 
-    How X was computed does not matter: rounding plays no part, only which numbers there are.
+    It does not matter how X was computed. Only the set of numbers of the wordlength matters, not the rounding.
 
     Parameters
     ----------
-    printed : an error norm as text; that of Table 1 by default.
-    reference : the error is against the inverse of the matrix as "given", or as "stored" in the wordlength.
+    printed : an error norm as text; by default that of Table 1.
+    reference : whose inverse defines the error, the matrix as "given" or as "stored" in the wordlength.
 
     Raises
     ------
-    ValueError : `norm` is not one of :data:`SEARCHED`, or `reference` is another word.
+    ValueError : `norm` is not one of :data:`SEARCHED`, or `reference` has another value.
     """
     if norm not in SEARCHED:
         raise ValueError(f"norm: got {norm!r}; needed one of {', '.join(SEARCHED)}")
@@ -93,9 +93,9 @@ def possible(
 
 @cache
 def all_possible() -> tuple[Possible, ...]:
-    """Search every wordlength, one with an additional digit, and every norm.
+    """Search every wordlength, one more with an additional digit, and every norm.
 
-    Rounding matters only where three digits cannot hold the matrix as given.
+    Rounding matters only if three digits cannot hold the given matrix.
     """
     given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in (*KINDS, "t = places + 2")]
     stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding.documented()]
@@ -104,7 +104,7 @@ def all_possible() -> tuple[Possible, ...]:
 
 
 def _groups(norm: str) -> list[list[tuple[int, int]]]:
-    """Entries whose sizes are added up; the norm is the largest of the sums."""
+    """List the groups of entries whose sizes are summed; the norm is the largest of the sums."""
     n = range(len(MATRIX))
     match norm:
         case "column sum":
@@ -120,7 +120,7 @@ def _groups(norm: str) -> list[list[tuple[int, int]]]:
 def _near(
     x: Fraction, wordlength: Wordlength, places: int, most: Fraction, square: bool
 ) -> list[tuple[Fraction, Fraction]]:
-    """Numbers of the wordlength near x, with their distance, or its square, below `most`; nearest first."""
+    """List numbers of the wordlength near x, nearest first, whose distance (or its square) is below `most`."""
     found = []
     for step in (1, -1):
         y = _toward(x, wordlength, places, step)
@@ -131,7 +131,7 @@ def _near(
 
 
 def _toward(x: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
-    """The nearest number of the wordlength on one side of x, x itself included on the upper."""
+    """Return the nearest number of the wordlength on one side of x; the upper side includes x itself."""
     chopped = Wordlength(wordlength.kind, Rounding.CHOP).rounder(places)(x)
     if step > 0:
         return chopped if chopped >= x else _next(chopped, wordlength, places, 1)
@@ -139,7 +139,7 @@ def _toward(x: Fraction, wordlength: Wordlength, places: int, step: int) -> Frac
 
 
 def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
-    """The neighbour of a number of the wordlength."""
+    """Return the neighbour of a number of the wordlength."""
     if wordlength.kind == "fixed point":
         return y + step * Fraction(1, 10**places)
     if y == 0:
@@ -147,7 +147,7 @@ def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fracti
     fmt = wordlength.format(places)
     _, _, e = fmt.split(y)
     unit = Fraction(10) ** (e - fmt.precision)
-    if step * y < 0 and abs(y) == Fraction(10) ** (e - 1):  # towards zero, at a power of ten
+    if step * y < 0 and abs(y) == Fraction(10) ** (e - 1):  # towards zero at a power of ten
         unit /= 10
     return y + step * unit
 
@@ -155,7 +155,7 @@ def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fracti
 def _fit(
     candidates: Sequence[Sequence[tuple[Fraction, Fraction]]], low: Fraction, high: Fraction
 ) -> list[Fraction] | None:
-    """Choose one of each so that the sizes add up to at least `low` and less than `high`; None if there is no way."""
+    """Choose one candidate of each list so that the sizes sum to at least `low` and less than `high`, or None."""
     order = sorted(range(len(candidates)), key=lambda i: len(candidates[i]))
     if not all(candidates):
         return None

@@ -1,4 +1,4 @@
-"""Experiments: inverses computed in a format, with their true errors and every bound.
+"""Experiments: compute inverses in a format, with their true errors and every bound.
 
 True errors are exact rationals, computed by python-flint, so even the smallest violation counts.
 """
@@ -30,7 +30,7 @@ from gpbnb.sweeps import Column, read
 #: Every reading of the printed procedure in the norm of the report.
 PRINTED = tuple(reading for reading in procedure.readings() if reading.norm == "column sum")
 
-#: Bounds of a second look, see :func:`trial`.
+#: Other bounds, which are valid; see :func:`trial`.
 BETTER = (
     "corrected",
     "strict",
@@ -44,7 +44,7 @@ BETTER = (
 )
 
 
-#: Those that can prove nothing.
+#: Bounds that may not exist.
 MAY_BE_ABSENT = BETTER[1:]
 
 
@@ -52,7 +52,7 @@ MAY_BE_ABSENT = BETTER[1:]
 class Trial(BoundedError):
     """One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
 
-    A bound that proves nothing is absent from `bounds`. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
+    `bounds` omits bounds that do not exist for this inverse. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
     """
 
     family: str
@@ -70,7 +70,7 @@ class Trial(BoundedError):
 
     @property
     def regular(self) -> bool:
-        """Whether the condition number is at most :data:`REGULAR` over β: the inverse has two digits and more."""
+        """Whether the condition number is at most :data:`REGULAR` over β, which leaves at least two correct digits."""
         return self.condition * float(self.matrix.format.unit_roundoff) <= REGULAR
 
 
@@ -80,11 +80,11 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
     Parameters
     ----------
     a : (n, n).
-    names : of the bounds, those of :data:`PRINTED` as text and of :data:`BETTER`; all by default.
+    names : names of bounds from :data:`PRINTED`, as text, and :data:`BETTER`; all by default.
 
     Raises
     ------
-    numpy.linalg.LinAlgError : the matrix is singular, or is so in the format.
+    numpy.linalg.LinAlgError : the matrix is singular, or elimination in the format finds it singular.
     """
     inverse = true_inverse(a)
     wanted = ALL_BOUNDS if names is None else tuple(names)
@@ -93,7 +93,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
     for name in wanted:
         try:
             evaluated[name] = float(_BOUNDS[name](computing))
-        except ValueError:  # it proves nothing here
+        except ValueError:  # the bound does not exist here
             if name not in MAY_BE_ABSENT:
                 raise
     error = bounds.true_error(computing.x, inverse)
@@ -102,7 +102,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
 
 
 class _Computing:
-    """A matrix, its inverse and intermediate results, each computed once, on demand."""
+    """A matrix, its inverse and intermediate results, each computed once when it is needed."""
 
     def __init__(self, a: FloatArray, pivot: bool) -> None:
         self.a, self.pivot = a, pivot
@@ -119,7 +119,7 @@ class _Computing:
 
     @cached_property
     def printed(self) -> dict[str, float]:
-        """The bound of every reading of the printed procedure."""
+        """The bound in every reading of the printed procedure."""
         outcomes = procedure.evaluate_all(self.reduction, self.beta, PRINTED)
         return {str(one.reading): float(one.bound) for one in outcomes}
 
@@ -147,7 +147,7 @@ ALL_BOUNDS = tuple(_BOUNDS)
 
 
 def _uniform(n: int, rng: np.random.Generator) -> NDArray[Any]:
-    """Entries from -1 to 1, in steps of 2**-30: the same on every machine."""
+    """Draw entries from -1 to 1 in steps of 2**-30, which are the same on every machine."""
     return np.asarray(rng.integers(-(2**30), 2**30, (n, n)).astype(object) * Fraction(1, 2**30))
 
 
@@ -166,7 +166,7 @@ def _nearly_singular(n: int, rng: np.random.Generator) -> NDArray[Any]:
 
 
 def conditioned(n: int, digits: float, rng: np.random.Generator) -> NDArray[Any]:
-    """Random matrix whose last row is the sum of the others plus a part of size 10**-digits: nearly singular."""
+    """Draw a nearly singular matrix: the last row is the sum of the others plus a part of size 10**-digits."""
     a = _uniform(n, rng)
     a[-1] = a[:-1].sum(axis=0) + a[-1] * Fraction(10.0**-digits)
     return a
@@ -177,7 +177,7 @@ def _hilbert(n: int, rng: np.random.Generator) -> NDArray[Any]:
 
 
 def _wilkinson(n: int, rng: np.random.Generator) -> NDArray[Any]:
-    """Wilkinson's matrix, whose last column doubles with each step of pivoted elimination, in random scales."""
+    """Return a randomly scaled Wilkinson matrix, whose last column doubles in each step of pivoted elimination."""
     a = _table(n, lambda i, j: Fraction(1) if i == j or j == n - 1 else Fraction(-1 if i > j else 0))
     scale = 1 + _uniform(n, rng)[0] / 1000
     return a * scale
@@ -188,7 +188,7 @@ def _frank(n: int, rng: np.random.Generator) -> NDArray[Any]:
 
 
 def _kahan(n: int, rng: np.random.Generator) -> NDArray[Any]:
-    """Upper triangular, s**i (1 on the diagonal, -c right of it), with s = 4/5 and c = 3/5."""
+    """Return Kahan's upper triangular matrix: row i is s**i times (1, -c, -c, …), with s = 4/5 and c = 3/5."""
     s, c = Fraction(4, 5), Fraction(3, 5)
     return _table(n, lambda i, j: s**i * (1 if i == j else -c if j > i else 0))
 
@@ -208,7 +208,7 @@ FAMILIES: dict[str, Callable[[int, np.random.Generator], NDArray[Any]]] = {
     "Kahan": _kahan,
 }
 
-#: Those that are the same at every draw.
+#: Families whose matrices are the same at every draw.
 FIXED = ("Hilbert", "Frank", "Kahan")
 
 
@@ -219,7 +219,7 @@ FIXED = ("Hilbert", "Frank", "Kahan")
 class Cell:
     """An independent part of a sweep, with its own seed.
 
-    `sizes` are the numbers of rows, each drawn `repeats` times; a matrix that is the same at every draw, once.
+    `sizes` are the numbers of rows, each drawn `repeats` times, or once if every draw gives the same matrix.
     """
 
     family: str
@@ -230,7 +230,7 @@ class Cell:
     seed: tuple[int, ...]
 
     def trials(self, names: Iterable[str] | None = None) -> Iterator[Trial | None]:
-        """The trials, one after the other; None where the matrix is singular in the format."""
+        """Yield the trials one after the other; None if the matrix is singular in the format."""
         rng = np.random.default_rng(self.seed)
         for n in self.sizes:
             for _ in range(1 if self.family in FIXED else self.repeats):
@@ -242,19 +242,19 @@ class Cell:
 
     @property
     def count(self) -> int:
-        """How many trials there are."""
+        """Return the number of trials."""
         return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
 
 
 def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
-    """Invert random matrices of growing size with pivoting and evaluate :data:`BETTER`."""
+    """Invert random matrices of growing size with pivoting, and evaluate :data:`BETTER`."""
     return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
 
 
 def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np.random.Generator) -> list[Trial]:
-    """Invert matrices of one size that approach a singular one, see :func:`conditioned`; evaluate :data:`BETTER`.
+    """Invert matrices of one size that approach a singular one, by :func:`conditioned`, and evaluate :data:`BETTER`.
 
-    Those that the format cannot tell from singular are left out.
+    Matrices that are singular in the format are omitted.
     """
     trials = []
     for d in digits:
@@ -266,7 +266,7 @@ def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np
 SEED = 1984
 _NEAREST, _CHOP = Rounding.NEAREST, Rounding.CHOP
 
-#: The formats of the sweep over all readings and families, and of that over random matrices.
+#: The formats of the sweep over all readings and families, and of the sweep over random matrices.
 VARIANT_FORMATS = (FloatFormat(10, 4), FloatFormat(10, 9), FloatFormat(2, 24), FloatFormat(10, 4, _CHOP))
 RANDOM_FORMATS = (
     FloatFormat(2, 11),
@@ -276,19 +276,19 @@ RANDOM_FORMATS = (
     FloatFormat(16, 6, _CHOP),
 )
 
-#: How many random inversions of each size, in each format.
+#: Number of random inversions for each size and format.
 RANDOM_SIZES = {n: 3000 if n <= 6 else 1010 if n <= 10 else 100 for n in range(2, 21)}
 
 
 def variant_cells() -> list[Cell]:
-    """Cells of the sweep over all families of matrices, n = 2 ... 20, with and without pivoting."""
+    """Return the cells of the sweep over all families of matrices, n = 2 ... 20, with and without pivoting."""
     cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
     sizes = tuple(range(2, 21))
     return [Cell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
 
 
 def random_cells() -> list[Cell]:
-    """Cells of the sweep over a hundred thousand random matrices, with pivoting."""
+    """Return the cells of the sweep over a hundred thousand random matrices, with pivoting."""
     cases = product(RANDOM_FORMATS, RANDOM_SIZES.items())
     return [Cell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
 
@@ -310,18 +310,18 @@ COLUMNS = (
     *(Column(name, low=0, optional=True) for name in _RATIOS),
 )
 
-#: A bound is tight if it is at most so many times the error.
+#: A bound is tight if it is at most this many times the error.
 TIGHT = 1.1
 
-#: Condition number times unit roundoff up to which first-order analysis can be expected to say something.
+#: Largest condition number times unit roundoff at which first-order analysis can be expected to hold.
 REGULAR = 0.01
 
 
 class Sample:
     """Statistics of trials: how often each bound was absent or violated, and its ratios to the error.
 
-    `failed` counts matrices that are singular in the format, `exact` inverses without error, which have no ratio;
-    `regular` matrices have a condition number of at most :data:`REGULAR` over β.
+    `failed` counts matrices that are singular in the format. `exact` counts inverses without error, which have no
+    ratio. `regular` counts matrices whose condition number is at most :data:`REGULAR` over β.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -390,19 +390,19 @@ def cell_sample(cell: Cell, names: Sequence[str]) -> Sample:
 
 
 def cell_rows(cell: Cell, sample: Sample) -> list[dict[str, str]]:
-    """Rows of one cell of a sweep, as stored."""
+    """Return the rows of one cell of a sweep, as stored."""
     return sample.rows(*_where(cell).values())
 
 
 def _where(cell: Cell) -> dict[str, str]:
-    """Key of the rows of a cell."""
+    """Return the key of the rows of a cell."""
     sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
     texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
     return dict(zip(_FIELDS, texts, strict=False))
 
 
 def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> list[dict[str, str]]:
-    """Rows for each family, if there are several, and for all families together."""
+    """Return rows for each family, if there are several, and for all families together."""
     rows, whole, families = [], Sample(names), dict[str, Sample]()
     for cell, sample in samples:
         families.setdefault(cell.family, Sample(names)).merge(sample)
@@ -424,7 +424,7 @@ def worst(bound: str, sweep: str = "variants") -> Trial:
 
     Parameters
     ----------
-    bound : one of those of the sweep, as text.
+    bound : a bound of the sweep, as text.
 
     Raises
     ------
@@ -440,7 +440,7 @@ def worst(bound: str, sweep: str = "variants") -> Trial:
 
 
 def format_name(fmt: FloatFormat) -> str:
-    """Base, precision and rounding in one word, as in "10:4:chop"."""
+    """Return base, precision and rounding in one word, as in "10:4:chop"."""
     return f"{fmt.base}:{fmt.precision}:{fmt.rounding.value}"
 
 
@@ -452,7 +452,7 @@ class Frozen:
     rows: tuple[Mapping[str, str], ...]
 
     def select(self, **where: str) -> list[Mapping[str, str]]:
-        """The rows whose fields have these values."""
+        """Return the rows whose fields have these values."""
         return [row for row in self.rows if all(row[name] == value for name, value in where.items())]
 
 

@@ -48,7 +48,7 @@ CHART: Mapping[str, Box] = {
 
 
 def flow_chart(ax: Axes) -> list[Artist]:
-    """Draw Figure III-1 anew: boxes and arrows."""
+    """Redraw Figure III-1 with boxes and arrows."""
     ax.set_axis_off()
     ax.set_xlim(0, 1)
     ax.set_ylim(-0.12, 1.04)
@@ -135,7 +135,7 @@ def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
 
 
 def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: str = "size") -> list[Artist]:
-    """Draw bound over error: medians against the size of the matrix, or every trial against the condition number."""
+    """Draw bound / error: medians against the size of the matrix, or every trial against the condition number."""
     artists: list[Artist] = []
     ends = {}
     for bound, marker in zip(bounds, "osD^Pv", strict=False):
@@ -144,7 +144,7 @@ def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: st
             having.sort(key=lambda one: one.condition)
             x, y = [one.condition for one in having], [one.overestimation(bound) for one in having]
             artists += ax.plot(x, y, marker, ms=4, color=VALID, label=bound)
-            # The loosest bound is named at its last point, the sharpest above its first, any other below its first.
+            # Label the loosest bound at its last point, the sharpest above its first, any other below its first.
             place, shift = (-1, (6, 0)) if bound == bounds[0] else (0, (1, 4 if bound == bounds[-1] else -8))
             name(ax, bound, (x[place], y[place]), VALID, shift)
             continue

@@ -1,8 +1,8 @@
 r"""The procedure of Figure III-1: a bound on the error of an inverse, computed while inverting.
 
-One function for each box of the chart, and :func:`run` for the whole. The inverse is computed in the arithmetic of the
-format; the errors are then evaluated from its digits by the formulas of :mod:`gpbnb.inversion.theory`. Whatever the
-text leaves open is a :class:`Reading`.
+There is one function for each box of the chart, and :func:`run` for the whole chart. The inverse is computed in the
+arithmetic of the format. The errors are then evaluated from its digits by the formulas of
+:mod:`gpbnb.inversion.theory`. A :class:`Reading` settles whatever the text leaves open.
 
 Source: hung1984, ch. II, section 11; the texts of the boxes are in hung1982, ch. III.
 """
@@ -31,8 +31,8 @@ class Triangularization(NamedTuple):
 
     Parameters
     ----------
-    stages : n FloatArrays (n, n), from the given matrix, its rows in their final order, to the upper triangular one.
-    multipliers : n - 1 FloatArrays, the k-th of length n - k: what row k was multiplied by before it was added.
+    stages : n FloatArrays (n, n), from the given matrix with its rows in final order to the upper triangular matrix.
+    multipliers : n - 1 FloatArrays; the k-th, of length n - k, holds the factors of row k before it was added.
     order : (n,), the rows of the given matrix in the order in which they were eliminated.
     """
 
@@ -52,7 +52,7 @@ def triangularize(a: FloatArray, pivot: bool = False) -> Triangularization:
     Parameters
     ----------
     a : (n, n).
-    pivot : partial pivoting, which the text of section 10 mentions and section 11 leaves out.
+    pivot : whether to use partial pivoting, which section 10 mentions and section 11 omits.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def transform(triangular: Triangularization, right: FloatArray) -> tuple[FloatAr
 
     Returns
     -------
-    rights : n FloatArrays (n, p), with the rows in the order of elimination; the last is b_T of (64).
+    rights : n FloatArrays (n, p), with rows in the order of elimination; the last is b_T of (64).
     """
     work = right[triangular.order]
     rights = [work]
@@ -132,7 +132,7 @@ def as_floats(reduction: Reduction) -> Reduction:
 
 
 def _replaced(a: FloatArray, corner: tuple[int, int], block: FloatArray) -> FloatArray:
-    """`a` with its lower right block, from `corner` on, replaced."""
+    """Return `a` with its lower right block, from `corner` on, replaced."""
     i, j = corner
     lower = cast(FloatArray, np.concatenate([cast(Any, a[i:, :j]), cast(Any, block)], axis=1))
     return cast(FloatArray, np.concatenate([cast(Any, a[:i]), cast(Any, lower)]))
@@ -149,24 +149,24 @@ NORMS: dict[str, Norm] = {
     "spectral": lambda a: np.linalg.norm(np.asarray(a, dtype=np.float64), 2),
 }
 
-#: What norms are taken of, the matrix of (95), as the last box says, the factors of (96), or every summand, (61), (62).
+#: Quantities whose norm is taken, the matrix of (95) as in the last box, factors of (96), or terms of (61), (62).
 FORMS = ("chart", "(96)", "norms throughout")
 
 
 @dataclass(frozen=True)
 class Reading:
-    """A choice of what the text of the procedure leaves open.
+    """A choice for each question that the text of the procedure leaves open.
 
     Parameters
     ----------
-    signed : ε has one sign throughout, as printed in (59), (60) and (87)-(90); else sizes are added up, (61), (62).
-    form : of :data:`FORMS`.
-    triangular : the inverse in (94) is that of A_T, to which ΔA and Δb belong; else that of A.
-    norm : of :data:`NORMS`; "column sum" is that of the report, (22).
+    signed : whether ε has one sign throughout, as in (59), (60) and (87)-(90); otherwise sizes are added, (61), (62).
+    form : one of :data:`FORMS`.
+    triangular : whether the inverse in (94) is that of A_T, to which ΔA and Δb belong; otherwise that of A.
+    norm : one of :data:`NORMS`; the report uses "column sum", (22).
 
     Raises
     ------
-    ValueError : `form` or `norm` is another word.
+    ValueError : `form` or `norm` has another value.
     """
 
     signed: bool = True
@@ -186,7 +186,7 @@ class Reading:
 
 
 def readings() -> Iterator[Reading]:
-    """All distinct readings; sums of norms do not depend on signs."""
+    """Return all distinct readings; sums of norms do not depend on signs."""
     for signed, form, triangular, norm in product((True, False), FORMS, (False, True), NORMS):
         if not (signed and form == "norms throughout"):
             yield Reading(signed, form, triangular, norm)
@@ -217,7 +217,7 @@ def resultant_errors(first: Perturbation, second: Perturbation) -> Perturbation:
 
 
 def bracket(errors: Perturbation, solution: Any, signed: bool = True) -> NDArray[Any]:
-    r"""E of (95), columns :math:`\delta b_j-\delta A\hat x_j`; of sizes, :math:`|\delta b_j|+|\delta A||\hat x_j|`."""
+    r"""E of (95), :math:`\delta b_j-\delta A\hat x_j`, or of sizes :math:`|\delta b_j|+|\delta A||\hat x_j|`."""
     x = _plain(solution)
     e = errors.right - errors.matrix @ x if signed else abs(errors.right) + abs(errors.matrix) @ abs(x)
     return np.asarray(e)
@@ -238,7 +238,7 @@ def error_norm(error: Any, norm: str = "column sum") -> Any:
 class Outcome:
     """Intermediate results and bound of the procedure.
 
-    `norm_of_inverse` is that of the computed inverse, by which (97) divides to get the relative bound.
+    `norm_of_inverse` is the norm of the computed inverse, by which (97) divides.
     """
 
     reading: Reading
@@ -255,12 +255,12 @@ class Outcome:
 
 
 def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) -> Outcome:
-    """Evaluate the boxes of the errors in one reading.
+    """Evaluate the error boxes in one reading.
 
     Parameters
     ----------
-    reduction : of FloatArrays or exact entries, for an exact bound, or of float64; of an inverse, so that its first
-        right-hand sides are the columns of the identity.
+    reduction : reduction of an inverse, whose first right-hand sides are the columns of the identity; in FloatArrays
+        or exact entries for an exact bound, or in float64.
     beta : unit roundoff β.
     reading : by default with signs, the norm of (95), and the computed inverse of A.
     """
@@ -273,7 +273,7 @@ def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) ->
     second = {signed: back_substitution_errors(reduction, beta, signed) for signed in (True, False)}
     errors = {s: resultant_errors(triangularization_errors(reduction, beta, s), second[s]) for s in second}
     brackets = {signed: bracket(errors[signed], solution, signed) for signed in errors}
-    # The rows of the errors are in the order of elimination; so are the columns of the inverse before them.
+    # The rows of the errors, and so the columns of the inverse that multiplies them, are in the order of elimination.
     order = np.argmax(_plain(reduction.rights[0]) != 0, axis=1)
     fronts = {False: solution[:, order], True: _upper_inverse(reduction.stages[-1])}
     for reading in several:
@@ -293,12 +293,12 @@ def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> O
     Parameters
     ----------
     a : (n, n).
-    pivot : partial pivoting.
+    pivot : whether to use partial pivoting.
     reading : see :func:`evaluate`.
 
     Returns
     -------
-    outcome : its bound is a Fraction; a float for the Frobenius and spectral norms.
+    outcome : the bound is a Fraction, or a float for the Frobenius and spectral norms.
 
     Raises
     ------
@@ -312,10 +312,10 @@ def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> O
 
 
 def _sum_of_norms(reduction: Reduction, beta: Any, second: Perturbation, norm: Norm) -> Any:
-    """‖Ã‖‖x‖ + ‖ΔA‖‖x‖ + ‖b̃‖ + ‖Δb‖ with (61) and (62), of matrices of all right-hand sides."""
+    """Return ‖Ã‖‖x‖ + ‖ΔA‖‖x‖ + ‖b̃‖ + ‖Δb‖ with (61) and (62), for all right-hand sides as matrices."""
     stages, rights = ([_plain(part) for part in parts] for parts in reduction[:2])
     first = theory.printed_triangularization_norm(reduction.stages, beta, norm)
-    # (62) for all columns at once, so that one norm serves throughout
+    # (62) for all columns at once, so that the same norm is used throughout
     right = sum(
         weight * beta * norm(theory.trailing(rights[i], k, columns=False))
         for k in range(1, len(stages))
@@ -325,7 +325,7 @@ def _sum_of_norms(reduction: Reduction, beta: Any, second: Perturbation, norm: N
 
 
 def _upper_inverse(upper: Any) -> NDArray[Any]:
-    """The inverse of an upper triangular matrix, by back substitution in the arithmetic of its entries."""
+    """Invert an upper triangular matrix by back substitution in the arithmetic of its entries."""
     u = _plain(upper)
     n = len(u)
     x = np.zeros_like(u) + np.eye(n, dtype=int)

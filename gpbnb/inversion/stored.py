@@ -13,30 +13,30 @@ from gpbnb.sweeps import Sweep
 
 
 def compute(cell: Cell, directory: Path | None = None, *, names: Sequence[str]) -> dict[str, Any]:
-    """Compute a cell: the attributes of its sample."""
+    """Compute a cell and return the attributes of its sample."""
     return vars(experiment.cell_sample(cell, names))
 
 
 def restored(result: dict[str, Any], names: Sequence[str]) -> Sample:
-    """The sample with these attributes."""
+    """Return the sample with these attributes."""
     sample = Sample(names)
     vars(sample).update(result)
     return sample
 
 
 def rows(cell: Cell, result: dict[str, Any], *, names: Sequence[str]) -> list[tuple[str, ...]]:
-    """The rows of a cell, one for each bound."""
+    """Return the rows of a cell, one for each bound."""
     return [tuple(row.values()) for row in experiment.cell_rows(cell, restored(result, names))]
 
 
 def sums(results: Sequence[tuple[Cell, dict[str, Any]]], *, names: Sequence[str]) -> list[tuple[str, ...]]:
-    """The rows of all cells together, and of each family."""
+    """Return the rows of all cells together and of each family."""
     samples = [(cell, restored(result, names)) for cell, result in results]
     return [tuple(row.values()) for row in experiment.sum_rows(samples, names)]
 
 
 def sweep(name: str) -> Sweep[Cell]:
-    """One of the sweeps of :data:`gpbnb.inversion.experiment.SWEEPS`."""
+    """Return one of the sweeps of :data:`gpbnb.inversion.experiment.SWEEPS`."""
     cells, names = experiment.SWEEPS[name]
     return Sweep(
         name=f"inversion/{name}",
@@ -54,5 +54,5 @@ def sweep(name: str) -> Sweep[Cell]:
 
 
 def stored() -> tuple[Sweep[Cell], ...]:
-    """All sweeps of the chapter."""
+    """Return all sweeps of the chapter."""
     return tuple(sweep(name) for name in experiment.SWEEPS)

@@ -12,35 +12,27 @@ from gpbnb.inversion.existence import Possible
 from gpbnb.inversion.experiment import Frozen, Trial
 
 
-def table1(readings: Sequence[tuple[Column, Column]]) -> Table:
-    """Tabulate the six numbers of Table 1 in some readings, each with its ratio to the printed one."""
-    header = ("wordlength", "reading", *(f"{name}, {p}" for name in ("bound", "error") for p in PLACES))
-    values = (float(value) for name in ("bound", "error") for value in PRINTED[name])
-    printed = ("as printed", "", *(scientific(value, 4) for value in values))
-    body = [
-        (
-            str(bound.wordlength),
-            in_math(bound.detail),
-            *(
-                f"{scientific(value, 4)} ({ratio:.3g})"
-                for column in (bound, error)
-                for value, ratio in zip(column.values, column.ratios, strict=True)
-            ),
-        )
-        for bound, error in readings
-    ]
-    return Table(f"Table 1 in {len(body)} readings", header, (printed, *body))
+def table1(found: Sequence[Search]) -> Table:
+    """Show the six numbers of Table 1 as printed, and beside each the number of the reading that comes closest."""
+    names = {"bound": "By proposed method", "error": "Actual value"}
+    header = ["places after decimal point"]
+    columns = []
+    for one in found:
+        header += [f"{names[one.column]}, printed", f"{names[one.column]}, closest reading"]
+        columns += [[float(value) for value in PRINTED[one.column]], one.closest.values]
+    body = [(str(places), *(scientific(column[i], 4) for column in columns)) for i, places in enumerate(PLACES)]
+    return Table("Table 1 as printed and as computed", tuple(header), tuple(body))
 
 
 def searches(found: Sequence[Search]) -> Table:
-    """Count the numbers of all readings that agree with the print, and show the reading that comes closest."""
+    """Count the numbers of all readings that agree with the printed ones, and show the closest reading."""
     header = (
         "column",
         "readings",
         "numbers that agree in four digits",
         "expected by chance",
         "closest reading",
-        "its numbers / printed ones",
+        "its numbers / printed numbers",
     )
     body = [
         (
@@ -66,13 +58,15 @@ def possibilities(found: Sequence[Possible]) -> Table:
     """Show, for each wordlength and norm, which printed errors some matrix of that wordlength has."""
     lines: dict[tuple[str, str, str], list[str]] = {}
     for one in found:
-        wordlength = one.wordlength.kind if one.reference == "given" else f"{one.wordlength}, matrix stored so"
+        wordlength = (
+            one.wordlength.kind if one.reference == "given" else f"{one.wordlength}, matrix rounded to this format"
+        )
         key = wordlength, one.norm, "relative" if one.relative else "absolute"
         lines.setdefault(key, []).append("no" if one.witness is None else "yes")
     header = (
         "wordlength",
         "norm",
-        "error",
+        "kind of error",
         *(f"{p} places: {v}" for p, v in zip(PLACES, PRINTED["error"], strict=True)),
     )
     return Table(f"{len(found)} searches", header, tuple((*key, *line) for key, line in lines.items()))
@@ -90,23 +84,23 @@ def violations(result: Frozen, bounds: Sequence[str]) -> Table:
 
 
 def summary(result: Frozen, bounds: Sequence[str]) -> Table:
-    """Show how often each bound of a sweep proves nothing or is exceeded, and its ratio to the error."""
+    """Show how often each bound of a sweep does not exist or fails, and its ratio to the error."""
     keys = ("absent", "violations", "smallest", "median", "largest")
     body = []
     for name in bounds:
         (row,) = result.select(family="all", format="all", bound=name)
         ratios = (scientific(float(row[key]), 4) if "e" in row[key] else row[key] for key in keys[2:])
         body.append((in_math(name), *(f"{int(row[key]):,}" for key in keys[:2]), *ratios))
-    header = ("bound", "proves nothing", "exceeded", *(f"bound / error, {name}" for name in keys[2:]))
+    header = ("bound", "gives no bound", "error above the bound", *(f"bound / error, {name}" for name in keys[2:]))
     return Table(f"{len(body)} bounds", header, tuple(body))
 
 
 def prices(found: Sequence[Price], sizes: Sequence[int]) -> Table:
-    """Show what each bound achieves and costs: median of bound over error by number of rows, operations, digits."""
+    """Tabulate sharpness and cost of each bound: median of bound / error by number of rows, operations, digits."""
     body = [
         (one.bound, *(short(ratio, 3) for ratio in one.ratios), f"{one.operations:.2g}", one.digits) for one in found
     ]
-    header = ("bound", *(f"bound / error, n = {n}" for n in sizes), "operations / inversion", "digits")
+    header = ("bound", *(f"bound / error, n = {n}" for n in sizes), "operations / those of the inverse", "digits")
     return Table(f"Sharpness and cost of {len(body)} bounds", header, tuple(body))
 
 

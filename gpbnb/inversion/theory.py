@@ -2,17 +2,17 @@ r"""Theory: bounds on the error of an inverse from elimination and back substitu
 
 Bounds named ``printed_…`` are those of the documents; the others are derived in
 :mod:`gpbnb.inversion.derivation`. ``beta`` is the unit roundoff β. Entries are exact (Fractions, ints, a FloatArray) or
-float64, and so are the results: exact where everything given is exact, else float64.
+float64, and so are the results: exact if all arguments are exact, otherwise float64.
 
-All of them start from what a computer has when it is done, a :class:`Reduction`. With L the unit lower triangle of the
-exact quotients :math:`\hat a_{ik}(k-1)/\hat a_{kk}(k-1)`, :func:`lower_factor`, elimination and back substitution give,
-without anything left out,
+All bounds start from the intermediate results of a computation, a :class:`Reduction`. Let L be the unit lower
+triangular matrix of the exact quotients :math:`\hat a_{ik}(k-1)/\hat a_{kk}(k-1)`, from :func:`lower_factor`.
+Elimination and back substitution then satisfy exactly
 
 .. math:: L\hat A_T = A + \tilde A, \qquad L\hat b_T = b + \tilde b, \qquad
     (\hat A_T + \Delta A)\,\hat x = \hat b_T + \Delta b.
 
-So Ã and b̃ change the given system and ΔA and Δb the triangular one: they cannot be added before the second are
-multiplied by L, which (91) and (92) leave out.
+So Ã and b̃ change the given system, while ΔA and Δb change the triangular one. Before they are added, ΔA and Δb must be
+multiplied by L, a step that (91) and (92) omit.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Reduction(NamedTuple):
     Parameters
     ----------
     stages : n matrices (n, n), :math:`\hat A(0) \dots \hat A(n-1)`; the first is the given matrix, with its rows
-        interchanged if there was pivoting, the last is upper triangular. What is eliminated is zero from then on.
+        interchanged if there was pivoting, the last is upper triangular. Eliminated entries are zero from then on.
     rights : n matrices (n, p), :math:`\hat b(0) \dots \hat b(n-1)`, a column for each right-hand side; for an inverse
         p = n and the first is the identity, with its rows interchanged.
     solution : (n, p), :math:`\hat x` of each right-hand side; for an inverse, the computed inverse.
@@ -51,7 +51,7 @@ class Reduction(NamedTuple):
 
 
 def residual(a: Any, x: Any) -> NDArray[Any]:
-    """R = A X - I, of a computed inverse X; hung1984, ch. II, (34) and (37)."""
+    """R = A X - I for a computed inverse X; hung1984, ch. II, (34) and (37)."""
     matrix, computed = _common(_square(a, "a"), _square(x, "x"))
     if matrix.shape != computed.shape:
         raise ValueError(f"got a of shape {matrix.shape}, x of shape {computed.shape}; needed equal shapes")
@@ -61,8 +61,8 @@ def residual(a: Any, x: Any) -> NDArray[Any]:
 def printed_first_bound(inverse: Any, residual: Any, change: Any = None, norm: Norm = column_sum) -> Any:
     r"""Bound of ‖E‖ as :math:`\|A^{-1}\|\|R\| + \|A^{-1}\|^2\|\Delta A\|`; hung1984, ch. II, (39) and (43).
 
-    `inverse` is the true inverse of A, `residual` that of the matrix that was inverted, A + ΔA, and `change` is ΔA,
-    none by default. Only to first order in ΔA.
+    `inverse` is the true inverse of A. `residual` belongs to the matrix that was inverted, A + ΔA, and `change` is ΔA,
+    zero by default. The bound holds only to first order in ΔA.
     """
     size = norm(_matrix(inverse, "inverse"))
     return size * printed_first_relative_bound(inverse, residual, change, norm)
@@ -91,7 +91,7 @@ def residual_bound(x: Any, residual: Any, norm: Norm = column_sum) -> Any:
 
     Raises
     ------
-    ValueError : ‖R‖ ≥ 1; such an X proves nothing, not even that A has an inverse.
+    ValueError : ‖R‖ ≥ 1; such an X does not even prove that A has an inverse.
     """
     size = norm(_matrix(residual, "residual"))
     return norm(_matrix(x, "x")) * size / _rest(size, "‖R‖", "a better inverse, computed with more digits")
@@ -101,7 +101,7 @@ def residual_bound(x: Any, residual: Any, norm: Norm = column_sum) -> Any:
 
 
 def lower_factor(stages: Sequence[Any]) -> NDArray[Any]:
-    r"""L, (n, n): ones, and below them the quotients :math:`\hat a_{ik}(k-1)/\hat a_{kk}(k-1)`, not rounded."""
+    r"""L, (n, n), with a unit diagonal and below it the exact quotients :math:`\hat a_{ik}(k-1)/\hat a_{kk}(k-1)`."""
     matrices = _stages(stages)
     lower = _identity(matrices[0])
     for k, matrix in enumerate(matrices[:-1]):
@@ -121,7 +121,7 @@ def trailing(a: Any, k: int, columns: bool = True) -> NDArray[Any]:
 def printed_triangularization_error(stages: Sequence[Any], beta: Any) -> NDArray[Any]:
     r"""Ã, (n, n), as :math:`\beta\sum_i[3\hat A_i(i) - 2\hat A_i(i-1)]`; hung1984, ch. II, (59).
 
-    It has signs, as if all roundings had one and the same error.
+    The formula keeps signs, as if all roundings had the same error.
     """
     return _telescope(_stages(stages), beta, True, lambda x: x, -2)
 
@@ -224,7 +224,7 @@ def printed_perturbation(reduction: Reduction, beta: Any) -> Perturbation:
 def perturbation_bounds(reduction: Reduction, beta: Any, transfer: bool = True) -> Perturbation:
     r"""Bounds of the entries of δA and δb, :math:`|\tilde A| + |L||\Delta A|`, :math:`|\tilde b| + |L||\Delta b|`.
 
-    To first order. Without `transfer`, L is left out: (91) and (92) corrected only in their signs.
+    To first order. Without `transfer`, L is omitted, so that only the signs of (91) and (92) are corrected.
     """
     stages, rights, _ = _checked(reduction)
     lower = abs(lower_factor(stages)) if transfer else _identity(stages[0])
@@ -235,7 +235,7 @@ def perturbation_bounds(reduction: Reduction, beta: Any, transfer: bool = True) 
 
 
 def strict_perturbation_bounds(reduction: Reduction, beta: Any) -> Perturbation:
-    """The same with every order in β kept, and with the sharper Ã and b̃."""
+    """Bounds of :func:`perturbation_bounds` to every order in β, with the sharper Ã and b̃."""
     stages, rights, _ = _checked(reduction)
     lower, n = abs(lower_factor(stages)), len(stages)
     weights = _gammas(back_substitution_weights(n), beta, stages[-1])
@@ -263,20 +263,20 @@ def printed_bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> A
 
 
 def bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> Any:
-    r"""(96) corrected, :math:`\|\hat A^{-1}\|\,\bigl\||\delta b| + |\delta A||\hat A^{-1}|\bigr\|`; to first order.
+    r"""Corrected (96), :math:`\|\hat A^{-1}\|\,\bigl\||\delta b| + |\delta A||\hat A^{-1}|\bigr\|`; to first order.
 
-    `norm` must not grow when entries shrink in size, which column and row sums do not.
+    `norm` must not grow when entries shrink in size; column and row sums have this property.
     """
     entries = bracket_bounds(reduction, perturbation_bounds(reduction, beta))
     return norm(_checked(reduction).solution) * norm(entries)
 
 
 def strict_bound(reduction: Reduction, beta: Any, norm: Norm = column_sum) -> Any:
-    r"""The same to every order: with strict entries, over :math:`1 - \|E\|`; from computed quantities alone.
+    r"""Bound of :func:`bound` to every order: with strict entries, divided by :math:`1 - \|E\|`.
 
     Raises
     ------
-    ValueError : ‖E‖ ≥ 1, so that nothing is proved; more digits are needed.
+    ValueError : ‖E‖ ≥ 1, so no bound exists; more digits are needed.
     """
     size = norm(bracket_bounds(reduction, strict_perturbation_bounds(reduction, beta)))
     return norm(_checked(reduction).solution) * size / _rest(size, "‖E‖", "more digits")
@@ -302,7 +302,7 @@ def _square(x: Any, name: str) -> NDArray[Any]:
 
 
 def _common(*arrays: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """The arrays as they are if all are exact, else in float64."""
+    """Return the arrays unchanged if all are exact, otherwise in float64."""
     if all(each.dtype == object for each in arrays):
         return arrays
     return tuple(each.astype(float) for each in arrays)
@@ -347,7 +347,7 @@ def _identity(like: NDArray[Any]) -> NDArray[Any]:
 
 
 def _like(value: Any, arrays: Sequence[NDArray[Any]]) -> Any:
-    """A constant that leaves the entries of `arrays` exact, or float64."""
+    """Return a constant whose type keeps the entries of `arrays` exact, or float64."""
     return Fraction(value) if arrays[0].dtype == object else float(value)
 
 
@@ -378,7 +378,7 @@ def _rest(product: Any, name: str, cure: str) -> Any:
 def _telescope(
     stages: Sequence[NDArray[Any]], beta: Any, columns: bool, size: Callable[[NDArray[Any]], NDArray[Any]], old: int
 ) -> NDArray[Any]:
-    """β times the sum over k of 3 A_k(k) + `old` A_k(k-1), of the entries or of their sizes."""
+    """Return β times the sum over k of 3 A_k(k) + `old` A_k(k-1), of the entries or of their sizes."""
     total = np.zeros_like(stages[0])
     for k in range(1, len(stages)):
         after, before = (size(trailing(stages[i], k, columns)) for i in (k, k - 1))

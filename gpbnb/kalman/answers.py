@@ -61,7 +61,7 @@ def find_answers(tolerance: float = 1.0) -> Answers:
                 f"got a tolerance of {tolerance}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
             )
         observed[rounding] = min(enough)
-    corrected = report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.CORRECTIONS["and errors carried on"])
+    corrected = report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.ALL_CORRECTED)
     return Answers(
         tolerance,
         runs,

@@ -91,6 +91,7 @@ class BoundedRun(Run):
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped or not len(z):
             return
+        self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
         if self.fmt is None:
             values = packed[:, :, np.newaxis]
@@ -209,7 +210,11 @@ def _widened(packed: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def emulate_with_bound(
-    model: LinearModel, z: Any, fmt: FloatFormat, form: Form = Form.HUNG, checkpoint_steps: Sequence[int] | None = None
+    model: LinearModel,
+    z: Any,
+    fmt: FloatFormat,
+    form: Form = Form.INNOVATION,
+    checkpoint_steps: Sequence[int] | None = None,
 ) -> BoundedHistory:
     """Run the filter rounded, in double-double, and with its contraction bound; arguments as of ``emulate``."""
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)

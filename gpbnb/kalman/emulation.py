@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.array_forms import AnyForm, ArrayForm
+from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import form_named
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,7 @@ class History:
 
     model: LinearModel
     fmt: FloatFormat
-    form: Form
+    form: AnyForm
     steps: NDArray[np.int64]
     state: NDArray[np.float64]
     gain: NDArray[np.float64]
@@ -72,7 +75,7 @@ def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
 
-def compare_runs(run: Run, true: Checkpoints) -> History:
+def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
     """Subtract the reference from the checkpoints of a run, at the same steps."""
     checkpoints = run.checkpoints()
     c = len(checkpoints.steps)
@@ -92,7 +95,7 @@ def emulate(
     model: LinearModel,
     z: Any,
     fmt: FloatFormat,
-    form: Form = Form.HUNG,
+    form: AnyForm | str = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
     fused: bool = False,
@@ -106,17 +109,32 @@ def emulate(
     model : n states, m measurements.
     z : (steps, m), measurements.
     fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13; or fixed point.
+    form : or its name, such as "UD".
     checkpoint_steps : steps at which to compare; by default four a decade.
     true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
         errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
     fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
     sums, compensated : as of :class:`~gpbnb.kalman.filter_run.Run`.
+
+    Raises
+    ------
+    ValueError : `fused`, `sums` or `compensated` with known inputs, or with a form without compiled loops.
     """
+    form = form_named(form)
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
-    run = Run(model, fmt, form, chosen, fused, sums, compensated)
+    run: Run | ArrayRun
+    if model.has_inputs or isinstance(form, ArrayForm):
+        if fused or sums is not None or compensated:
+            raise ValueError(
+                "got fused, sums or compensated with known inputs or a form without compiled loops; needed none of "
+                'them; for compensated summation write form="compensated"'
+            )
+        run = ArrayRun(model, fmt, form, chosen)
+    else:
+        run = Run(model, fmt, form, chosen, fused, sums, compensated)
     run.take(measured)
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)

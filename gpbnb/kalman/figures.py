@@ -37,8 +37,8 @@ from gpbnb.kalman.year import Year
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",
     "rate": "error of the drift rate (mas/yr)",
-    "gain": "error / gain, norms (no unit)",
-    "covariance": "error / covariance, norms (no unit)",
+    "gain": "relative error of the gain (no unit)",
+    "covariance": "relative error of the covariance (no unit)",
 }
 _DIGITS = np.linspace(3.5, 23, 50)
 _MARKERS = {Form.HUNG: "o", Form.HUNG_SECOND_GAIN: "P", Form.INNOVATION: "^", Form.JOSEPH: "s", Form.UD: "D"}
@@ -143,7 +143,7 @@ def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
     """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
     lines: dict[str, Mapping[str, bool]] = {
         "(125), printed formula": {},
-        "(125), all faults corrected": report_bounds.CORRECTIONS["and errors carried on"],
+        "(125), all faults corrected": report_bounds.ALL_CORRECTED,
     }
     marked: list[tuple[str, Sequence[float]]] = [
         ("printed answers", found.printed),
@@ -165,16 +165,22 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style, place, away in (
         ("(125) as printed", {}, "-", 0, (2, -38)),
-        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"], "--", 12, (6, 6)),
+        (
+            "(125) with its faults corrected",
+            report_bounds.ALL_CORRECTED,
+            "--",
+            12,
+            (6, 6),
+        ),
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
         x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]
         artists += [line, _beside(ax, word, (x, y), away, REFUTED)]
     artists.append(ax.axhline(found.tolerance, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "goal: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
+    artists.append(_beside(ax, "tolerance: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
     size = float(report_bounds.YEAR_SIZE)
     artists.append(ax.axhline(size, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "as large as the drift of a year", (16.9, size), (0, -13), REFERENCE, ha="right"))
+    artists.append(_beside(ax, "as large as the drift in a year", (16.9, size), (0, -13), REFERENCE, ha="right"))
     artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=REFUTED, ms=11, mew=1.5)
     artists += [_beside(ax, f"{place} printed", (place, size), (9, 3), REFUTED) for place in found.printed]
     ax.set_yscale("log")
@@ -182,7 +188,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     ax.set_yticks(10.0 ** np.arange(-8, 24, 8))
     ax.set_xticks(range(4, 24, 2))
     legend(ax, loc="lower left")
-    label(ax, "decimal digits that the computer carries", "largest error in a year (mas, mas/yr)")
+    label(ax, "decimal digits of the arithmetic", "largest error in a year (mas, mas/yr)")
     return artists
 
 
@@ -235,7 +241,7 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
     ax.set_xticks(range(len(forms)), [str(Form[form.upper()]) for form in forms])
     ax.set_ylim(0, 118)
     legend(ax, ncols=3, loc="upper right")
-    label(ax, "form of the filter", "filters that violate it (%)")
+    label(ax, "form of the filter", "filters that violate the bound (%)")
     return artists
 
 

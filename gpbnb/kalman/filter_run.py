@@ -16,6 +16,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.step import (
     DONE,
@@ -61,6 +62,7 @@ class Run:
         sums: FloatFormat | FixedFormat | None = None,
         compensated: bool = False,
     ) -> None:
+        model.refuse_inputs("a run in compiled loops")
         self.model, self.fmt, self.form = model, fmt, Form(form)
         self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
         if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
@@ -132,6 +134,7 @@ class Run:
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped:
             return
+        self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         try:
@@ -260,6 +263,7 @@ def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form:
 
     Parameters
     ----------
+    model : also with known inputs and offsets.
     z : (steps, m), measurements; float64 or Fractions.
     checkpoint_steps : steps whose results are saved.
 
@@ -267,8 +271,25 @@ def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form:
     ------
     ArithmeticError : a division by zero or a number beyond 2**1000, even so: the model is degenerate.
     """
-    run = Run(model, None, form, checkpoint_steps)
-    run.take(z)
+    run = Run(model.without_inputs(), None, form, checkpoint_steps)
+    if model.has_inputs:
+        _take_with_inputs(run, model, z)
+    else:
+        run.take(z)
     if run.stopped:
         raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
     return run.checkpoints()
+
+
+def _take_with_inputs(run: Run, model: LinearModel, z: Any) -> None:
+    """Take steps with known inputs c: from x to E(x, z - d - Hc) + c, with the step E of a filter without inputs."""
+    model.check_steps(len(z))
+    for k, measured in enumerate(exact(z)):
+        state, measurement = model.known(k)
+        at = int(run.notes[NEXT_CHECKPOINT])
+        run.take((measured - measurement - model.H[k % len(model.H)] @ state)[np.newaxis])
+        if run.stopped:
+            return
+        run.x = run.as_packed(run.exactly(run.x) + state.reshape(-1, 1))
+        if run.notes[NEXT_CHECKPOINT] > at:
+            run.X[at] = run.x

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,15 @@ from gpbnb.kalman.covariance import Repair, check_covariance, in_floats, repaire
 class LinearModel:
     r"""A linear process and its measurements; hung1984, ch. II, before (98).
 
-    .. math:: x_k = \Phi_{k-1} x_{k-1} + w_{k-1}, \qquad z_k = H_k x_k + v_k, \qquad
+    .. math:: x_k = \Phi_{k-1} x_{k-1} + B_{k-1} u_{k-1} + b_{k-1} + w_{k-1}, \qquad z_k = H_k x_k + d_k + v_k, \qquad
         w_k \sim N(0, Q_k),\ v_k \sim N(0, R_k)
 
-    Each of the four matrices may be one for all steps, or a cycle of them with a leading axis: step k = 1, 2, … takes
-    the member (k - 1) mod p, of each cycle with its own p. Entries are held exactly, as Fractions; numbers, strings
-    and Decimals are read exactly too.
+    Each matrix and offset may be one for all steps, or a cycle of them with a leading axis: step k = 1, 2, … takes
+    the member (k - 1) mod p, of each cycle with its own p. It may also be a function of k, which is called for
+    k = 1 … `steps`. Entries are held exactly, as Fractions; numbers, strings and Decimals are read exactly too.
+
+    Without u, b and d this is the model of the report. With them, a filter predicts
+    :math:`((\Phi\hat x) + (Bu)) + b` and takes the innovation :math:`(z - d) - H\hat x`, in this order.
 
     Parameters
     ----------
@@ -36,6 +40,12 @@ class LinearModel:
     name : what tables and figures call it.
     repair : whether to undo roundings in Q, R and P0, as :mod:`gpbnb.kalman.covariance` states. By default only in
         those that are given in floats; covariances of strings, whole numbers and Fractions are taken at their word.
+    B : (n, p) or (c, n, p), input matrix.
+    u : (steps, p), known inputs, row k - 1 for step k; or (p,), the same in every step.
+    b : (n,) or (c, n), known offset of the states.
+    d : (m,) or (c, m), known offset of the measurements.
+    steps : how many steps the model describes; needed if something is a function. By default as many as `u` has rows,
+        or any number. A longer run is refused.
 
     Attributes
     ----------
@@ -43,7 +53,19 @@ class LinearModel:
 
     Raises
     ------
-    ValueError : shapes that do not fit; NaN or infinity; a covariance that is not symmetric or not definite.
+    ValueError : shapes that do not fit; NaN or infinity; a covariance that is not symmetric or not definite; a function
+        without `steps`, or inputs for fewer steps.
+
+    Examples
+    --------
+    A cart whose acceleration is known, and whose sensor reads 0.5 m too much:
+
+    >>> cart = LinearModel(
+    ...     Phi=[[1, "0.1"], [0, 1]], H=[[1, 0]], Q=[["1e-6", 0], [0, "1e-4"]], R=[["0.04"]], x0=[0, 0],
+    ...     P0=[[1, 0], [0, 1]], B=[["0.005"], ["0.1"]], u=[[1], [1], [0]], d=["0.5"],
+    ... )
+    >>> cart.n, cart.m, cart.steps
+    (2, 1, 3)
     """
 
     Phi: NDArray[Any]
@@ -54,9 +76,15 @@ class LinearModel:
     P0: NDArray[Any]
     name: str = "a linear model"
     repair: bool | None = None
+    B: Any = None
+    u: Any = None
+    b: Any = None
+    d: Any = None
+    steps: int | None = None
     repairs: tuple[Repair, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
+        self._evaluate_functions()
         repairable = {
             letter: in_floats(getattr(self, letter)) if self.repair is None else self.repair
             for letter in ("Q", "R", "P0")
@@ -87,15 +115,111 @@ class LinearModel:
                 )
         if self.P0.shape != (n, n):
             raise ValueError(f"got P0 of shape {self.P0.shape}; needed ({n}, {n}), as x0 has {n} states")
+        self._read_inputs()
         repairs: list[Repair] = []
         for letter, strictly in (("Q", False), ("R", True), ("P0", False)):
             matrices = getattr(self, letter)
             if repairable[letter]:
                 object.__setattr__(self, letter, _repaired_cycle(letter, matrices, strictly, repairs))
                 continue
-            for matrix in matrices.reshape(-1, *matrices.shape[-2:]):
+            different = {tuple(matrix.flat): matrix for matrix in matrices.reshape(-1, *matrices.shape[-2:])}
+            for matrix in different.values():
                 check_covariance(letter, matrix, strictly)
         object.__setattr__(self, "repairs", tuple(repairs))
+
+    def _evaluate_functions(self) -> None:
+        """Replace functions of the step by what they give for each step."""
+        if self.steps is not None and (
+            isinstance(self.steps, bool) or not isinstance(self.steps, (int, np.integer)) or self.steps < 1
+        ):
+            raise ValueError(f"got steps {self.steps!r}; needed a whole number, at least 1")
+        for letter in ("Phi", "H", "Q", "R", *_INPUTS):
+            given = getattr(self, letter)
+            if callable(given):
+                if self.steps is None:
+                    raise ValueError(f"got a function for {letter} without steps; needed steps=, how often to call it")
+                members = [given(k) for k in range(1, int(self.steps) + 1)]
+                shapes = {np.shape(each) for each in members}
+                if len(shapes) != 1:
+                    raise ValueError(f"{letter}: the function gave shapes {sorted(shapes)}; needed one shape")
+                object.__setattr__(self, letter, np.array(members) if in_floats(members) else exact(members))
+
+    def _read_inputs(self) -> None:
+        """Known inputs and offsets as exact cycles."""
+        n, m = self.n, self.m
+        if (self.B is None) != (self.u is None):
+            raise ValueError(
+                f"got {'u without B' if self.B is None else 'B without u'}; needed both: B of shape ({n}, p) and u of "
+                "shape (steps, p)"
+            )
+        for letter in _INPUTS:
+            given = getattr(self, letter)
+            if given is None:
+                continue
+            try:
+                entries = exact(given)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{letter}: {error}") from None
+            single = 2 if letter == "B" else 1
+            if letter == "u" and entries.ndim == 2 and (self.steps is None or self.steps > len(entries)):
+                if self.steps is not None:
+                    raise ValueError(f"got u for {len(entries)} steps; needed one row for each of the {self.steps}")
+                object.__setattr__(self, "steps", len(entries))
+            if letter != "u" and entries.ndim == single:
+                entries = entries[np.newaxis]
+            width = entries.shape[-1] if entries.ndim else 0
+            needed = {"B": (n, width), "u": (width,), "b": (n,), "d": (m,)}[letter]
+            axes = (1, 2) if letter == "u" else (single + 1,)
+            if entries.ndim not in axes or entries.shape[-single:] != needed or not entries.size:
+                texts = {"B": f"({n}, p)", "u": "(p,) or (steps, p)", "b": f"({n},)", "d": f"({m},)"}
+                raise ValueError(f"got {letter} of shape {np.shape(given)}; needed {texts[letter]}")
+            entries.flags.writeable = False
+            object.__setattr__(self, letter, entries)
+        if self.B is not None and self.B.shape[2] != self.u.shape[-1]:
+            raise ValueError(
+                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers a step; needed as many"
+            )
+
+    @property
+    def has_inputs(self) -> bool:
+        """Whether there are known inputs or offsets."""
+        return any(getattr(self, letter) is not None for letter in _INPUTS)
+
+    def without_inputs(self) -> LinearModel:
+        """The same model without known inputs and offsets."""
+        return replace(self, B=None, u=None, b=None, d=None, repair=False) if self.has_inputs else self
+
+    def known(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """What step k + 1 adds to the states, :math:`Bu + b`, and to the measurements, d; exact, (n,) and (m,)."""
+        state, measurement = (np.array([Fraction(0)] * size, dtype=object) for size in (self.n, self.m))
+        if self.B is not None:
+            state = state + self.B[k % len(self.B)] @ (self.u if self.u.ndim == 1 else self.u[k])
+        if self.b is not None:
+            state = state + self.b[k % len(self.b)]
+        return state, measurement if self.d is None else self.d[k % len(self.d)]
+
+    def refuse_inputs(self, what: str) -> None:
+        """Refuse a model with known inputs or offsets where they would be ignored.
+
+        Raises
+        ------
+        ValueError : there are some.
+        """
+        if self.has_inputs:
+            raise ValueError(
+                f"got {self.name} with known inputs or offsets; needed none for {what}, which does not cover them; use "
+                'required_precision with basis "emulation" or "bound"'
+            )
+
+    def check_steps(self, count: int) -> None:
+        """Refuse a run that is longer than the model describes.
+
+        Raises
+        ------
+        ValueError : more than `steps` steps.
+        """
+        if self.steps is not None and count > self.steps:
+            raise ValueError(f"got {count} steps; needed at most {self.steps}: {self.name} describes no more")
 
     @property
     def n(self) -> int:
@@ -119,15 +243,17 @@ class LinearModel:
         ------
         ValueError : so few digits make a covariance indefinite.
         """
-        stored = {letter: fmt.array(getattr(self, letter)).to_fractions() for letter in _LETTERS}
-        return LinearModel(**stored, name=f"{self.name}, in {fmt}")
+        given = [letter for letter in (*_LETTERS, *_INPUTS) if getattr(self, letter) is not None]
+        stored = {letter: fmt.array(getattr(self, letter)).to_fractions() for letter in given}
+        return LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
-        """The nearest float64 of each entry, by letter."""
+        """The nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter."""
         return {letter: getattr(self, letter).astype(np.float64) for letter in _LETTERS}
 
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
+_INPUTS = ("B", "u", "b", "d")
 
 
 def _repaired_cycle(letter: str, matrices: NDArray[Any], strictly: bool, repairs: list[Repair]) -> NDArray[Any]:

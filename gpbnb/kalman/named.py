@@ -6,10 +6,11 @@ import operator
 from typing import Any
 
 from gpbnb.arithmetic.formats import Rounding
+from gpbnb.kalman.array_forms import ALIASES, AnyForm, ArrayForm
 from gpbnb.kalman.forms import Form
 
 
-def form_named(form: Form | str) -> Form:
+def form_named(form: AnyForm | str) -> AnyForm:
     """A form, or the form of this name; capitals, blanks and hyphens do not count.
 
     Raises
@@ -20,15 +21,20 @@ def form_named(form: Form | str) -> Form:
     --------
     >>> form_named("ud")
     <Form.UD: 4>
+    >>> form_named("Cholesky")
+    <ArrayForm.CARLSON: 'Carlson'>
     """
-    if isinstance(form, Form):
+    if isinstance(form, (Form, ArrayForm)):
         return form
     if isinstance(form, str):
         wanted = form.strip().upper().replace(" ", "_").replace("-", "_")
-        for each in Form:
+        if wanted in ALIASES:
+            return ALIASES[wanted]
+        for each in (*Form, *ArrayForm):
             if wanted in (each.name, str(each).upper()):
                 return each
-    raise ValueError(f"got form {form!r}; needed one of {', '.join(f'Form.{each.name}' for each in Form)}, or its name")
+    names = ", ".join(repr(each.name.lower()) for each in (*Form, *ArrayForm))
+    raise ValueError(f"got form {form!r}; needed one of {names}, or a member of Form or ArrayForm")
 
 
 def rounding_named(rounding: Rounding | str) -> Rounding:

@@ -13,6 +13,8 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 from gpbnb.arithmetic.search import CHECKED, Search
+from gpbnb.kalman.array_forms import AnyForm, ArrayForm
+from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -20,11 +22,12 @@ from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
+from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
-from gpbnb.kalman.simulation import Simulation, fine_resolution
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 MOST_SIMULATED = 10**8
@@ -32,12 +35,12 @@ MOST_SIMULATED = 10**8
 
 
 def required_precision(
-    model: LinearModel | LinearSystem,
+    model: LinearModel | LinearSystem | Recursion,
     steps: int,
     tolerance: float | Sequence[float],
     base: int = 2,
     rounding: Rounding | str = Rounding.NEAREST,
-    form: Form | str = Form.INNOVATION,
+    form: AnyForm | str = Form.INNOVATION,
     basis: Basis = "emulation",
     z: Any = None,
     seed: int = 0,
@@ -54,11 +57,13 @@ def required_precision(
     Parameters
     ----------
     model : a Kalman filter; with repaired covariances, the answer lists the repairs. Or a linear system, whose inputs
-        are `z`; see :func:`gpbnb.kalman.system.required_system_precision`.
+        are `z`; see :func:`gpbnb.kalman.system.required_system_precision`. Or a function of a format and `z`, written
+        with arrays of the format; see :func:`gpbnb.kalman.recursion.required_recursion_precision`.
     tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
         accuracy does not matter an infinite tolerance. For a linear system, of each output.
     base : 2, 10 or 16.
-    rounding, form : or their names, such as "nearest" and "UD".
+    rounding, form : or their names, such as "nearest" and "UD"; see :class:`gpbnb.kalman.forms.Form` and
+        :class:`gpbnb.kalman.array_forms.ArrayForm`.
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
         the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
         contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
@@ -75,9 +80,17 @@ def required_precision(
     Raises
     ------
     ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops; more
-        or fewer measurements than steps.
+        or fewer measurements than steps; a model with known inputs, or an ``ArrayForm``, where a basis does not cover
+        them.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    if not isinstance(model, LinearModel) and form is not Form.INNOVATION:
+        raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+    if callable(model):
+        if within is not None:
+            raise ValueError("got limits for a function; needed none: they are for models")
+        steps = whole_number("steps", steps)
+        return required_recursion_precision(model, steps, tolerance, z, base, rounding, basis, progress)
     if isinstance(model, LinearSystem):
         return required_system_precision(model, steps, tolerance, z, base, rounding, basis, within, progress)
     tolerances = _checked(model, tolerance, base, basis)
@@ -85,23 +98,31 @@ def required_precision(
     for_ever = basis in ("guarantee", "probable")
     if for_ever and within is None:
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
+    if for_ever:
+        model.refuse_inputs(f'basis "{basis}"')
+        if isinstance(form, ArrayForm):
+            raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
+        if model.steps is not None:
+            raise ValueError(
+                f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever'
+            )
     if z is None and steps > MOST_SIMULATED:
         raise ValueError(
             f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: they take hours; try fewer, and see "
             "how the answer grows: gpbnb.wordlength.study.required_precision_by_steps"
         )
     if z is None:
-        z = Simulation(
-            model, tuple(model.x0.astype(np.float64)), whole_number("seed", seed, 0), fine_resolution(model)
-        ).measurements(steps)
+        z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
     repairs = tuple(str(each) for each in model.repairs)
     model, z = without_missing(model, z)
     measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
+    model.check_steps(steps)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
 
-    def errors_of(chosen: Form) -> Callable[[FloatFormat], tuple[float, str]]:
-        if within is not None and for_ever:
-            return lambda fmt: _guaranteed(model, fmt, chosen, within, tolerances, basis)
+    def errors_of(chosen: AnyForm) -> Callable[[FloatFormat], tuple[float, str]]:
+        if within is not None and for_ever and isinstance(chosen, Form):
+            compiled = chosen
+            return lambda fmt: _guaranteed(model, fmt, compiled, within, tolerances, basis)
         return lambda fmt: _error_over_tolerance(model, measured, fmt, chosen, checkpoint_steps, true, tolerances)
 
     checks = () if for_ever else CHECKED[base]
@@ -114,8 +135,8 @@ def required_precision(
 
 
 def _better_form(
-    errors_of: Callable[[Form], Callable[[FloatFormat], tuple[float, str]]],
-    form: Form,
+    errors_of: Callable[[AnyForm], Callable[[FloatFormat], tuple[float, str]]],
+    form: AnyForm,
     base: int,
     rounding: Rounding,
     checks: Sequence[int],
@@ -130,13 +151,13 @@ def _better_form(
 
 
 def survey(
-    model: LinearModel,
+    model: LinearModel | Recursion,
     z: Any,
     tolerance: float | Sequence[float],
     precisions: Sequence[int],
     base: int = 2,
     rounding: Rounding | str = Rounding.NEAREST,
-    form: Form | str = Form.INNOVATION,
+    form: AnyForm | str = Form.INNOVATION,
     basis: Basis = "emulation",
 ) -> tuple[tuple[int, float], ...]:
     """Run a filter in each of some precisions; arguments as of :func:`required_precision`.
@@ -150,20 +171,31 @@ def survey(
     ValueError : as :func:`required_precision`; a precision without compiled loops.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    if not isinstance(model, LinearModel) and callable(model):
+        if form is not Form.INNOVATION:
+            raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+        return survey_recursion(model, z, tolerance, _formats(base, precisions, rounding), basis)
     tolerances = _checked(model, tolerance, base, basis)
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
-    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
-    if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION[base]]:
-        raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION[base]}")
+    formats = _formats(base, precisions, rounding)
     checkpoint_steps = log_spaced(len(measured), 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
     return tuple(
         (fmt.precision, _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)[0])
         for fmt in formats
     )
+
+
+def _formats(base: int, precisions: Sequence[int], rounding: Rounding) -> list[FloatFormat]:
+    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
+    if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION.get(base, 0)]:
+        raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION.get(base, 0)}")
+    if not formats:
+        raise ValueError("got no precisions; needed at least one")
+    return formats
 
 
 def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
@@ -194,7 +226,7 @@ def _error_over_tolerance(
     model: LinearModel,
     z: NDArray[Any],
     fmt: FloatFormat,
-    form: Form,
+    form: AnyForm,
     checkpoint_steps: Sequence[int],
     true: Checkpoints | None,
     tolerances: NDArray[np.float64],
@@ -202,13 +234,13 @@ def _error_over_tolerance(
     """Largest error, or without `true` largest bound, over tolerance; infinity and the reason if there is none."""
     asked, measured = np.isfinite(tolerances), fmt.array(z)
     try:
-        run = (BoundedRun if true is None else Run)(model, fmt, form, checkpoint_steps)
+        run = _opened(model, fmt, form, checkpoint_steps, true is None)
     except ValueError as error:  # a covariance is not definite in so few digits
         return math.inf, str(error)
     run.take(measured)
     if run.stopped is not None:
         return math.inf, f"the run is refused: {run.reason}"
-    if isinstance(run, BoundedRun):
+    if true is None and isinstance(run, (BoundedRun, ArrayRun)):
         errors = run.bounds[0]
     elif true is not None:
         errors = compare_runs(run, true).state
@@ -217,6 +249,15 @@ def _error_over_tolerance(
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
     ratio = float((np.abs(errors[:, asked]) / tolerances[asked]).max())
     return ratio, "the bound says nothing" if math.isinf(ratio) else ""
+
+
+def _opened(
+    model: LinearModel, fmt: FloatFormat, form: AnyForm, checkpoint_steps: Sequence[int], bounded: bool
+) -> Run | BoundedRun | ArrayRun:
+    """A run in compiled loops if the form has them and the model has no inputs, or else in array operations."""
+    if model.has_inputs or isinstance(form, ArrayForm):
+        return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
+    return (BoundedRun if bounded else Run)(model, fmt, form, checkpoint_steps)
 
 
 def _guaranteed(

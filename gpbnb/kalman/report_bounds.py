@@ -111,11 +111,14 @@ def coefficients(
 
 CORRECTIONS: dict[str, dict[str, bool]] = {
     "as printed": {},
-    "counted once": {"once": True},
-    "and signs free": {"once": True, "free_signs": True},
-    "and errors carried on": {"once": True, "free_signs": True, "carried": True},
+    "roundings counted once": {"once": True},
+    "and errors of either sign": {"once": True, "free_signs": True},
+    "and covariance errors carried on": {"once": True, "free_signs": True, "carried": True},
 }
 """Arguments of :func:`coefficients`, one more fault of (125) corrected on each line."""
+
+ALL_CORRECTED = CORRECTIONS["and covariance errors carried on"]
+"""Arguments of :func:`coefficients` with every fault of (125) corrected."""
 
 
 def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fraction:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
-from gpbnb.kalman.forms import Form
+from gpbnb.kalman.array_forms import AnyForm
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
@@ -41,7 +41,7 @@ class Requirement:
     steps: int
     tried: tuple[tuple[int, float], ...]
     why: str = ""
-    form: Form | None = None
+    form: AnyForm | None = None
     irregular: tuple[int, ...] = ()
     advice: str = ""
     repairs: tuple[str, ...] = ()

@@ -39,6 +39,7 @@ class Simulation:
     resolution: float | tuple[float, ...]
 
     def __post_init__(self) -> None:
+        self.model.refuse_inputs("a simulation")
         if len(self.start) != self.model.n:
             raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one a state")
         given = np.asarray(self.resolution, dtype=np.float64)

@@ -40,12 +40,12 @@ def example(k: int, n: int, m: int) -> Table:
                     scientific(coefficient * DOUBLE.unit_roundoff, 2),
                 )
             )
-    header = ("(125)", "term", "coefficient", "$\\beta$, one over it", "digits", "times $\\beta$ of IEEE double")
+    header = ("(125)", "term", "coefficient", "$\\beta$ = 1 / coefficient", "digits", "error in IEEE double")
     return Table(f"the closing example, {len(report_bounds.CORRECTIONS)} ways", header, tuple(body))
 
 
 def misprints(k: int, n: int, m: int) -> Table:
-    """Each printed number of the closing example, what the printed formula gives, and what gives the printed number."""
+    """Each printed number of the closing example, what the printed formula gives, and how the number arose."""
     first, second = report_bounds.coefficients(k, n, m)
     printed = report_bounds.PRINTED
     wrong = report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"])
@@ -53,11 +53,15 @@ def misprints(k: int, n: int, m: int) -> Table:
     ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in wrong)
     products = [loop for loop in loops if prints_as(report_bounds.read_as_product(k, n, m, loop), printed[_SECOND])]
     values: list[tuple[str, str, str]] = [
-        ("first coefficient", scientific(first, 5), f"{', '.join(map(str, loops))} times $k$, as by {ways}"),
+        (
+            "first coefficient",
+            scientific(first, 5),
+            f"{', '.join(map(str, loops))} times $k$, from a factor {ways}",
+        ),
         (
             "second coefficient",
             scientific(second, 5),
-            f"with {', '.join(map(str, products))}, and times for plus: $k(3n+1)\\cdot0.5(k-1)\\cdot{products[0]}$"
+            f"{', '.join(map(str, products))} as above, and × in place of +: $k(3n+1)\\cdot0.5(k-1)\\cdot{products[0]}$"
             if products
             else "not found",
         ),
@@ -75,18 +79,18 @@ def misprints(k: int, n: int, m: int) -> Table:
             (
                 f"{name} digits",
                 str(report_bounds.precision_for_coefficient(coefficient)),
-                f"the printed β is that of {exact_digits:.2f} digits; it needs {needed}",
+                f"the printed β corresponds to {exact_digits:.2f} digits, so {needed} are needed",
             )
         )
     body = tuple((name, f"${_typeset(printed[name])}$", value, why) for name, value, why in values)
-    return Table("the printed numbers of the closing example", ("number", "printed", "formula", "what gives it"), body)
+    return Table("the printed numbers of the closing example", ("number", "printed", "formula", "explanation"), body)
 
 
 _SECOND = "second coefficient"
 
 
 def tolerances(k: int, n: int, m: int, tolerance: Fraction, size: Fraction) -> Table:
-    """Digits that each coefficient asks for an error of all of `size`, as in the example, and for one of `tolerance`.
+    """Digits that each coefficient requires for an error as large as `size`, as in the example, and for `tolerance`.
 
     Parameters
     ----------
@@ -94,18 +98,18 @@ def tolerances(k: int, n: int, m: int, tolerance: Fraction, size: Fraction) -> T
     """
     body = []
     for name, coefficient in zip(("first", "second"), report_bounds.coefficients(k, n, m), strict=True):
-        for granted in (Fraction(1), Fraction(tolerance) / Fraction(size)):
+        for allowed in (Fraction(1), Fraction(tolerance) / Fraction(size)):
             body.append(
                 (
-                    f"{name} term",
-                    scientific(granted, 2),
-                    scientific(granted * Fraction(size), 2),
-                    str(report_bounds.precision_for_coefficient(coefficient, granted)),
-                    str(report_bounds.precision_for_coefficient(coefficient, granted, base=2)),
+                    name,
+                    scientific(allowed, 2),
+                    scientific(allowed * Fraction(size), 2),
+                    str(report_bounds.precision_for_coefficient(coefficient, allowed)),
+                    str(report_bounds.precision_for_coefficient(coefficient, allowed, base=2)),
                 )
             )
-    header = ("dominates", "error granted, relative", "in mas", "decimal digits", "bits")
-    return Table("what an error of one grants", header, tuple(body))
+    header = ("dominant term", "allowed error, relative", "allowed error (mas)", "decimal digits", "bits")
+    return Table("digits for an error of 1 and for the tolerance", header, tuple(body))
 
 
 def violations(fmts: Sequence[FloatFormat]) -> Table:
@@ -127,7 +131,9 @@ def order() -> Table:
     body = []
     for name, second in (("first", False), ("second", True)):
         found = report_bounds.order(second)
-        body.append((name, " → ".join(found) if found else "none: (99) waits for (101), and (101) for (99)"))
+        body.append(
+            (name, " → ".join(found) if found else "none: (99) needs the result of (101), and (101) that of (99)")
+        )
     return Table("the order of (98)-(101)", ("form of (99)", "order"), tuple(body))
 
 
@@ -144,13 +150,13 @@ def largest_violating_noise(fmts: Sequence[FloatFormat]) -> Table:
 
 
 def states(model: LinearModel) -> Table:
-    """States of :func:`gpbnb.kalman.gravity_probe_b.gravity_probe_b`: transition, first deviation, process noise."""
+    """Tabulate the states of the Gravity Probe B model: transition, initial standard deviation, process noise."""
     given = model.to_float()
     body = tuple(
         (name, unit, f"{given['Phi'][0, i, i]:g}", _root(given["P0"][i, i]), _root(given["Q"][0, i, i]))
         for i, (name, unit) in enumerate(STATES)
     )
-    header = ("state", "unit", "transition per step", "first standard deviation", "random walk per step")
+    header = ("state", "unit", "transition per step", "initial standard deviation", "random walk per step")
     return Table(f"{len(body)} states", header, body)
 
 
@@ -167,17 +173,17 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
             raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
         found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
         cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
-        lost = f", a variance lost at step {run.indefinite:,}" if run.indefinite else ""
+        lost = f"; first non-positive variance at step {run.indefinite:,}" if run.indefinite else ""
         body.append((*([run.case.model] if several else []), *cells, short(float(run.least_eigenvalue[-1])) + lost))
     header = (
         *(["model"] if several else []),
         "arithmetic",
         "form",
-        "drift (mas)",
-        "rate (mas/yr)",
-        "gain, relative",
-        "covariance, relative",
-        "least eigenvalue",
+        "error of the drift (mas)",
+        "error of the rate (mas/yr)",
+        "relative error of the gain",
+        "relative error of the covariance",
+        "smallest eigenvalue",
     )
     return Table(f"{len(body)} years", header, tuple(body))
 
@@ -202,7 +208,7 @@ def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms
         body.append((arithmetic(fmt), short(error), *(short(each) for each in cells), f"{companion / error:.5f}"))
     header = (
         "arithmetic",
-        "rate, error (mas/yr)",
+        "error of the rate (mas/yr)",
         *(f"(125), {name}" for name in report_bounds.CORRECTIONS),
         "companion bound",
     )
@@ -228,7 +234,13 @@ def trials(found: Sequence[Summary]) -> Table:
         logarithm = sum(each.compared * math.log(each.typical) for each in group if each.compared)
         typical = short(math.exp(-logarithm / compared)) if compared else ""
         body.append((name, str(count), *cells, f"{violated}, {largest:.3f}", typical))
-    header = ("models", "runs", "violate (105), worst", "(108)", "(125)", "contraction bound", "typically, over error")
+    header = (
+        "models",
+        "runs",
+        *(f"({bound}): violations, largest error / bound" for bound in (105, 108, 125)),
+        "contraction bound: violations, largest error / bound",
+        "contraction bound / error, typical",
+    )
     return Table(f"{sum(each.trials for each in found)} random filters", header, tuple(body))
 
 
@@ -239,7 +251,7 @@ def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
         ratio = f"{dict(answer.tried)[answer.fmt.precision]:.2g}" if answer.fmt else ""
         smallest_format = arithmetic(answer.fmt) if answer.fmt else "none"
         body.append((name, answer.basis, str(answer.steps), smallest_format, ratio))
-    header = ("filter", "rests on", "steps", "smallest precision", "error or bound / tolerance")
+    header = ("filter", "found by", "steps", "smallest precision", "error or bound / tolerance")
     return Table(f"{len(body)} answers", header, tuple(body))
 
 
@@ -266,7 +278,17 @@ def shares(found: Sequence[Share]) -> Table:
         )
         for each in found
     ]
-    head = ("state", "form", "arithmetic", "within", "probability", "median", "90 %", "largest", "99 %, upper limit")
+    head = (
+        "state",
+        "form",
+        "arithmetic",
+        "within tolerance",
+        "probability",
+        "median",
+        "90 %",
+        "largest",
+        "upper limit for 99 % of records",
+    )
     return Table("records that stay within a milliarcsecond for a year", head, tuple(rows))
 
 
@@ -282,22 +304,31 @@ def sensitivity(moved: Sequence[Moved]) -> Table:
         (each.choice, each.before, each.after, f"{each.bits:+.1f}".replace("-", "−"), str(each.records))
         for each in moved
     )
-    return Table("what moves the answer", ("choice", "from", "to", "bits", "records at least"), rows)
+    return Table("what moves the answer", ("choice", "from", "to", "bits", "records (at least)"), rows)
 
 
 def needed_precisions(found: Sequence[Share]) -> Table:
-    """Smallest precisions that meet the tolerance with a probability of 99 %, a line for each kind of formats."""
+    """Smallest precisions that meet the tolerance with a probability of 99 %, and the records behind each answer.
+
+    A line for each kind of formats. The counts and the 95 % limits are those of the smallest precision at which 99 %
+    of the records stay within the tolerance.
+    """
     groups: dict[tuple[str, ...], list[Share]] = {}
     for each in found:
         fmt = each.fmt
-        unit = "bits" if fmt.base == 2 else "decimal digits"
+        unit = "bits" if fmt.base == 2 else "digits"
         groups.setdefault((each.setting, each.states, each.form, fmt.rounding.value, unit), []).append(each)
     rows = []
     for (setting, states, form, rounding, unit), group in groups.items():
         answer = probability.needed(group)
-        cells = ("none" if each is None else f"{each} {unit}" for each in answer)
-        rows.append((f"{setting}, {states}", f"{form}, {rounding}", *cells))
-    head = ("model and states", "form and rounding", "99 % of the records", "99 %, lognormal", "99 %, no assumption")
+        observed, lognormal, shown = ("none" if each is None else f"{each} {unit}" for each in answer)
+        at = next((each for each in group if each.fmt.precision == answer.observed), None)
+        passed, limits = (f"{at.within} of {at.records}", f"{at.low:.3f} to {at.high:.3f}") if at else ("–", "–")
+        rows.append((f"{setting}, {states}", f"{form}, {rounding}", observed, passed, limits, lognormal, shown))
+    head = (
+        "model and states", "form and rounding", "99 % of the records", "passed", "probability", "99 %, lognormal",
+        "99 %, proved with 95 % confidence",
+    )  # fmt: skip
     return Table("smallest precision that stays within a milliarcsecond", head, tuple(rows))
 
 
@@ -305,7 +336,9 @@ def first_steps(found: Sequence[FirstStep]) -> Table:
     """Models that exceed (105) in their first step, by kind, with the 95 % limits of the probability."""
     rows = [(each.kind, str(each.models), str(each.exceeded), f"{each.low:.2f} to {each.high:.2f}") for each in found]
     return Table(
-        "models that exceed (105) in their first step", ("kind", "models", "exceed", "probability"), tuple(rows)
+        "models that exceed (105) in their first step",
+        ("kind", "models", "models that exceed (105)", "probability"),
+        tuple(rows),
     )
 
 
@@ -352,9 +385,9 @@ def bound_costs(
             cells.append(f"{value / float(error[at]):.3g}")
     costs = (
         ("a formula", "none"),
-        (f"{time:.0f} times the run", "106 bits for each step again"),
-        (f"{time:.0f} times the run", "106 bits for a second run"),
+        (f"{time:.0f} times the run", "106 bits, to repeat each step"),
+        (f"{time:.0f} times the run", "106 bits, for a second run"),
     )
     body = tuple((name, *cost, *cells) for (name, cells), cost in zip(ratios.items(), costs, strict=True))
-    head = ("bound", "processor time", "digits", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))
+    head = ("bound", "processor time", "extra digits", *(f"bound / error, {arithmetic(fmt)}" for fmt, _ in found))
     return Table(f"what a bound costs, after {k} steps", head, body)

@@ -47,7 +47,8 @@ PAGES = (
     LedgerPage("ledger-1984-2", "Report of 1984: inversion by elimination", "hung1984", r"II\.11.*"),
     LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter, roll and deroll", "hung1984", r"II\.1[234]|III.*"),
     LedgerPage("ledger-1982-1", "Report of 1982: budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"),
-    LedgerPage("ledger-1982-2", "Report of 1982: inversion, filter, geometry", "hung1982", r"III\.1[123].*|IV"),
+    LedgerPage("ledger-1982-2", "Report of 1982: inversion by elimination", "hung1982", r"III\.11.*"),
+    LedgerPage("ledger-1982-3", "Report of 1982: Kalman filter, geometry", "hung1982", r"III\.1[23]|IV"),
     LedgerPage("ledger-2016", "Note of 2016: digital integration", "savage2016", r".*"),
 )
 """The pages of the complete ledger; each statement is on exactly one of them."""
@@ -80,6 +81,10 @@ _REPLICATION = {
     Verdict.NOT_REPRODUCED: "not reproducible",
     Verdict.UNVERIFIABLE: "not reproducible",
 }
+
+
+_SHOWN = {Verdict.VERIFIED.value: 1, Verdict.GIVEN.value: 1, Verdict.MISPRINT.value: 2}
+"""How many texts of its evidence a verdict shows; others are collapsed, as most readers look for other verdicts."""
 
 
 def topics() -> dict[str, str]:
@@ -158,31 +163,43 @@ def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
 
 
 def error_table(rows: Iterable[Row]) -> Html:
-    """Tabulate the statements that disagree, the most serious first: place, verdict, what is wrong."""
-    found = [
-        (row, row.finding) for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS
-    ]
-    found.sort(key=lambda pair: DISAGREEMENTS.index(pair[1].verdict))
+    """Tabulate the errors behind the statements that disagree, the most serious first, with the statements affected.
+
+    Statements with the same root error share a row; their notes are collapsed.
+    """
+    found = [row for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS]
+    groups: dict[str, list[Row]] = {}
+    for row in found:
+        groups.setdefault((row.finding and row.finding.root) or row.statement.id, []).append(row)
+    ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
+    header = ("Error", "Verdict", "Statements affected")
+    table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
+    return Html(f"{len(found)} statements that disagree", table)
+
+
+def printed_table(rows: Iterable[Row], title: str) -> Html:
+    """Show statements as printed, collapsed under a title."""
     lines = [
-        f'<tr><th scope="row">{_link(row)}</th><td>{badge(row.outcome)}</td>'
-        f"<td><p>{typeset(finding.note or finding.recomputed)}</p>{_root(finding)}</td></tr>"
-        for row, finding in found
+        f'<tr><th scope="row">{_link(row)}</th><td>{typeset(row.statement.printed)}</td></tr>'
+        for row in in_reading_order(rows)
     ]
-    return Html(f"{len(found)} statements that disagree", _wrapped(("Statement", "Verdict", "What is wrong"), lines))
+    table = _wrapped(("Statement", "As printed"), lines, "ledger-printed")
+    return Html(title, f'<details class="derivation"><summary>{escape(title)}</summary>\n{table}</details>')
 
 
 def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
-    """Tabulate some rows in reading order: place, verdict, printed text, recomputation and note.
+    """Tabulate some rows in reading order: place, verdict, note, and the printed text collapsed.
 
     Parameters
     ----------
     rows : which.
-    left_undone : label the texts as what the documents leave undone and what is answered here.
+    left_undone : show all texts, labelled as what the documents leave undone and what is answered here.
     """
     rows = in_reading_order(rows)
     owner = topics()
     lines = [
-        f'<tr><th scope="row">{_link(row)}</th><td>{badge(row.outcome)}</td>{_evidence(row, owner)}</tr>'
+        f'<tr><th scope="row">{_link(row)}{_chapter(row, owner)}</th><td>{badge(row.outcome)}</td>'
+        f"{_evidence(row, note_first=not left_undone)}</tr>"
         for row in rows
     ]
     classes = "ledger-undone" if left_undone else ""
@@ -228,6 +245,29 @@ def _link(row: Row) -> str:
     return f"{link} <small>{statement.document}, {escape(place)}</small>"
 
 
+def _seriousness(row: Row) -> int:
+    return DISAGREEMENTS.index(row.finding.verdict) if row.finding else len(DISAGREEMENTS)
+
+
+def _error(group: Sequence[Row]) -> str:
+    """One error: what is wrong, the verdicts, and links to the statements of each document."""
+    notes = [typeset(row.finding.note or row.finding.recomputed) for row in group if row.finding]
+    finding = group[0].finding
+    text = _root_link(finding) if finding and finding.root else notes[0]
+    if finding and finding.root:
+        listed = "".join(f"<li>{_link(row)}: {note}</li>" for row, note in zip(group, notes, strict=True))
+        text += f"<details><summary>In detail</summary><ul>{listed}</ul></details>"
+    places: dict[str, list[str]] = {}
+    for row in group:
+        link = f'<a href="{address(row.statement)}">{typeset(row.statement.item)}</a>'
+        places.setdefault(row.statement.document, []).append(link)
+    affected = "".join(f"<p>{document}: {', '.join(links)}</p>" for document, links in places.items())
+    badges = " ".join(
+        badge(outcome) for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
+    )
+    return f'<tr><th scope="row">{text}</th><td>{badges}</td><td>{affected}</td></tr>'
+
+
 def _entry(row: Row, owner: dict[str, str]) -> str:
     statement = row.statement
     section = section_name(statement.chapter, statement.section)
@@ -235,28 +275,41 @@ def _entry(row: Row, owner: dict[str, str]) -> str:
     return (
         f'<tr id="{escape(statement.id)}" data-kind="{statement.kind}" data-verdict="{outcome}" '
         f'data-chapter="{owner.get(statement.id, "")}"><th scope="row"><a href="#{escape(statement.id)}">'
-        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}</th>"
+        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}{_chapter(row, owner)}</th>"
         f"<td>{badge(outcome_name(row.outcome))}</td>"
-        f"{_evidence(row, owner)}</tr>"
+        f"{_evidence(row)}</tr>"
     )
 
 
-def _evidence(row: Row, owner: dict[str, str]) -> str:
+def _chapter(row: Row, owner: dict[str, str]) -> str:
+    topic = owner.get(row.statement.id, "")
+    return f"<br>{chapter_link(topic)}" if topic in CHAPTERS else ""
+
+
+def _evidence(row: Row, note_first: bool = False) -> str:
     found, note, root = "", "", ""
     if row.finding:
         found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
-    topic = owner.get(row.statement.id, "")
-    link = chapter_link(topic) if topic in CHAPTERS else ""
-    named = (("printed", typeset(row.statement.printed)), ("recomputed", found), ("note", note), ("see", link))
-    texts = "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
-    return f"<td>{texts}{root}</td>"
+    named = [("printed", typeset(row.statement.printed)), ("recomputed", found), ("note", note)]
+    shown = _SHOWN.get(row.outcome, len(named))
+    if note_first and note:
+        named.insert(0, named.pop())
+        shown = 1
+    hidden = _paragraphs(named[shown:])
+    evidence = f"<details><summary>Evidence</summary>{hidden}</details>" if hidden else ""
+    return f"<td>{_paragraphs(named[:shown])}{root}{evidence}</td>"
+
+
+def _paragraphs(named: Iterable[tuple[str, str]]) -> str:
+    return "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
 
 
 def _root(finding: Finding) -> str:
-    if not finding.root:
-        return ""
-    title = typeset(load_roots()[finding.root].title)
-    return f'<p class="root"><a href="errata.html#root-{escape(finding.root)}">{title}</a></p>'
+    return f'<p class="root">{_root_link(finding)}</p>' if finding.root else ""
+
+
+def _root_link(finding: Finding) -> str:
+    return f'<a href="errata.html#root-{escape(finding.root)}">{typeset(load_roots()[finding.root].title)}</a>'
 
 
 def _wrapped(header: Sequence[str], lines: Sequence[str], classes: str = "") -> str:

@@ -1,1 +1,1 @@
-"""Roll and deroll: what rolling the spacecraft does to 1/f noise, and what its errors cost."""
+"""Roll and deroll: how rolling the spacecraft affects 1/f noise, and what errors of the roll cost."""

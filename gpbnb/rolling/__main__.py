@@ -1,4 +1,4 @@
-"""``python -m gpbnb.rolling``: simulate the years of all gyros again, and write ``drift_rates.csv`` to a folder."""
+"""``python -m gpbnb.rolling``: repeat the simulated years of all gyros, and write ``drift_rates.csv`` to a folder."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpbnb.rolling.stored import SWEEP
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(
         prog=SWEEP.command, description="Simulate the drift rates of all gyros, about 40 s of processor time."
     )

@@ -1,4 +1,4 @@
-"""The algebra of hung1984, ch. III, derived again, and the closed forms of what the report leaves open."""
+"""Derive the algebra of hung1984, ch. III, again, and closed forms for the questions that the report leaves open."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ SX, SY, N1, N2, SIGNAL, NOISE = sp.symbols("s_x s_y n_1 n_2 s n", real=True)
 
 
 def roll(angle: sp.Expr) -> sp.Matrix:
-    """The matrix of (5)."""
+    """Return the matrix of (5)."""
     return sp.Matrix([[sp.cos(angle), sp.sin(angle)], [-sp.sin(angle), sp.cos(angle)]])
 
 
 def deroll(angle: sp.Expr) -> sp.Matrix:
-    """The matrix of (7)."""
+    """Return the matrix of (7)."""
     return sp.Matrix([[sp.cos(angle), -sp.sin(angle)], [sp.sin(angle), sp.cos(angle)]])
 
 
 def one_dimension() -> Derivation:
-    """(3), (4) and (10), (11): what multiplication by a cosine makes of signal and noise."""
+    """Derive (3), (4), (10) and (11): the effect of multiplying signal and noise by a cosine."""
     phi = ROLL * TIME
     rolled = SIGNAL * sp.cos(phi) + NOISE
     return Derivation(
@@ -52,7 +52,7 @@ def one_dimension() -> Derivation:
 
 
 def two_dimensions() -> Derivation:
-    r"""(5)-(8), with a phase error ψ between roll and deroll: component by component."""
+    r"""Derive (5)-(8) component by component, with a phase error ψ between roll and deroll."""
     phi = ROLL * TIME
     rolled = roll(phi) * sp.Matrix([SX, SY])
     measured = rolled + sp.Matrix([N1, N2])
@@ -79,14 +79,14 @@ def two_dimensions() -> Derivation:
 
 
 def fits() -> Derivation:
-    r"""Drift rates fitted by least squares: of a constant frequency error, and of noise with and without rolling.
+    r"""Derive least-squares drift rates due to a constant frequency error, and due to noise with and without rolling.
 
-    The fit weighs the record with :math:`c(t) = 12(t-T/2)/T^3`.
+    The fit weights the record by :math:`c(t) = 12(t-T/2)/T^3`.
     """
     a, k, z, f, w = sp.symbols("A k z f w", positive=True)
     c = 12 * (TIME - T / 2) / T**3
     j0, j1 = sp.sin(z) / z, sp.sin(z) / z**2 - sp.cos(z) / z
-    # Of noise that begins with the record: response 1/sqrt(pi t) to white noise of density pi A.
+    # Noise that begins with the record has the response 1/sqrt(pi t) to white noise of density pi A.
     v = sp.Symbol("v", positive=True)
     on_white = sp.Integral(12 * ((1 - v) + w - sp.Rational(1, 2)) / sp.sqrt(sp.pi * w), (w, 0, v))
     return Derivation(
@@ -122,7 +122,7 @@ def fits() -> Derivation:
 
 
 def filters() -> Derivation:
-    """The error of a ramp behind a low-pass filter of noise bandwidth B, and its least value."""
+    """Derive the error of a ramp after a low-pass filter of noise bandwidth B, and the smallest error."""
     b, k, n0, tau, length = sp.symbols("B k N_0 tau L", positive=True)
     s = sp.Symbol("s", positive=True)
     pole = sp.exp(-s / tau) / tau
@@ -160,7 +160,7 @@ def filters() -> Derivation:
 
 
 def ramp_spectrum() -> Derivation:
-    """The transform of a ramp that is switched on, and of a record of it of length T."""
+    """Derive the transform of a ramp that is switched on, and of a record of it with length T."""
     w, k, z = sp.symbols("omega k z", positive=True)
     s = sp.Symbol("s", positive=True)
     m = sp.Symbol("m", integer=True, positive=True)
@@ -190,9 +190,10 @@ def ramp_spectrum() -> Derivation:
 
 
 def roll_rate() -> Derivation:
-    r"""Drift rates across a drift, of a roll rate that is a random walk of intensity q, for T = 1.
+    r"""Derive the false cross drift due to a roll rate that is a random walk of intensity q, for T = 1.
 
-    A step of the rate at u moves the phase by t - u from then on; with resets every P, by P/2 on average.
+    A step of the rate at time u moves the phase by t - u from then on. With resets every P, it moves it by P/2 on
+    average.
     """
     u, q, k, p = sp.symbols("u q k P", positive=True)
     c = 12 * (TIME - sp.Rational(1, 2))
@@ -222,7 +223,7 @@ def roll_rate() -> Derivation:
 
 
 def response() -> Derivation:
-    r"""The response of the noise as an integral over decays: with :math:`e^{y/2} = \cot\varphi` one of Wallis's."""
+    r"""Derive the noise response as an integral over decays; :math:`e^{y/2} = \cot\varphi` gives Wallis's integral."""
     phi = sp.Symbol("phi", positive=True)
     half = sp.cot(phi)
     steps = [

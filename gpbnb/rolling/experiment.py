@@ -1,4 +1,4 @@
-"""What does happen: records of 1/f noise rolled and derolled, an uneven roll rate, and rotations in t digits."""
+"""Simulations: 1/f noise with roll and deroll, an uneven roll rate, and rotations computed in t digits."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ __all__ = [
 
 
 def fit_drift(derolled: NDArray[np.complex128], interval: float = INTERVAL) -> NDArray[np.float64]:
-    """Drifts (2,) of x and y, mas a year, of straight lines fitted to a derolled record by least squares."""
+    """Fit straight lines to a derolled record by least squares; return the drifts (2,) of x and y in mas a year."""
     weights = theory.slope_weights(len(derolled), interval)
     return np.array([float(np.sum(weights * part)) * YEAR for part in (derolled.real, derolled.imag)])
 
@@ -87,7 +87,7 @@ def clean_drift_error(
     duration: float = YEAR,
     interval: float = 100.0,
 ) -> NDArray[np.float64]:
-    """Errors (2,) of both drifts, mas a year, of a record without noise that is derolled with a phase error."""
+    """Return the errors (2,) of both drifts, in mas a year, for a noise-free record derolled with a phase error."""
     stages = derolled_record(
         drift, 0.0, period, np.random.default_rng(0), samples_in(duration, interval), interval, phase_error
     )
@@ -99,7 +99,7 @@ def clean_drift_error(
 
 @dataclass(frozen=True)
 class DriftStudy:
-    """Errors of fitted drift rates, mas a year: (periods, gyros, 2), of x and y; a period of None is without roll."""
+    """Errors of fitted drift rates of x and y in mas a year, (periods, gyros, 2); a period of None means no roll."""
 
     periods: tuple[float | None, ...]
     level: float
@@ -108,17 +108,17 @@ class DriftStudy:
     errors: NDArray[np.float64]
 
     def standard_error(self) -> NDArray[np.float64]:
-        """Root mean square of the errors, for each period; the estimates have no bias."""
+        """Root mean square of the errors for each period; the estimates have no bias."""
         return np.sqrt(np.mean(self.errors**2, axis=(1, 2)))
 
     def uncertainty(self) -> float:
-        """Relative standard error of :meth:`standard_error`, from the number of errors."""
+        """Relative standard error of :meth:`standard_error`, from the number of simulated errors."""
         return 1 / math.sqrt(2 * self.errors[0].size)
 
 
 @compiled
 def _add_sums(first, noise, cosines, sines, slope, kx, ky, sums):  # type: ignore[no-untyped-def]
-    # One pass: signal rolled, noise added, derolled, and summed with the times, which are centred and scaled.
+    # One pass rolls the signal, adds noise, derolls, and sums with the centred and scaled times.
     for p in range(cosines.shape[0]):
         for i in range(noise.shape[0]):
             t = slope * (first + i) - 1.0
@@ -141,19 +141,19 @@ def drift_rates(
     drift: tuple[float, float] = theory.DRIFTS,
     progress: bool = False,
 ) -> DriftStudy:
-    """Roll, measure, deroll and fit both drifts of gyros with two readouts each, in blocks: in bounded memory.
+    """Roll, measure, deroll and fit both drifts of gyros with two readouts each, in blocks that bound the memory.
 
-    The same noise serves each period.
+    All periods use the same noise.
 
     Parameters
     ----------
-    periods : of roll, s; None for no rolling.
-    gyros : number of them; gyro i has the same noise whatever the number.
+    periods : roll periods, s; None for no rolling.
+    gyros : number of gyros; gyro i has the same noise for any number.
     rng : source of the noise.
-    level : of the noise of each readout, mas².
-    duration, interval : of the record and between samples, s.
-    drift : of x and y, mas a year.
-    progress : show a bar.
+    level : level of the noise of each readout, mas².
+    duration, interval : length of the record and time between samples, s.
+    drift : drifts of x and y, mas a year.
+    progress : show a progress bar.
     """
     n = samples_in(duration, interval)
     if gyros < 1 or not periods:
@@ -165,7 +165,7 @@ def drift_rates(
         raise ValueError(f"got drifts {drift}; needed finite numbers, in mas a year")
     sums = np.zeros((len(periods), gyros, 2))
     slope = 2 / (n - 1)  # times run from -1 to 1
-    half = (n - 1) * interval / YEAR / 2  # of the record, in years
+    half = (n - 1) * interval / YEAR / 2  # length of the record in years
     first = 0
     block = max(1, 2**18 // gyros)
     blocks = flicker(level, n, 2 * gyros, rng, block)
@@ -180,14 +180,14 @@ def drift_rates(
 
 
 SURVEY = Path(__file__).with_name("drift_rates.csv")
-"""Errors of drift rates of `SURVEY_GYROS` gyros, a year each; ``python -m gpbnb.rolling`` writes it again."""
+"""Errors of the drift rates of `SURVEY_GYROS` gyros, a year each; ``python -m gpbnb.rolling`` recomputes the file."""
 
 SURVEY_PERIODS = (None, 6000.0, 600.0, 200.0, 77.5)
 SURVEY_GYROS = 128
 
 
 def survey_rng() -> np.random.Generator:
-    """The generator of the survey, as at its beginning."""
+    """Return the generator of the survey in its initial state."""
     return np.random.default_rng(1984)
 
 
@@ -211,7 +211,7 @@ def survey() -> DriftStudy:
 
 
 def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
-    """A study as rows of the stored file, one for each gyro, with six digits."""
+    """Return a study as rows of the stored file, one for each gyro, with six digits."""
     table = study.errors.transpose(1, 0, 2).reshape(study.errors.shape[1], -1)
     return [(str(gyro), *(f"{value:.5e}" for value in row)) for gyro, row in enumerate(table)]
 
@@ -221,9 +221,9 @@ def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
 
 @dataclass(frozen=True)
 class FilterStudy:
-    """Mean square errors, mas², behind low-pass filters: (filters, records), after their start.
+    """Mean square errors (filters, records) in mas², after low-pass filters that have settled.
 
-    `lag` and `bandwidth` are those of the filters, `error` is the mean over the records.
+    `lag` and `bandwidth` are those of the filters; `error` is the mean over the records.
     """
 
     drift: float
@@ -254,9 +254,9 @@ def filter_study(
     duration: float = YEAR,
     interval: float = INTERVAL,
 ) -> FilterStudy:
-    """Measure the error of a drift behind a single pole and a moving average of each noise bandwidth, in Hz.
+    """Measure the error of a drift after a single pole and after a moving average, for each noise bandwidth in Hz.
 
-    Both components of each gyro, rolled and derolled, are a record. Averages are taken from ten time constants on.
+    Each component of each gyro, rolled and derolled, is a record. Averages start after ten time constants.
     """
     n = samples_in(duration, interval)
     names = [*("single pole" for _ in bandwidths), *("moving average" for _ in bandwidths)]
@@ -291,10 +291,10 @@ def filter_study(
 def image_behind(
     weights: NDArray[np.float64], drift: float, period: float, samples: int, interval: float = INTERVAL
 ) -> NDArray[np.float64]:
-    """The double-frequency term that a filter leaves of a ramp that is rolled and derolled in one dimension, mas.
+    """Return the double-frequency term that remains after filtering a ramp rolled and derolled in one dimension; mas.
 
-    Twice the derolled signal, so that its strength is one, is filtered; what the ramp itself gives behind the filter
-    is taken off. The last turn is returned.
+    The filter gets twice the derolled signal, so that the ramp has its full strength. The filtered ramp itself is then
+    subtracted. The function returns the last turn.
     """
     n = np.arange(samples)
     ramp = drift / YEAR * interval * n
@@ -315,13 +315,13 @@ def roll_rate_errors(
     step: float,
     resets: Sequence[int | None],
 ) -> NDArray[np.float64]:
-    """Drift rates across a drift, fitted to a ramp that is derolled at the nominal rate, mas a year.
+    """Fit the cross drift rates of a ramp that is derolled at the nominal rate; mas a year.
 
     Parameters
     ----------
     drift : k, mas a year.
-    rates : departures (n,) of the roll rate from the nominal one, rad/s, one array a trial.
-    step : s between two rates; each is kept for one step.
+    rates : deviations (n,) of the roll rate from the nominal rate, rad/s, one array for each trial.
+    step : time between two rates, s; each rate lasts for one step.
     resets : steps between resets of the phase by the star sensor; None for never.
 
     Returns
@@ -337,7 +337,7 @@ def roll_rate_errors(
         ramp = drift * step * (np.arange(n) + 0.5)
         line = []
         for reset in resets:
-            # At a reset the phase is again that of the spacecraft.
+            # A reset sets the phase to that of the spacecraft.
             wrong = middle if reset is None else middle - np.repeat(begin[::reset], reset)[:n]
             line.append(float(np.sum(weights * ramp * np.sin(-wrong))))
         errors.append(line)
@@ -347,7 +347,7 @@ def roll_rate_errors(
 def rate_walks(
     intensity: float, trials: int, steps: int, step: float, rng: np.random.Generator
 ) -> Iterator[NDArray[np.float64]]:
-    """Roll rates that are random walks from zero, of variance `intensity` (rad²/s³) times the time."""
+    """Draw roll rates that are random walks from zero, whose variance is `intensity` (rad²/s³) times the time."""
     for _ in range(trials):
         yield np.cumsum(rng.standard_normal(steps)) * math.sqrt(intensity * step)
 
@@ -355,7 +355,7 @@ def rate_walks(
 def rate_sines(
     amplitude: float, period: float, trials: int, steps: int, step: float, rng: np.random.Generator
 ) -> Iterator[NDArray[np.float64]]:
-    """Roll rates that are sinusoids of random phase: amplitude in rad/s, period in s."""
+    """Draw roll rates that are sinusoids of random phase; amplitude in rad/s, period in s."""
     t = np.arange(steps) * step
     for _ in range(trials):
         yield amplitude * np.cos(2 * np.pi * (t / period + rng.random()))

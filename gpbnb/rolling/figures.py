@@ -1,6 +1,6 @@
 """Figures of the chapter on roll and deroll: ``(result, ax)`` in, artists out.
 
-Blue points are simulated noise and errors, purple points the drift signal. Solid lines are theory that holds; dashed
+Blue points show simulated noise and errors, purple points the drift signal. Solid lines are theory that holds; dashed
 lines are printed formulas that fail.
 """
 
@@ -60,12 +60,12 @@ def density(spectrum: Spectrum, level: float, slope: Slope, ax: Axes) -> list[Dr
 
 
 def residual(spectrum: Spectrum, level: float, interval: float, ax: Axes) -> list[Drawn]:
-    """Draw the measured density over the expected one, with two standard errors."""
+    """Draw the ratio of measured to expected density, with two standard errors."""
     ratio = spectrum.density / theory.flicker_density(level, spectrum.frequency, interval)
     artists: list[Drawn] = [
         ax.errorbar(spectrum.frequency, ratio, 2 * spectrum.error, fmt="o", color=OBSERVED, label="measured")
     ]
-    artists.append(ax.axhline(1, color=VALID, label="expected of samples"))
+    artists.append(ax.axhline(1, color=VALID, label="expected for the samples"))
     ax.set_xscale("log")
     label(ax, "frequency (Hz)", "measured / expected\n(no unit)")
     return artists

@@ -1,12 +1,12 @@
-r"""Causal 1/f noise by the sample: reproducible, of stated density, in bounded memory for any length.
+r"""Causal 1/f noise, sample by sample: reproducible, with a stated density, in bounded memory for any length.
 
 White noise passes through the fractional difference of order one half, whose response is
 :math:`h_k = \binom{2k}{k}/4^k` (Kasdin 1995). As an integral over decays,
 
 .. math:: h_k = \frac1\pi\int_{-\infty}^{\infty} \frac{(1+e^y)^{-k}}{2\cosh(y/2)}\,dy,
 
-it is a sum of some hundred exponentials, found by the trapezoidal rule, which converges here like
-:math:`2\sqrt2\,e^{-\pi^2/\text{step}}`. Each exponential is a filter with one number of memory.
+the response is a sum of some hundred exponentials. The trapezoidal rule gives them and converges here like
+:math:`2\sqrt2\,e^{-\pi^2/\text{step}}`. Each exponential is a filter with a memory of one number.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.kernels.compiling import compiled
 
 ACCURACY = 1e-6
-"""Of the response h_k, relative, up to `LONGEST`."""
+"""Relative error of the response h_k for k up to `LONGEST`."""
 
 LONGEST = 10**10
-"""Samples up to which the response is accurate, three thousand years at one every 10 s."""
+"""Number of samples up to which the response is accurate; at one sample every 10 s, three thousand years."""
 
 
 def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    r"""Poles p and weights w with :math:`h_k = \sum_j w_j p_j^k`, for 1 ≤ k < `longest`.
+    r"""Return poles p and weights w such that :math:`h_k = \sum_j w_j p_j^k`, for 1 ≤ k < `longest`.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[ND
         raise ValueError(f"got an accuracy of {accuracy}; needed 1e-12 to 0.1")
     if not 1 <= longest <= LONGEST:
         raise ValueError(f"got {longest} samples; needed 1 to {LONGEST}")
-    # A third of the error each: the step, the largest y, the slowest decays joined into one that never ends.
+    # A third of the error each: the step, the largest y, and joining the slowest decays into one that never ends.
     share = accuracy / 3
     step = math.pi**2 / math.log(2 * math.sqrt(2) / share)
     last = -math.log(share) / 1.5
@@ -74,7 +74,7 @@ def _filter(poles, weights, states, white, out):  # type: ignore[no-untyped-def]
 def flicker(
     level: float, samples: int, channels: int, rng: np.random.Generator, block: int = 2**15
 ) -> Iterator[NDArray[np.float64]]:
-    r"""Independent records of 1/f noise, block by block; each starts at rest.
+    r"""Generate independent records of 1/f noise, block by block; each starts at rest.
 
     The one-sided density of samples taken Δt apart is :math:`\pi A\,\Delta t/\sin(\pi f\Delta t)`, and A/f at low
     frequencies, whatever Δt. A channel's noise depends neither on the number of channels nor on the block.
@@ -82,10 +82,10 @@ def flicker(
     Parameters
     ----------
     level : A, in the square of the noise's unit.
-    samples : of each record.
+    samples : number of samples in each record.
     channels : number of records.
-    rng : each channel draws from a child of it.
-    block : samples at a time; memory grows with it alone.
+    rng : generator; each channel draws from a child of it.
+    block : number of samples at a time; it determines the memory.
 
     Yields
     ------
@@ -124,5 +124,5 @@ def _blocks(
 
 
 def record(level: float, samples: int, channels: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """As :func:`flicker`, in one array (samples, channels)."""
+    """Return the noise of :func:`flicker` in one array (samples, channels)."""
     return np.concatenate(list(flicker(level, samples, channels, rng)))

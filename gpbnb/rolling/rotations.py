@@ -1,4 +1,4 @@
-"""Rounded rotations, emulated digit by digit: recursively, and directly from each angle."""
+"""Rounded rotations, emulated digit by digit: by recursion, and directly from each angle."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from gpbnb.rolling.theory import INTERVAL
 
 
 def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
-    """Rounding error of ω_r = 2π/T in a register: the rounded less the true rate, rad/s."""
+    """Return the rounding error of ω_r = 2π/T in a register: rounded rate minus true rate, rad/s."""
     rate = theory.roll_rate(period)
     return float(fmt.round(rate) - rate)
 
 
 @dataclass(frozen=True)
 class Rotation:
-    """A rotation (cos nδ, sin nδ) computed in a format: relative amplitude and phase errors, and size of both.
+    """A rotation (cos nδ, sin nδ) computed in a format, with its amplitude error, phase error and total error.
 
-    `method` is "recursion" or "direct", `step` the samples n looked at, `bound` that of the size.
+    `method` is "recursion" or "direct", `step` holds the samples n, and `bound` the bound on `size`, the total error.
     """
 
     fmt: FloatFormat
@@ -46,7 +46,7 @@ class Rotation:
     bound: NDArray[np.float64]
 
     def drift_error(self, drift: float) -> float:
-        """Largest error in mas of a ramp of `drift` mas a year, derolled with this rotation."""
+        """Return the largest error in mas of a ramp of `drift` mas a year that is derolled with this rotation."""
         return float(np.max(self.size * self.step * (drift * self.interval / YEAR)))
 
 
@@ -67,7 +67,7 @@ def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
 
 
 def _exact_turn(n: int, period: float, interval: float) -> tuple[Fraction, Fraction]:
-    """Cosine and sine of n steps, to 60 digits."""
+    """Return cosine and sine of n steps, to 60 digits."""
     turns = n * Fraction(interval) / Fraction(period) % 1
     with mpmath.workdps(60):
         angle = 2 * mpmath.mpf(turns.numerator) / turns.denominator
@@ -82,7 +82,7 @@ def _fraction(x: Any) -> Fraction:
 def _compared(
     fmt: FloatFormat, period: float, interval: float, method: str, steps: Any, values: Any, bounds: Any
 ) -> Rotation:
-    """Errors of computed pairs (m, 2) of exact Fractions."""
+    """Return the errors of computed pairs (m, 2) of exact Fractions."""
     errors = []
     for n, (c, s) in zip(steps, values, strict=True):
         cosine, sine = _exact_turn(int(n), period, interval)
@@ -107,9 +107,9 @@ def recursion(
 
     Parameters
     ----------
-    fmt : base 2, 10 or 16 of a precision that has compiled loops.
-    period, interval : of roll and between samples, s.
-    steps : samples to look at, ascending.
+    fmt : a format in base 2, 10 or 16 with a precision that has compiled loops.
+    period, interval : roll period and time between samples, s.
+    steps : samples at which errors are evaluated, ascending.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def digits_needed_observed(
 ) -> int:
     """Find the smallest precision with which a year's deroll of a drift stays within `error` mas.
 
-    Found by :func:`gpbnb.arithmetic.search.smallest_precision` up to what the bound proves to be enough.
+    :func:`gpbnb.arithmetic.search.smallest_precision` searches up to the precision that the bound proves to be enough.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def digits_needed_observed(
     def within(fmt: FloatFormat) -> bool:
         try:
             return rotate(fmt, period, steps).drift_error(drift) <= error
-        except OverflowError:  # with few digits the rotation grows without limit
+        except OverflowError:  # with few digits, the rotation grows without limit
             return False
 
     found = smallest_precision(within, base, least=2, largest=most)

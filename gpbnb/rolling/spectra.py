@@ -1,4 +1,4 @@
-"""Spectra of signal and noise: estimates from records, and records of a rolled ramp."""
+"""Estimate spectra of signal and noise from records, and simulate records of a rolled ramp."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def samples_in(duration: float, interval: float) -> int:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """One-sided density, mas²/Hz, averaged in bands: `averages` is the number of independent values in each."""
+    """One-sided density in mas²/Hz, averaged in bands; `averages` is the number of independent values in each band."""
 
     frequency: NDArray[np.float64]
     density: NDArray[np.float64]
@@ -38,7 +38,7 @@ class Spectrum:
 
     @property
     def error(self) -> NDArray[np.float64]:
-        """Relative standard error of the density, a mean of so many values that are chi-square of two degrees."""
+        """Relative standard error of the density, a mean of `averages` chi-square values of two degrees of freedom."""
         return 1 / np.sqrt(self.averages)
 
 
@@ -49,29 +49,29 @@ def in_bands(frequency: Any, density: Any, averages: float, first: float, last: 
     counts = np.array([np.count_nonzero(place == i) for i in range(bands)])
     full = np.flatnonzero(counts)
     middle = np.array([math.exp(np.mean(np.log(frequency[place == i]))) for i in full])
-    # Of f times the density, so that 1/f noise has no bias within a band.
+    # Average f times the density, so that 1/f noise has no bias within a band.
     mean = np.array([np.mean((frequency * density)[place == i]) for i in full]) / middle
     return Spectrum(middle, mean, averages * counts[full])
 
 
 def welch(records: NDArray[np.float64], interval: float, segment: int) -> tuple[Any, Any, float]:
-    """Welch's estimate, Hann windows overlapping by half, of records (samples, channels).
+    """Estimate the density of records (samples, channels) by Welch's method, with Hann windows that overlap by half.
 
     Returns
     -------
-    frequency, density : without that of frequency zero, and of the two next to it, into which the mean leaks.
-    averages : number of independent periodograms that it is worth.
+    frequency, density : without frequency zero and the two frequencies next to it, into which the mean leaks.
+    averages : equivalent number of independent periodograms.
     """
     f, p = signal.welch(records, 1 / interval, "hann", segment, axis=0)
     count = 2 * (len(records) // segment) - 1
-    # Overlapping by half, Hann-windowed segments have a correlation of their periodograms of 1/36 (Welch 1967); and
+    # Periodograms of Hann-windowed segments that overlap by half have a correlation of 1/36 (Welch 1967), and
     # neighbouring frequencies are correlated too: a sum over a band is worth 18/35 of its number (see below).
     worth = count / (1 + 2 * (count - 1) / count / 36)
     return f[3:], np.mean(p[3:], axis=1), worth * records.shape[1] * HANN
 
 
 HANN = 18 / 35
-r"""Independent values in a band of a Hann-windowed periodogram, a frequency, :math:`1/(1 + 2(4/9) + 2/36)`."""
+r"""Independent values per frequency in a band of a Hann-windowed periodogram, :math:`1/(1 + 2(4/9) + 2/36)`."""
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,9 @@ class Slope:
 
 
 def fit_slope(spectrum: Spectrum, interval: float = INTERVAL) -> Slope:
-    """Fit a line to log density against log frequency, each band with its weight; sampling is accounted for."""
+    """Fit a line to log density against log frequency, with a weight for each band, and correct for sampling."""
     x = np.log10(spectrum.frequency)
-    # The logarithm of a mean of m values is low by 1/(2m); samples have a density higher by x/sin x, x = πfΔt.
+    # The logarithm of a mean of m values is too low by 1/(2m). Sampling raises the density by x/sin x, x = πfΔt.
     y = np.log10(spectrum.density * np.sinc(spectrum.frequency * interval)) + np.log10(np.e) / (2 * spectrum.averages)
     w = spectrum.averages
     x = x - np.sum(w * x) / np.sum(w)
@@ -102,7 +102,7 @@ def noise_spectrum(
     interval: float = INTERVAL,
     bands: int = 24,
 ) -> Spectrum:
-    """Density of the generated noise by Welch's method, in bands from 4 cycles a segment to f = 0.12/Δt."""
+    """Estimate the density of generated noise by Welch's method, in bands from 4 cycles a segment to f = 0.12/Δt."""
     records = record(LEVEL, samples, channels, rng)
     f, p, averages = welch(records, interval, segment)
     return in_bands(f, p, averages, 4 / (segment * interval), 0.12 / interval, bands)
@@ -110,11 +110,11 @@ def noise_spectrum(
 
 @dataclass(frozen=True)
 class Spectra:
-    """One-sided densities, mas²/Hz, of a year of a drift and of the noise, before rolling, rolled, and derolled.
+    """One-sided densities in mas²/Hz of a year of drift and noise: before rolling, rolled, and derolled.
 
-    `ramp`, `noise` and `derolled` (noise) are averages in bands. `offset` is in cycles a record, as distance from the
-    roll frequency of one readout (`line_signal`, `line_noise`), or as frequency of a derolled component
-    (`base_signal`, `base_noise`, from one cycle on).
+    `ramp`, `noise` and `derolled` (noise) are averages in bands. `offset` is in cycles per record. For one readout
+    (`line_signal`, `line_noise`) it is the distance from the roll frequency; for a derolled component (`base_signal`,
+    `base_noise`) it is the frequency, from one cycle on.
     """
 
     drift: float
@@ -133,7 +133,7 @@ class Spectra:
 
 
 def periodogram(x: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
-    """One-sided density of a whole record without a window, from one cycle a record on; the record is real."""
+    """Return the one-sided density of a whole real record without a window, from one cycle per record on."""
     return np.asarray(2 * np.abs(np.fft.rfft(x)[1:]) ** 2 * interval / len(x))
 
 
@@ -201,10 +201,10 @@ def derolled_record(
 
     Parameters
     ----------
-    drift : of x and y, mas a year.
-    level : of the noise of each readout, mas²; 0 for none.
-    period, interval : of roll and between samples, s.
-    phase_error : by how much the deroll is ahead, rad, a function of times (n,) in s; None for not.
+    drift : drifts of x and y, mas a year.
+    level : level of the noise of each readout, mas²; 0 for none.
+    period, interval : roll period and time between samples, s.
+    phase_error : angle in rad by which the deroll is ahead, a function of times (n,) in s; None for no error.
 
     Returns
     -------

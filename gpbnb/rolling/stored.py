@@ -21,12 +21,12 @@ def compute(gyros: int, directory: Path | None = None) -> list[tuple[str, ...]]:
 
 
 def rows(gyros: int, result: Sequence[Any]) -> list[tuple[str, ...]]:
-    """The rows of the table; a saved result has lists for tuples."""
+    """Return the rows of the table; a saved result has lists in place of tuples."""
     return [tuple(row) for row in result]
 
 
 def sample(gyros: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """The rows of the first one to three gyros."""
+    """Return the rows of the first one to three gyros."""
     return compute(int(rng.integers(1, 4)))
 
 

@@ -12,21 +12,21 @@ from gpbnb.rolling import experiment, theory
 
 
 def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
-    """Tabulate the cost of rounding ω_r in a year: in the worst case, and as it rounds."""
+    """Tabulate what rounding ω_r costs in a year: in the worst case and with the actual rounding."""
     body = []
     for fmt in formats:
         for case, error in (
             ("worst", float(theory.worst_rate_error(period, fmt))),
-            ("as rounded", abs(experiment.rounded_rate_error(period, fmt))),
+            ("actual rounding", abs(experiment.rounded_rate_error(period, fmt))),
         ):
             body.append((arithmetic(fmt), case, *_cells(error)))
     header = (
         "register",
-        "which $\\Delta\\omega$",
+        "case",
         "$\\Delta\\omega$ (rad/s)",
         "phase after a year (rad)",
-        "strength lost, one dimension",
-        "drift across, two dimensions (mas a year)",
+        "share of the signal lost, one dimension",
+        "false drift at right angles, two dimensions (mas a year)",
     )
     return Table(f"What rounding the roll rate of {period:g} s costs", header, tuple(body))
 
@@ -38,7 +38,7 @@ def _cells(error: float) -> tuple[str, ...]:
 
 
 def _small(value: float) -> str:
-    # What is left of a zero by rounding differs from machine to machine.
+    # The rounding error of a zero differs from machine to machine.
     return f"{value:.2g}" if value > 1e-9 else "0"
 
 
@@ -71,14 +71,14 @@ def drift_errors(study: experiment.DriftStudy) -> Table:
                 f"{plain / closed:.3g}",
             )
         )
-    header = ("roll period", "simulated", "closed form", "difference / standard error", "better than without")
+    header = ("roll period", "simulated", "closed form", "difference / standard error", "gain over no roll")
     return Table("Standard error of a drift rate (mas a year)", header, tuple(body))
 
 
 def filters(
     named: Mapping[str, object], drift: float, level: float, period: float, samples: int, interval: float
 ) -> Table:
-    """Filters beside each other: lag, noise in the band, slow noise let through, and the image of one dimension."""
+    """Compare filters: lag, noise in the band, slow noise that passes, total noise, and the image in one dimension."""
     density = float(theory.flicker_density(level, 1 / period, interval))
     body = []
     for name, weights in named.items():
@@ -94,7 +94,14 @@ def filters(
                 _small(abs(image).max()),
             )
         )
-    header = ("filter", "lag", "noise in the band", "slow noise let through", "noise, exact", "image, one dimension")
+    header = (
+        "filter",
+        "lag",
+        "noise in the band",
+        "slow noise let through",
+        "total noise, exact",
+        "image, one dimension",
+    )
     return Table("What filters leave, in mas at the end of the record", header, tuple(body))
 
 

@@ -1,9 +1,9 @@
 r"""Theory: closed forms for rolling, 1/f noise, filters, an uneven roll rate and rounded rotations.
 
-Times are in seconds, angles of roll in radians, angles of the gyro in milliarcseconds (mas), drift rates in mas a year.
-The 1/f noise has the one-sided power spectral density `level` / f, in mas² a hertz; `level` is in mas². A pair
+Times are in seconds, roll angles in radians, gyro angles in milliarcseconds (mas), and drift rates in mas a year.
+The 1/f noise has the one-sided power spectral density `level` / f, in mas²/Hz; `level` is in mas². A pair
 (x, y) is also written as the complex number :math:`z = x + iy`: the roll (5) of hung1984, ch. III, is then a product
-with :math:`e^{-i\omega_r t}`, the deroll (7) one with :math:`e^{+i\omega_r t}`.
+with :math:`e^{-i\omega_r t}`, and the deroll (7) a product with :math:`e^{+i\omega_r t}`.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ DRIFTS = (6600.0, 40.0)
 """Geodetic drift and frame dragging, in mas a year, rounded; Everitt et al. 2011."""
 
 PERIOD, PERIOD_FLOWN = 600.0, 77.5
-"""Roll periods in seconds, of hung1984, ch. III, section 4, and as flown."""
+"""Roll periods in seconds, from hung1984, ch. III, section 4, and as flown."""
 
 INTERVAL = 10.0
-"""Between two samples, in seconds."""
+"""Time between two samples, in seconds."""
 
 LEVEL = 200.0**2 / PERIOD_FLOWN
-"""An example of a noise level, in mas², which is 200 mas/√Hz at the roll frequency flown. No document gives one."""
+"""Example of a noise level in mas². It gives 200 mas/√Hz at the roll frequency flown. No document states a level."""
 
 _POINTS = np.polynomial.legendre.leggauss(400)
 
@@ -49,7 +49,7 @@ def rotation(phase: float) -> NDArray[np.float64]:
 
 
 def phase_error_cost(drift: tuple[float, float], phase: float) -> NDArray[np.float64]:
-    r"""Error of both drifts if the deroll is ahead of the roll by a constant angle.
+    r"""Errors of both drifts if the deroll is ahead of the roll by a constant angle.
 
     .. math:: z\,(e^{i\theta} - 1), \qquad
         \begin{bmatrix} k_x(\cos\theta-1) - k_y\sin\theta \\ k_x\sin\theta + k_y(\cos\theta-1) \end{bmatrix}
@@ -79,11 +79,11 @@ def largest_phase(drift: tuple[float, float], error: float) -> float:
 def fitted_drift(
     drift: tuple[float, float], phase: Callable[[Any], Any], duration: float = YEAR
 ) -> NDArray[np.float64]:
-    r"""Drifts that a least-squares line finds in a ramp derolled with a varying phase error.
+    r"""Drifts that a least-squares fit finds in a ramp derolled with a varying phase error.
 
     .. math:: \frac{12}{T^3}\int_0^T \Bigl(t-\frac T2\Bigr)\, z t\, e^{i\psi(t)}\, dt
 
-    By 400-point Gauss-Legendre quadrature: for phase errors of less than some hundred radians.
+    The integral is evaluated by 400-point Gauss-Legendre quadrature, for phase errors below some hundred radians.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def fitted_drift(
 
     References
     ----------
-    In one dimension, ½cos ψ for e^{iψ}: hung1984, ch. III, (11).
+    hung1984, ch. III, (11), for one dimension, where ½cos ψ replaces e^{iψ}.
     """
     nodes, weights = _POINTS
     x = (nodes + 1) / 2
@@ -115,7 +115,7 @@ def roll_rate(period: float) -> Fraction:
 
 
 def worst_rate_error(period: float, fmt: FloatFormat) -> Fraction:
-    """Bound on the error of ω_r in a register, rad/s: half a unit in the last place, or a whole unit if chopped.
+    """Bound on the error of ω_r in a register, rad/s: half a unit in the last place, or one unit if chopped.
 
     References
     ----------
@@ -133,7 +133,7 @@ def off_tuned_loss(rate_error: float, duration: float = YEAR) -> float:
 def off_tuned_drift(drift: float, rate_error: float, duration: float = YEAR) -> float:
     r"""False drift across a drift k from a constant frequency error in two dimensions, about :math:`k\,\Delta\omega T`.
 
-    In the unit of `drift`; `rate_error` in rad/s.
+    The result has the unit of `drift`; `rate_error` is in rad/s.
     """
     return float(fitted_drift((drift, 0.0), lambda t: rate_error * t, duration)[1])
 
@@ -152,8 +152,8 @@ def ramp_density(drift: float, duration: float, frequency: Any) -> NDArray[np.fl
     .. math:: \frac2T \Bigl|\int_0^T k t\, e^{-i\omega t} dt\Bigr|^2
         = \frac{k^2T^3}{2}\,\bigl[j_0(z)^2 + j_1(z)^2\bigr], \qquad z = \frac{\omega T}{2}
 
-    j are spherical Bessel functions. It falls as :math:`2k^2T/\omega^2`, not as :math:`\omega^{-4}`: the record ends
-    with a jump.
+    j are spherical Bessel functions. The density falls as :math:`2k^2T/\omega^2`, not as :math:`\omega^{-4}`,
+    because the record ends with a jump.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def flicker_density(level: float, frequency: Any, interval: float | None = None)
 
     .. math:: \frac{A}{f}, \qquad \frac{\pi A\,\Delta t}{|\sin \pi f \Delta t|}
 
-    The second is that of a fractional difference of order one half of white noise of variance πA.
+    The second formula is the density of white noise with variance πA after a fractional difference of order one half.
 
     References
     ----------
@@ -184,18 +184,19 @@ def flicker_density(level: float, frequency: Any, interval: float | None = None)
 
 
 def derolled_density(level: float, period: float, frequency: Any, interval: float | None = None) -> NDArray[np.float64]:
-    r"""One-sided density of the noise of each derolled component of (7), of two equal and independent noises.
+    r"""One-sided density of the noise in each component derolled by (7), from two equal and independent noises.
 
     .. math:: \tfrac12\bigl[S(f_r - f) + S(f_r + f)\bigr] \;\to\; S(f_r) \text{ for } f \to 0
 
-    Of the one-dimensional (3), :math:`n\cos(\omega_r t+\theta)`: half of it, beside half of the signal.
+    In one dimension, (3), the noise :math:`n\cos(\omega_r t+\theta)` has half this density, and the signal half its
+    size.
     """
     f, roll = np.asarray(frequency, dtype=np.float64), 1 / period
     return np.asarray((flicker_density(level, roll - f, interval) + flicker_density(level, roll + f, interval)) / 2)
 
 
 FLOWN_DENSITY = float(flicker_density(LEVEL, 1 / PERIOD_FLOWN, INTERVAL))
-"""Of samples of the example's noise at the roll frequency that was flown, mas²/Hz."""
+"""Density of the sampled noise of the example at the roll frequency that was flown, mas²/Hz."""
 
 
 # -- sums of noise samples, exactly --------------------------------------------------------------
@@ -217,7 +218,7 @@ def variance_of_sum(weights: Any, level: float) -> float:
 
     .. math:: \pi A \sum_i \Bigl(\sum_{m\ge i} a_m h_{m-i}\Bigr)^2
 
-    Every linear use of the noise is such a sum: a fitted drift, the output of a filter.
+    Every linear use of the noise is such a sum, for example a fitted drift or the output of a filter.
 
     Parameters
     ----------
@@ -249,9 +250,9 @@ def drift_error(level: float, samples: int, period: float | None = None, interva
 
     Parameters
     ----------
-    level : of the noise of each readout, mas².
-    samples, interval : number, and seconds from one to the next.
-    period : of roll, s; None without rolling.
+    level : level of the noise of each readout, mas².
+    samples, interval : number of samples, and seconds between them.
+    period : roll period, s; None without rolling.
     """
     a = slope_weights(samples, interval)
     if period is None:
@@ -270,7 +271,7 @@ def drift_error_unrolled(level: float, duration: float = YEAR, at_rest: bool = F
     ----------
     level : A, mas².
     duration : T, s.
-    at_rest : the noise begins with the record, which leaves :math:`\sqrt{8A}/T`; else it is much older.
+    at_rest : whether the noise begins with the record, which gives :math:`\sqrt{8A}/T`; otherwise it is much older.
     """
     return math.sqrt((8 if at_rest else 9) * level) / duration * YEAR
 
@@ -281,7 +282,7 @@ def drift_error_rolled(level: float, period: float, duration: float = YEAR, inte
     Parameters
     ----------
     level, period, duration : A, T_r and T, mas² and s.
-    interval : between samples, for their density at f_r; None for A/f_r.
+    interval : time between samples, for the density of samples at f_r; None for A/f_r.
     """
     return math.sqrt(6 * float(flicker_density(level, 1 / period, interval)) / duration**3) * YEAR
 
@@ -338,7 +339,7 @@ def noise_bandwidth(weights: Any, interval: float = INTERVAL) -> float:
 def filtered_variance(
     weights: Any, level: float, samples: int, period: float | None, interval: float = INTERVAL
 ) -> float:
-    """Variance, in mas², of the derolled and filtered noise of a component at the last of some samples; exact."""
+    """Exact variance, in mas², of the derolled and filtered noise in one component at the last sample."""
     a = np.zeros(samples)
     kept = min(samples, len(weights))
     a[samples - kept :] = np.asarray(weights)[:kept][::-1]
@@ -353,8 +354,8 @@ def filtered_error(drift: float, density: float, bandwidth: Any) -> NDArray[np.f
 
     .. math:: \frac{k^2}{16B^2} + N_0 B
 
-    It is the same function of the noise bandwidth B for a single pole, whose time constant and lag are 1/(4B), and for
-    a moving average, whose length is 1/(2B) and lag half of that.
+    The formula holds for two filters of noise bandwidth B: a single pole, whose time constant and lag are 1/(4B), and
+    a moving average of length 1/(2B), whose lag is half its length.
 
     Parameters
     ----------
@@ -380,11 +381,11 @@ def signal_to_noise(drift: float, duration: float, error: Any) -> NDArray[np.flo
 
 
 def pedestal(weights: Any, level: float, samples: int, period: float, interval: float = INTERVAL) -> float:
-    r"""Approximate power, after a filter, of the slow noise that derolling moves to the roll frequency, in mas².
+    r"""Approximate power, in mas², of slow noise that derolling moves to the roll frequency and a filter lets through.
 
     .. math:: |H(f_r)|^2\, \pi A \sum_{k<n} h_k^2
 
-    after n samples of noise that starts at rest. A moving average over whole turns has none.
+    after n samples of noise that starts at rest. A moving average over whole turns lets none of it through.
     """
     slow = np.pi * level * float(np.sum(impulse_response(samples) ** 2))
     return float(filter_gain(weights, 1 / period, interval)) ** 2 * slow
@@ -395,7 +396,7 @@ def image_in_fit(drift: float, period: float, samples: int, interval: float = IN
 
     .. math:: \frac{12k}{n(n^2-1)}\Bigl[\frac{n}{2\sin^2(\omega_r\Delta t)} - \frac{n(n+1)}{4}\Bigr]
 
-    of a ramp at twice its derolled strength, so that its slope is k.
+    for a ramp at twice its derolled strength, so that its slope is k.
 
     Raises
     ------
@@ -413,7 +414,7 @@ def image_in_fit(drift: float, period: float, samples: int, interval: float = IN
 
 
 def rate_walk_error(drift: float, intensity: float, duration: float = YEAR, reset: float | None = None) -> float:
-    r"""Standard deviation of the drift rate across a drift k, if the roll rate is a random walk; mas a year.
+    r"""Standard deviation of the cross drift due to a drift k, if the roll rate is a random walk; mas a year.
 
     .. math:: k\sqrt{\tfrac{383}{1260}\, q T^3} \text{ without resets}, \qquad
         k \frac P2 \sqrt{\tfrac{38}{35}\, q T} \text{ with the phase reset every } P \ll T
@@ -421,7 +422,7 @@ def rate_walk_error(drift: float, intensity: float, duration: float = YEAR, rese
     Parameters
     ----------
     drift : k, mas a year.
-    intensity : q of the rate, rad²/s³: its variance grows by q a second.
+    intensity : q, rad²/s³; the variance of the rate grows by q per second.
     duration : T, s.
     reset : P, s; None for never.
     """
@@ -431,18 +432,18 @@ def rate_walk_error(drift: float, intensity: float, duration: float = YEAR, rese
 
 
 def rate_sine_error(drift: float, amplitude: float, period: float, reset: float | None = None) -> float:
-    r"""Root mean square error of the drift across k over the phase of a sinusoidal roll rate; mas a year.
+    r"""Root mean square cross drift due to a drift k, over all phases of a sinusoidal roll rate; mas a year.
 
     .. math:: \frac{k\,a}{\Omega\sqrt2}
 
-    for many cycles, without resets, or with resets a whole number of cycles apart; zero for all others.
+    for many cycles without resets, or with resets a whole number of cycles apart. It is zero for all other resets.
 
     Parameters
     ----------
     drift : k, mas a year.
     amplitude : a of the rate, rad/s.
     period : 2π/Ω, s.
-    reset : between resets of the phase, s; None for never.
+    reset : time between resets of the phase, s; None for never.
     """
     cycles = 0.0 if reset is None else reset / period
     if abs(cycles - round(cycles)) > 1e-9:
@@ -454,7 +455,7 @@ def rate_sine_error(drift: float, amplitude: float, period: float, reset: float 
 
 
 def recursion_bound(steps: int, beta: Fraction) -> float:
-    r"""Strict bound on the error of n rotations by one rounded angle, each rounded.
+    r"""Strict bound on the error of n rounded rotations by one rounded angle.
 
     .. math:: |\hat z_n - e^{in\delta}| \le \bigl[(1+\beta)(1+\sqrt2\,\gamma_2)\bigr]^n - 1
         \approx (1 + 2\sqrt2)\, n\beta
@@ -473,7 +474,7 @@ def recursion_bound(steps: int, beta: Fraction) -> float:
 def direct_bound(phase: float, beta: Fraction) -> float:
     r"""Bound on the error of cosine and sine of a rounded product, :math:`\omega t\,\gamma_3 + \beta`.
 
-    The rate, the time and their product are rounded, and then cosine and sine.
+    The rate, the time and their product are rounded, then the cosine and sine.
     """
     return abs(phase) * float(gamma(3, beta)) + float(beta)
 
@@ -488,7 +489,7 @@ def rotation_bound(method: str, period: float, steps: int, interval: float = INT
 
 
 def digits_needed(bound: Callable[[Fraction], float], base: int, largest: float) -> int:
-    """Least precision at which a bound, given as a function of the unit roundoff, is at most `largest`."""
+    """Smallest precision at which a bound, given as a function of the unit roundoff, is at most `largest`."""
 
     def meets(fmt: FloatFormat) -> bool:
         return 3 * fmt.unit_roundoff < 1 and bound(fmt.unit_roundoff) <= largest

@@ -1,1 +1,1 @@
-"""Rounding bounds: from one operation to chains of matrix products (hung1984, ch. II, 1-9)."""
+"""Rounding bounds: from one operation to chains of matrix products (hung1984, ch. II, sections 1-9)."""

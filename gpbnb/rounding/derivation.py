@@ -1,7 +1,7 @@
-"""The algebra of hung1984, ch. II, sections 3-9, re-derived; for general n by induction.
+"""Derive the algebra of hung1984, ch. II, sections 3-9, again; for general n by induction.
 
 The documents drop every product of two rounding errors. A bound for general n is proved from its
-recurrence: one more operation multiplies what is there by 1 + ε, and adds its own.
+recurrence: one more operation multiplies the earlier result by 1 + ε and adds its own operand.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ N, M, J, K = sp.symbols("n m j k", integer=True, positive=True)
 def one_rounding() -> Derivation:
     """Derive the unit roundoffs (8) and (13) from (2), and the sharper bound for rounding to nearest.
 
-    With x = (u + v/b^t) b^e the relative error is largest where u is smallest, u = 1/b: there,
-    rounding drops v < 1/2 or adds 1 - v <= 1/2; chopping drops v < 1.
+    With x = (u + v/b^t) b^e, the relative error is largest where u is smallest, at u = 1/b. There,
+    rounding drops v < 1/2 or adds 1 - v <= 1/2, and chopping drops v < 1.
     """
     b = sp.Symbol("b", integer=True, positive=True)
     t = sp.Symbol("t", integer=True, positive=True)
@@ -49,7 +49,7 @@ def one_rounding() -> Derivation:
 
 
 def rounded_sum(n: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...], tuple[sp.Symbol, ...]]:
-    """Computed sum of n terms with an error in each addition, with its terms and errors."""
+    """Return the computed sum of n terms with an error in each addition, the terms, and the errors."""
     x, eps = sp.symbols(f"x_1:{n + 1}"), errors(n - 1)
     total: sp.Expr = x[0]
     for term, e in zip(x[1:], eps, strict=True):
@@ -58,7 +58,7 @@ def rounded_sum(n: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...], tuple[sp.Symbol
 
 
 def sum_error(n: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...], tuple[sp.Symbol, ...]]:
-    """First-order error of the sum of n terms, as :func:`rounded_sum`."""
+    """Return the first-order error of the sum of n terms; see :func:`rounded_sum`."""
     total, x, eps = rounded_sum(n)
     return first_order(total, eps), x, eps
 
@@ -125,7 +125,7 @@ def ties() -> Derivation:
 
 
 def tie_sum_ratio() -> sp.Expr:
-    """Right-hand side of :func:`ties`."""
+    """Return the right-hand side of the step in :func:`ties`."""
     return 1 / (1 - (N - 4) * BETA / 2)
 
 
@@ -178,12 +178,12 @@ def roundings() -> Derivation:
 
 
 def product_operations() -> sp.Expr:
-    """Number of roundings of n factors over m divisors, with one division for each divisor: n + m - 1."""
+    """Derive the number of roundings for n factors over m divisors, each divided by separately: n + m - 1."""
     return sp.expand((N - 1) + M)
 
 
 def quotient_error(n: int, m: int) -> tuple[sp.Expr, tuple[sp.Symbol, ...]]:
-    """First-order relative error of (19), and the errors of its operations."""
+    """Return the first-order relative error of (19), and the errors of the operations in it."""
     eps, eta = errors(n - 1), errors(m, "eta")
     factor = sp.Mul(*(1 + e for e in (*eps, *eta)))
     return first_order(factor, (*eps, *eta)), (*eps, *eta)
@@ -214,10 +214,10 @@ def matrix_sums() -> Derivation:
 
 
 def dot_error(n: int) -> tuple[sp.Expr, list[sp.Expr], tuple[sp.Symbol, ...]]:
-    """First-order error of an inner product, the products a_j b_j, and the errors.
+    """Return the first-order error of an inner product, the products a_j b_j, and the rounding errors.
 
-    Numbered as in section 9.1: ε_1, ε_2 of the first two products, ε_3 of their sum, then ε_4 of
-    the third product, ε_5 of its addition, and so on.
+    The errors are numbered as in section 9.1. ε_1 and ε_2 come from the first two products, ε_3 from their sum, ε_4
+    from the third product, ε_5 from its addition, and so on.
     """
     a, b = sp.symbols(f"a_1:{n + 1}"), sp.symbols(f"b_1:{n + 1}")
     products = [p * q for p, q in zip(a, b, strict=True)]
@@ -229,7 +229,7 @@ def dot_error(n: int) -> tuple[sp.Expr, list[sp.Expr], tuple[sp.Symbol, ...]]:
 
 
 def roundings_of(error: sp.Expr, term: sp.Expr, eps: Sequence[sp.Symbol]) -> int:
-    """How many of the errors `eps` multiply `term` in a first-order error."""
+    """Count how many of the errors `eps` multiply `term` in a first-order error."""
     coefficient = (
         sp.expand(error).coeff(term)
         if term.is_Symbol
@@ -264,8 +264,8 @@ def dots() -> Derivation:
 def chains() -> Derivation:
     r"""Derive the norm of the error of a chain, relative to :math:`\prod\|M_j\|`, by induction.
 
-    Step i multiplies the error so far by M_{i+1} and adds the error of this product, at most
-    d_i β times the norm of what was computed.
+    Step i multiplies the error so far by M_{i+1} and adds the error of this product, which is at most
+    d_i β times the norm of the computed product.
     """
     d, before = sp.symbols("d s", positive=True)
     so_far = unevaluated(BETA * before)
@@ -281,9 +281,9 @@ def chains() -> Derivation:
 
 
 def chain_shortcut() -> sp.Expr:
-    """Error of a product of a row and a column of two, less what (30) allows: ε' times the product.
+    """Subtract the error that (30) allows, ε' times the product, from the error of a row times a column of two entries.
 
-    Zero for every a, b only if both products carry the same error: (30) is no identity.
+    The difference is zero for all a, b only if both products have the same error, so (30) is not an identity.
     """
     error, products, _ = dot_error(2)
     shared = sp.Symbol(r"{\epsilon'}")
@@ -291,7 +291,7 @@ def chain_shortcut() -> sp.Expr:
 
 
 def examples() -> Derivation:
-    """Derive the error of R = ABC + D, where the product ABC has the error E."""
+    """Derive the error of R = ABC + D, where the computed product ABC has the error E."""
     abc, d, e, eps = sp.symbols("P D E epsilon")
     return Derivation(
         (

@@ -1,4 +1,4 @@
-"""Sums and products computed in an emulated format, compared with the bounds of their errors.
+"""Compute sums and products in an emulated format, and compare their errors with the bounds.
 
 Errors and bounds are compared as exact Fractions, so even the smallest violation counts.
 """
@@ -29,7 +29,7 @@ Bounds = Mapping[str, Callable[[], Fraction]]
 class Trial(BoundedError):
     """One computed result: its inputs, its error, and the bounds of that error.
 
-    A bound that does not exist, because γ_n needs nβ < 1, is absent from `bounds`.
+    `bounds` omits a bound that does not exist because γ_n needs nβ < 1.
     """
 
     fmt: FloatFormat
@@ -42,7 +42,7 @@ class Trial(BoundedError):
 
 @dataclass(frozen=True)
 class BoundStatistics:
-    """A bound over many trials."""
+    """How one bound compares with the errors of many trials."""
 
     bound: str
     trials: int
@@ -53,7 +53,7 @@ class BoundStatistics:
 
 
 def bound_statistics(trials: Sequence[Trial]) -> tuple[BoundStatistics, ...]:
-    """Count, for each bound in order of its name's appearance, its violations."""
+    """Count the violations of each bound, in the order in which the names of the bounds appear."""
     names = list(dict.fromkeys(name for trial in trials for name in trial.bounds))
     result = []
     for name in names:
@@ -69,7 +69,7 @@ def bound_statistics(trials: Sequence[Trial]) -> tuple[BoundStatistics, ...]:
 
 
 def sum_trial(x: FloatArray) -> Trial:
-    """Add the (n,) terms from left to right; bounds of section 6."""
+    """Add the (n,) terms from left to right, and evaluate the bounds of section 6."""
     terms, beta = x.to_fractions(), x.format.unit_roundoff
     return _trial(
         (x,),
@@ -87,7 +87,7 @@ def sum_trial(x: FloatArray) -> Trial:
 def product_trial(x: FloatArray, y: FloatArray) -> Trial:
     """Multiply the (n,) factors from left to right, then divide by each of the (m,) divisors.
 
-    The error is the relative one; bounds of section 6.
+    The error is relative. The bounds are those of section 6.
     """
     fmt, n, m = x.format, len(x), len(y)
     if not n or np.any(x == 0):
@@ -111,7 +111,7 @@ def product_trial(x: FloatArray, y: FloatArray) -> Trial:
 
 
 def dot_trial(a: FloatArray, b: FloatArray) -> Trial:
-    """Inner product of (n,) and (n,); bounds of section 9.1."""
+    """Compute the inner product of two vectors (n,), with the bounds of section 9.1."""
     fa, fb, beta = a.to_fractions(), b.to_fractions(), a.format.unit_roundoff
     return _trial(
         (a, b),
@@ -125,13 +125,13 @@ def dot_trial(a: FloatArray, b: FloatArray) -> Trial:
 
 
 def matrix_sum_trial(a: FloatArray, b: FloatArray) -> Trial:
-    """Sum of two matrices; the error is the norm (22) of the error matrix; section 8."""
+    """Add two matrices; the error is the norm (22) of the error matrix, and the bounds are those of section 8."""
     fa, fb, beta = a.to_fractions(), b.to_fractions(), a.format.unit_roundoff
     return _trial((a, b), a + b, fa + fb, {"(24)": lambda: theory.matrix_sum_bound(fa, fb, beta)})
 
 
 def chain_trial(matrices: Sequence[FloatArray]) -> Trial:
-    """Product of matrices from left to right; the error is the norm (22); section 9.2."""
+    """Multiply matrices from left to right; the error is in norm (22), and the bounds are those of section 9.2."""
     computed = matrices[0]
     for matrix in matrices[1:]:
         computed = computed @ matrix
@@ -150,7 +150,7 @@ def chain_trial(matrices: Sequence[FloatArray]) -> Trial:
 
 
 def example_trial(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Trial:
-    """R = ABC + D, Examples 1 and 2 of section 9.2; the error is the norm (22)."""
+    """Compute R = ABC + D, Examples 1 and 2 of section 9.2; the error is in norm (22)."""
     fa, fb, fc, fd = (matrix.to_fractions() for matrix in (a, b, c, d))
     beta = a.format.unit_roundoff
     return _trial(
@@ -179,7 +179,7 @@ def _trial(
     for name, bound in bounds.items():
         try:
             evaluated[name] = bound()
-        except ValueError:  # gamma: so many roundings in so few digits have no strict bound
+        except ValueError:  # gamma: with so few digits, so many roundings have no strict bound
             if name != "strict":
                 raise
     return Trial(computed.format, inputs, computed, true, error, evaluated)
@@ -187,21 +187,21 @@ def _trial(
 
 # -- data -----------------------------------------------------------------------------------------
 
-#: The kinds of random data, see :func:`random_numbers`.
+#: The kinds of random data; see :func:`random_numbers`.
 KINDS = ("like signs", "mixed signs", "far exponents", "cancelling")
 
 
 def random_numbers(
     rng: np.random.Generator, fmt: FloatFormat, shape: tuple[int, ...], kind: str = "mixed signs"
 ) -> FloatArray:
-    """Numbers of a format with uniformly distributed significands.
+    """Draw numbers of a format with uniformly distributed significands.
 
     Parameters
     ----------
-    kind : "like signs", positive numbers with one exponent; "mixed signs", either sign;
-        "far exponents", either sign and exponents over a range of twice the precision;
-        "cancelling", mixed, and the last along the last axis is minus the rounded sum of the
-        others.
+    kind : "like signs" draws positive numbers with one exponent; "mixed signs" draws either sign;
+        "far exponents" draws either sign and exponents over a range of twice the precision;
+        "cancelling" draws mixed signs and replaces the last number along the last axis by minus the rounded
+        sum of the others.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def random_numbers(
 
 
 def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
-    """Random trials of one sort over sizes and all :data:`KINDS` of data.
+    """Run random trials of one computation over several sizes and all :data:`KINDS` of data.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng:
     """
     if trial not in _DRAWS:
         raise ValueError(f"got trial {trial!r}; needed one of {', '.join(map(repr, _DRAWS))}")
-    # A product knows no cancellation, and its divisors must not be zero.
+    # Factors cannot cancel in a product, and its divisors must not be zero.
     kinds = KINDS[:3] if trial == "product" else KINDS
     trials = []
     for size in sizes:
@@ -248,7 +248,7 @@ def sweep(trial: str, fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng:
     return trials
 
 
-#: The formats of a survey, with few digits and many, in the bases of computers old and new and in base 3.
+#: The formats of a survey, with few and with many digits, in the bases of old and new computers and in base 3.
 SURVEYED = tuple(
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 3), (2, 11), (2, 24), (3, 3), (10, 2), (10, 4), (10, 8), (16, 6))
@@ -258,7 +258,7 @@ SURVEYED = tuple(
 
 @cache
 def survey(trial: str, repeats: int = 10, seed: int = 1984) -> tuple[Trial, ...]:
-    """A :func:`sweep` over all formats of :data:`SURVEYED`."""
+    """Run :func:`sweep` over all formats in :data:`SURVEYED`."""
     sizes = (2, 3, 5, 10) if trial in ("sum", "product", "dot") else (1, 2, 3)
     rng = np.random.default_rng(seed)
     return tuple(one for fmt in SURVEYED for one in sweep(trial, fmt, sizes, repeats, rng))
@@ -288,7 +288,7 @@ class Sawtooth:
 
 
 def sawtooth(fmt: FloatFormat, points: int) -> Sawtooth:
-    """Round numbers spread evenly over the logarithm from 1 to the square of the base."""
+    """Round numbers whose logarithms are evenly spaced, from 1 to the square of the base."""
     x = float(fmt.base) ** np.linspace(0, 2, points, endpoint=False)
     exact = [Fraction(value) for value in x.tolist()]
     error = np.array([float(abs(fmt.round(value) - value) / value) for value in exact])
@@ -299,7 +299,7 @@ def sawtooth(fmt: FloatFormat, points: int) -> Sawtooth:
 class Growth:
     r"""Errors of sums of n terms in units of :math:`\beta \sum_j |x_j|`, for several n.
 
-    `errors[i]` holds the signed errors of the sums of `lengths[i]` terms, one a repeat. The
+    `errors[i]` holds the signed errors of the sums of `lengths[i]` terms, one for each repeat. The
     first-order bound is at most n - 1.
     """
 
@@ -309,14 +309,14 @@ class Growth:
     errors: NDArray[np.float64]
 
     def beyond_probabilistic(self, failure: float = 0.01) -> NDArray[np.float64]:
-        """Share of the sums of each length whose error exceeds the √n law."""
+        """Return the share of the sums of each length whose error exceeds the √n law."""
         law = [theory.probabilistic_sum_factor(n, self.fmt.unit_roundoff, failure) for n in self.lengths]
         limit = np.array(law) / float(self.fmt.unit_roundoff)
         return np.mean(abs(self.errors) > limit[:, np.newaxis], axis=1)
 
 
 def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rng: np.random.Generator) -> Growth:
-    """Add up ever more terms, from left to right.
+    """Add up more and more terms, from left to right.
 
     Parameters
     ----------
@@ -343,7 +343,7 @@ def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rn
 
 
 def cancelling_chains(fmt: FloatFormat, repeats: int, rng: np.random.Generator) -> list[Trial]:
-    """Products, other than zero, of a row and a column of two that cancel more and more digits."""
+    """Multiply rows and columns of two numbers that cancel more and more digits, without giving zero."""
     trials = []
     for digits in np.repeat(np.arange(fmt.precision), repeats):
         x, y = random_numbers(rng, fmt, (2,), "like signs").to_fractions()
@@ -358,8 +358,8 @@ def cancelling_chains(fmt: FloatFormat, repeats: int, rng: np.random.Generator) 
 def worst_product(fmt: FloatFormat, factors: int) -> Trial:
     """Find the factors whose product, from left to right, has the largest relative error of all.
 
-    With unbounded exponents only the significand of the partial product matters: dynamic
-    programming over significands looks at every chain.
+    With unbounded exponents, only the significand of the partial product matters. Dynamic
+    programming over significands therefore covers every chain.
 
     Parameters
     ----------
@@ -367,7 +367,7 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
 
     Raises
     ------
-    ValueError : fewer than 2 factors, or a format of more than 1000 numbers to a power of the base.
+    ValueError : fewer than 2 factors, or a format with more than 1000 significands.
     """
     if factors < 2:
         raise ValueError(f"got {factors} factors; needed at least 2")
@@ -378,29 +378,28 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
     products = np.frompyfunc(lambda i, j: fmt.kernel.multiply(int(i), 0, int(j), 0), 2, 2)
     significand, exponent = (a.astype(np.int64) for a in products.outer(start, start))
     log_error = np.log(significand * float(base) ** exponent / np.multiply.outer(start, start))
-    # State 0 is one; the first factor leads to its own significand without error.
+    # State 0 is the number one; the first factor leads to its own significand without error.
     states = len(start)
     end = np.concatenate([[np.arange(1, states + 1)], significand - start[0] + 1])
     log_error = np.concatenate([np.zeros((1, states)), log_error])
     trials = []
-    for sign in (1, -1):  # errors upwards, errors downwards
+    for sign in (1, -1):  # upward errors, downward errors
         path = best_path([sign * log_error] * factors, end)
         trials.append(product_trial(fmt.array([int(start[i]) for i in path]), fmt.array([])))
     return max(trials, key=lambda trial: trial.error)
 
 
 def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: bool = False) -> Trial:
-    """Find the terms for which the error of a sum comes nearest to its first-order bound, or exceeds it most.
+    """Find the terms for which the error of a sum is largest relative to its first-order bound.
 
-    Looks at every sequence of zeros and of terms ``±m * base**e`` with e in `exponents`, by
-    dynamic programming over partial sums; the ratio of the error to the bound, "weights" or (26),
-    is maximized by Dinkelbach's iteration.
+    Dynamic programming over partial sums covers every sequence of zeros and of terms ``±m * base**e`` with e in
+    `exponents`. Dinkelbach's iteration maximizes the ratio of the error to the bound, "weights" or (26).
 
     Parameters
     ----------
     terms : n, at least 2.
-    exponents : of the last digit of a term; the more, the slower.
-    products : each term is the rounded product of two numbers, so that the sum is an inner
+    exponents : those of the last digit of a term; more exponents take more time.
+    products : whether each term is the rounded product of two numbers, so that the sum is an inner
         product.
 
     Raises
@@ -434,12 +433,12 @@ def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: 
 def tie_sum(fmt: FloatFormat, terms: int) -> Trial:
     r"""Sum 1, β, −β, …, −β, where each addition is a tie that rounds up by β.
 
-    It exceeds the bound of hung1984, ch. II, (18), from 5 terms on, in every precision, as long as
-    (3n - 8)β < 4: by a factor of nearly 2 where the sum is nearly zero.
+    From 5 terms on, the error exceeds the bound of hung1984, ch. II, (18), in every precision, as long as
+    (3n - 8)β < 4. Where the sum is nearly zero, it does so by a factor of nearly 2.
 
     Raises
     ------
-    ValueError : an odd base, in which β is no finite number; chopping; fewer than 2 terms.
+    ValueError : an odd base, in which β has no finite expansion; chopping; fewer than 2 terms.
     """
     if fmt.base % 2 or fmt.rounding is not Rounding.NEAREST or terms < 2:
         raise ValueError(f"got {fmt}, {terms} terms; needed an even base, NEAREST, at least 2 terms")

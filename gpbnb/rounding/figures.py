@@ -51,7 +51,7 @@ def worst_ratios(
 
 
 def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
-    """Draw median (points) and largest error (thin lines) of ever longer sums, with the bound and the √n law."""
+    """Draw median (points) and largest error (thin lines) of sums against length, with the bound and the √n law."""
     artists: list[Artist] = []
     ends = {}
     for (marker, colour), result in zip(line_styles(len(results)), results, strict=True):
@@ -75,7 +75,7 @@ def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
 
 
 def cancellation(trials: Sequence[Trial], ax: Axes) -> list[Artist]:
-    """Draw the error of products that cancel, over the product of the norms, with (31) as printed and bound (32)."""
+    """Draw the error of cancelling products over the norms of the factors, with (31) as printed and bound (32)."""
     norms = [column_sum_norm(t.inputs[0]) * column_sum_norm(t.inputs[1]) for t in trials]
     lost = np.array([float(norm / column_sum_norm(t.true)) for norm, t in zip(norms, trials, strict=True)])
     scaled = {
@@ -98,7 +98,7 @@ def cancellation(trials: Sequence[Trial], ax: Axes) -> list[Artist]:
 def pessimism(
     groups: Sequence[tuple[str, Sequence[Trial]]], bound: str, ax: Axes, operands: str, bound_name: str
 ) -> list[Artist]:
-    """Draw the distribution of error over bound for groups of trials, as boxes from quartile to quartile."""
+    """Draw the distribution of error / bound for groups of trials, as boxes from quartile to quartile."""
     ratios = [[trial.ratio(bound) for trial in trials] for _, trials in groups]
     boxes = ax.boxplot(
         ratios,

@@ -13,7 +13,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 
 
 def exact_terms(fmt: FloatFormat, exponents: Sequence[int], products: bool) -> dict[Fraction, tuple[Fraction, int]]:
-    """Exact terms of a sum; each comes with two numbers of the format whose product it is."""
+    """List the exact terms of a sum; each comes with two numbers of the format whose product it is."""
     significands = range(fmt.base ** (fmt.precision - 1), fmt.base**fmt.precision)
     terms: dict[Fraction, tuple[Fraction, int]] = {Fraction(0): (Fraction(0), 0)}
     for e in exponents:
@@ -28,7 +28,7 @@ def exact_terms(fmt: FloatFormat, exponents: Sequence[int], products: bool) -> d
 def sum_table(choices: FloatArray, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """Tabulate the result and the error of each addition to a partial sum.
 
-    Row 0 is the empty sum. Partial sums that only the last addition reaches have no row.
+    Row 0 is the empty sum. Partial sums that are reached only by the last addition have no row.
     """
     index = {Fraction(0): 0}
     ends, errors, fresh = [], [], choices.format.array([0])
@@ -59,7 +59,7 @@ def best_path(rewards: Sequence[NDArray[np.float64]], end: NDArray[np.intp]) -> 
         candidates = (value[:states, np.newaxis] + reward).ravel()
         value = np.full(len(value), -np.inf)
         np.maximum.at(value, target, candidates)
-        winners = np.flatnonzero(candidates == value[target])[::-1]  # of equals, the first
+        winners = np.flatnonzero(candidates == value[target])[::-1]  # the first of equal rewards
         origin = np.zeros(len(value), dtype=np.intp)
         origin[target[winners]] = winners
         came_from.append(origin)

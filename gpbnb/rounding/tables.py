@@ -11,7 +11,7 @@ from gpbnb.rounding.experiment import Trial, bound_statistics
 
 
 def bound_statistics_table(trials: Mapping[str, Sequence[Trial]]) -> Table:
-    """Tabulate violations and ratios of every bound, one line each, by kind of computation."""
+    """Tabulate violations and ratios of every bound, grouped by kind of computation."""
     body = [
         (
             sort,
@@ -29,7 +29,7 @@ def bound_statistics_table(trials: Mapping[str, Sequence[Trial]]) -> Table:
 
 
 def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
-    """Tabulate single computations: operands, computed and true result, error over each bound."""
+    """Tabulate single computations: operands, computed and true result, and error / bound for each bound."""
     body = [
         (
             name,

@@ -4,8 +4,8 @@ Bounds named ``printed_…`` are those of the documents; the others are derived 
 :mod:`gpbnb.rounding.derivation`. ``beta`` is the unit roundoff β, ``FloatFormat.unit_roundoff``.
 All values are exact: entries are Fractions, and so are the bounds.
 
-A bound of first order leaves out terms in β²; a strict one, made of
-:math:`\\gamma_n = n\\beta/(1-n\\beta)`, leaves out nothing.
+A first-order bound omits terms in β². A strict bound, built from
+:math:`\\gamma_n = n\\beta/(1-n\\beta)`, omits nothing.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact, integers
 
 
 def sum_weights(n: int) -> list[int]:
-    """Roundings that each of n terms passes through when added from left to right.
+    """Count the roundings that each of n terms passes through when they are added from left to right.
 
-    The first two terms pass through all n - 1, the j-th through n + 1 - j.
+    The first two terms pass through all n - 1 roundings, the j-th term through n + 1 - j.
     """
     return [n - 1] * min(n, 1) + [n + 1 - j for j in range(2, n + 1)]
 
@@ -66,8 +66,8 @@ def sum_bound(x: Any, beta: Fraction) -> Fraction:
 def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
     r"""Bound as :math:`\sum_j \gamma_{w_j} |x_j|` with :func:`sum_weights`; to every order.
 
-    The computed sum is :math:`\sum_j x_j \prod (1+\epsilon_i)`, with the roundings that x_j passes
-    through.
+    The computed sum is :math:`\sum_j x_j \prod (1+\epsilon_i)`, where the ε_i are the errors
+    of the roundings that x_j passes through.
 
     References
     ----------
@@ -83,21 +83,21 @@ def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
 
 
 MANY_TERMS = 1000
-"""Above as many float64 terms, the strict bound is itself computed in float64 and rounded up."""
+"""For more float64 terms than this, the strict bound is itself computed in float64 and rounded up."""
 
 
 def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
-    """The strict bound of many float64 terms, at most 2**-45 of itself above; None for others, to be summed exactly.
+    """Return the strict bound for many float64 terms, too large by at most a relative 2**-45, or None for other terms.
 
-    The exact sum has a denominator of millions of digits. Here each factor and product is off by less than 2**-50,
-    their sum is correctly rounded, and the result is raised by more than all of that.
+    The exact sum has a denominator of millions of digits. Here the relative error of each factor and product is below
+    2**-50, their sum is correctly rounded, and the result is raised by more than all of these errors.
     """
     if not isinstance(x, np.ndarray) or x.dtype != np.float64 or x.ndim != 1 or len(x) <= MANY_TERMS:
         return None
     size = np.abs(x)
     if not np.isfinite(size).all() or (size[size > 0] < 1e-250).any() or (size > 1e250).any():
         return None
-    gamma(len(x) - 1, beta)  # refuses too many roundings
+    gamma(len(x) - 1, beta)  # raises if there are too many roundings
     unit = float(beta)
     if Fraction(unit) != beta or unit * len(x) > 0.5:
         return None
@@ -107,14 +107,14 @@ def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
 
 
 def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> float:
-    r"""Bound on the error of a sum of n terms, as a multiple of :math:`\sum_j |x_j|`, of size √n β.
+    r"""Bound on the error of a sum of n terms, about √n β, as a multiple of :math:`\sum_j |x_j|`.
 
-    It fails with at most the probability `failure` if roundings are independent with mean zero:
-    each of the n terms, of at most n - 1 roundings, may take its share of it.
+    If rounding errors are independent with mean zero, the bound fails at most with the probability `failure`.
+    Each of the n terms, with at most n - 1 roundings, gets an equal share of this probability.
 
     Raises
     ------
-    ValueError : no term; and as :func:`gpbnb.arithmetic.bounds.gamma_probabilistic`.
+    ValueError : no term; or for a reason given in :func:`gpbnb.arithmetic.bounds.gamma_probabilistic`.
 
     References
     ----------
@@ -129,7 +129,7 @@ def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> f
 
 
 def printed_product_bound(n: int, m: int, beta: Fraction) -> Fraction:
-    r"""Bound as :math:`(n+m+1)\beta`, n factors over m divisors; hung1984, ch. II, (20)."""
+    r"""Bound as :math:`(n+m+1)\beta`, for n factors over m divisors; hung1984, ch. II, (20)."""
     return (_operations(n, m) + 2) * beta
 
 
@@ -153,9 +153,9 @@ def _operations(n: int, m: int) -> int:
 
 
 def dot_weights(n: int) -> list[int]:
-    """Roundings of each product of an inner product of n: n, n, n - 1, ..., 2.
+    """Count the roundings of each product in an inner product of length n: n, n, n - 1, ..., 2.
 
-    References: the diagonal of D in hung1982, ch. III, section 9.2.
+    These are the diagonal entries of D in hung1982, ch. III, section 9.2.
     """
     return [w + 1 for w in sum_weights(n)]
 
@@ -178,12 +178,12 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     .. math:: \frac{|\tilde I|}{|I|} \le
         \gamma_n \frac{|a|^T|b|}{|a^Tb|}
 
-    The quotient is the condition number of the inner product: how much larger its relative change
-    may be than those of the entries of one of the vectors.
+    The quotient is the condition number of the inner product. It states by how much a relative change of the entries
+    of one vector may be amplified in the result.
 
     Raises
     ------
-    ZeroDivisionError : the inner product is zero, so that it has no relative error.
+    ZeroDivisionError : the inner product is zero, so it has no relative error.
     """
     value = abs(_total(_products(a, b)))
     if value == 0:
@@ -199,10 +199,10 @@ def matmul_entry_bounds(a: Any, b: Any, beta: Fraction) -> NDArray[Any]:
 
 
 def chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
-    r"""Bound as :math:`\beta\,(\sum d_i)\prod\|M_j\|`; hung1984, ch. II, (32); for two factors (28).
+    r"""Bound as :math:`\beta\,(\sum d_i)\prod\|M_j\|`; hung1984, ch. II, (32), or (28) for two factors.
 
-    `matrices` are M_1 ... M_N, multiplied from left to right; d_i is the number of columns of
-    M_i; norms are column sums, (22).
+    `matrices` are M_1 ... M_N, multiplied from left to right. d_i is the number of columns of
+    M_i. The norm is the largest column sum, (22).
     """
     return beta * sum(interfaces(matrices)) * _norm_product(matrices)
 
@@ -210,14 +210,14 @@ def chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
 def strict_chain_bound(matrices: Sequence[Any], beta: Fraction) -> Fraction:
     r"""Bound as :math:`\gamma_{\sum d_i} \prod\|M_j\|`; to every order.
 
-    An entry of the product is a sum over paths, one entry of each factor; each passes through at
+    An entry of the product is a sum over paths, each with one entry from every factor. A path passes through at
     most :math:`\sum d_i` roundings.
     """
     return gamma(sum(interfaces(matrices)), beta) * _norm_product(matrices)
 
 
 def printed_chain_claim(matrices: Sequence[Any], beta: Fraction) -> Fraction:
-    r"""Norm that (31) gives the error, :math:`\beta\,(\sum d_i)\,\|M_1\cdots M_N\|`.
+    r"""Norm of the error according to (31), :math:`\beta\,(\sum d_i)\,\|M_1\cdots M_N\|`.
 
     References
     ----------
@@ -229,7 +229,7 @@ def printed_chain_claim(matrices: Sequence[Any], beta: Fraction) -> Fraction:
 def printed_example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fraction:
     r"""Bound of the error of ABC + D as :math:`\beta[(1+m+r)\|ABC\| + \|D\|]`.
 
-    m and r are the interface dimensions, n both for square matrices.
+    m and r are the interface dimensions; both are n for square matrices.
 
     References
     ----------
@@ -241,13 +241,13 @@ def printed_example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fra
 
 
 def example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fraction:
-    r"""The same corrected, :math:`\beta[(m+r)\|A\|\|B\|\|C\| + \|ABC + D\|]`; to first order."""
+    r"""The corrected bound of ABC + D, :math:`\beta[(m+r)\|A\|\|B\|\|C\| + \|ABC + D\|]`; to first order."""
     result = _sum(product([a, b, c]), d)
     return chain_bound([a, b, c], beta) + beta * column_sum_norm(result)
 
 
 def strict_example_bound(a: Any, b: Any, c: Any, d: Any, beta: Fraction) -> Fraction:
-    r"""To every order, :math:`(1+\beta)\gamma_{m+r}\|A\|\|B\|\|C\| + \beta\|ABC + D\|`."""
+    r"""Bound of ABC + D to every order, :math:`(1+\beta)\gamma_{m+r}\|A\|\|B\|\|C\| + \beta\|ABC + D\|`."""
     result = _sum(product([a, b, c]), d)
     return (1 + beta) * strict_chain_bound([a, b, c], beta) + beta * column_sum_norm(result)
 
@@ -261,7 +261,7 @@ def matrix_sum_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
 
 
 def product(matrices: Sequence[Any]) -> NDArray[Any]:
-    """The exact product of matrices."""
+    """Return the exact product of matrices."""
     interfaces(matrices)
     result, unit = integers(exact(matrices[0]))
     for matrix in matrices[1:]:
@@ -275,7 +275,7 @@ def interfaces(matrices: Sequence[Any]) -> list[int]:
 
     Raises
     ------
-    ValueError : no matrix, something else than a matrix, or rows that do not fit the columns before.
+    ValueError : no matrix, an argument that is not a matrix, or rows that do not fit the columns of the factor before.
     """
     shapes = [np.shape(matrix) for matrix in matrices]
     fit = all(len(shape) == 2 for shape in shapes) and all(p[1] == q[0] for p, q in pairwise(shapes))

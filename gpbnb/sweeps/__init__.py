@@ -1,6 +1,6 @@
-"""Long computations: cells with seeds, progress, resume, any executor, and results stored with checksums.
+"""Sweeps, which are long computations in cells: with seeds, progress, resumption, any executor, and checked results.
 
-``python -m gpbnb.sweeps verify`` computes a sample of every stored sweep again on this machine and compares.
+``python -m gpbnb.sweeps verify`` recomputes a sample of every stored sweep on this machine and compares the results.
 """
 
 from gpbnb.sweeps.numbers import plain_integer, plain_number

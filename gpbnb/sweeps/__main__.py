@@ -1,4 +1,4 @@
-"""``python -m gpbnb.sweeps verify``: compute a sample of every stored sweep again on this machine and compare."""
+"""``python -m gpbnb.sweeps verify``: recompute a sample of every stored sweep on this machine and compare."""
 
 from __future__ import annotations
 

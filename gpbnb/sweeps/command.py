@@ -1,4 +1,4 @@
-"""The command that computes a sweep cell by cell and stores the cells that are finished."""
+"""The command that computes a sweep cell by cell and stores the finished cells."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ INTERRUPTED = 130
 
 
 def run_command(sweep: Sweep[Any], description: str, directory: Path, arguments: Sequence[str] | None = None) -> int:
-    """Compute the cells of a sweep and write its table, or write the finished cells alone; return the exit status.
+    """Compute the cells of a sweep and write its table, or only write the finished cells; return the exit status.
 
     Parameters
     ----------
     sweep : what to compute.
-    description : of the command, for its help.
-    directory : where progress is saved by default.
-    arguments : of the command line; those of this process by default.
+    description : text for the help of the command.
+    directory : default folder for saved progress.
+    arguments : arguments of the command line; by default those of this process.
     """
     cells = sweep.cells()
     parser = argparse.ArgumentParser(prog=sweep.command, description=description)

@@ -1,4 +1,4 @@
-"""Numbers in text files: ASCII digits only, without the underscores and foreign digits that Python itself reads."""
+"""Read numbers from text files: ASCII digits only, without the underscores and non-ASCII digits that Python accepts."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def plain_integer(text: str) -> int:
 
 
 def plain_number(text: str) -> float:
-    """Read a decimal number in ASCII digits; or ``inf`` or ``nan``, but no number that only float64 makes infinite.
+    """Read a decimal number in ASCII digits, ``inf`` or ``nan``; reject a finite number that overflows float64.
 
     Raises
     ------

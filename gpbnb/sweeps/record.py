@@ -15,7 +15,7 @@ CHECK = "sha256"
 
 
 def write_record(file: Path, values: Mapping[str, Any]) -> None:
-    """Write a record; all of it, or nothing."""
+    """Write a record, either completely or not at all."""
     draft = file.with_suffix(".draft")
     whole = {CHECK: _digest(values), **values}
     draft.write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8", newline="")
@@ -27,11 +27,11 @@ def read_record(file: Path, cure: str) -> dict[str, Any]:
 
     Parameters
     ----------
-    cure : the command that computes the file again; part of every message.
+    cure : the command that computes the file again; it appears in every error message.
 
     Raises
     ------
-    DamagedFileError : the file is not as it was written; the message names the line, as far as there is one.
+    DamagedFileError : the file is not as it was written; the message names the line if there is one.
     """
 
     def damaged(line: int, problem: str) -> DamagedFileError:

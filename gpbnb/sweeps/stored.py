@@ -1,4 +1,4 @@
-"""What ``python -m gpbnb.sweeps`` does with the stored sweeps that it is given."""
+"""Verify stored sweeps, for the command ``python -m gpbnb.sweeps``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpbnb.sweeps.sweep import Sweep
 
 
 def verify(sweeps: Sequence[Sweep[Any]], count: int, seed: int, progress: bool = False) -> list[str]:
-    """Read every sweep, compute a sample of its cells again, and describe each difference.
+    """Read every sweep, recompute a sample of its cells, and describe each difference.
 
     Raises
     ------
@@ -25,7 +25,7 @@ def verify(sweeps: Sequence[Sweep[Any]], count: int, seed: int, progress: bool =
 
 
 def run(sweeps: Sequence[Sweep[Any]], arguments: Sequence[str] | None = None) -> int:
-    """The command; returns its exit status: 1 if a file is damaged or a value differs."""
+    """Run the command and return its exit status, 1 if a file is damaged or a value differs."""
     parser = argparse.ArgumentParser(prog="python -m gpbnb.sweeps", description="The stored sweeps of the package.")
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="name, command and provenance of each stored sweep")

@@ -1,7 +1,7 @@
-"""A sweep: cells computed one by one or on an executor, kept until all are done, then stored as one table.
+"""A sweep computes cells one by one or on an executor, saves them until all are done, and stores them as one table.
 
-A cell is a small picklable value, such as a named tuple of a model, a format and a seed, from which its result follows
-on any machine. Finished cells survive an interruption. The same class recomputes a sample of what is stored.
+A cell is a small picklable value, such as a named tuple of a model, a format and a seed. It determines its result
+on any machine. Finished cells survive an interruption. The same class recomputes a sample of the stored cells.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from gpbnb.sweeps.table import Column, Record, Table, read, write
 C = TypeVar("C")
 
 ATTEMPTS = 10
-"""How often a chunk is sent again when its worker dies."""
+"""Number of times that a chunk is sent to a worker, if workers die."""
 
 
 class Difference(NamedTuple):
-    """A row that was computed again and does not stand in the stored table: the stored row with its key, if any."""
+    """A recomputed row that the stored table does not contain, and the stored row with the same key, if any."""
 
     cell: str
     stored: Record | None
@@ -45,22 +45,22 @@ class Sweep(Generic[C]):
 
     Parameters
     ----------
-    name : as in "kalman/year".
-    file : where the table is stored.
-    columns : of the table; the first `key` of them identify a row.
-    key : how many columns identify a row.
+    name : name of the sweep, as in "kalman/year".
+    file : file of the stored table.
+    columns : columns of the table; the first `key` of them identify a row.
+    key : number of columns that identify a row.
     cells : all cells, in the order of the table.
-    compute : result of a cell, made of lists, dictionaries, texts and numbers; a function that can be pickled. It gets
-        a directory in which a long cell may save its progress, or None.
-    rows : the rows of a cell, from its result.
-    command : computes the sweep again.
-    seed : of all that is drawn.
-    version : changes when results change, so that saved cells of an older version are not used.
-    summary : further rows, from the results of all cells.
-    sample : rows of a cell, or some of them, computed again as a check; by default all of them; the generator
-        may choose.
-    same : whether a stored row and one computed again agree; by default if they are equal.
-    packages : whose versions the provenance names.
+    compute : picklable function that returns the result of a cell, made of lists, dictionaries, texts and numbers. Its
+        second argument is a directory in which a long cell may save its progress, or None.
+    rows : function that turns the result of a cell into rows.
+    command : command that recomputes the sweep.
+    seed : seed of all random numbers.
+    version : a number that changes when results change, so that cells saved by an older version are not used.
+    summary : function that makes further rows from the results of all cells.
+    sample : function that recomputes rows of a cell as a check, by default all of them; it may choose some with the
+        generator.
+    same : function that tells whether a stored and a recomputed row agree; by default they must be equal.
+    packages : packages whose versions the provenance lists.
     """
 
     name: str
@@ -89,18 +89,18 @@ class Sweep(Generic[C]):
         cells: Sequence[C] | None = None,
         progress: bool = True,
     ) -> list[tuple[C, Any]]:
-        """Compute the cells that are not yet saved in a directory; return all, in their order.
+        """Compute the cells that are not yet saved in a directory, and return all cells in their order.
 
         Parameters
         ----------
-        directory : where finished cells are saved; the same call goes on after an interruption.
-        executor : any of concurrent.futures, or ``Client.get_executor()`` of Dask; by default this process.
-        chunk : how many cells are sent at once.
-        cells : a part of the cells; all by default.
+        directory : folder for finished cells; after an interruption, the same call resumes.
+        executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
+        chunk : number of cells that are sent at once.
+        cells : some of the cells; all by default.
 
         Raises
         ------
-        RuntimeError : workers died under one chunk ten times.
+        RuntimeError : workers died ten times while computing one chunk.
         """
         if chunk < 1:
             raise ValueError(f"got chunks of {chunk} cells; needed at least 1")
@@ -118,7 +118,7 @@ class Sweep(Generic[C]):
         return [(cell, found[cell]["result"]) for cell in wanted]  # type: ignore[index]
 
     def finished(self, directory: Path) -> list[tuple[C, Any]]:
-        """The cells that are saved in a directory, with their results."""
+        """Return the cells that are saved in a directory, with their results."""
         saved = ((cell, self._saved(cell, directory)) for cell in self.cells())
         return [(cell, each["result"]) for cell, each in saved if each is not None]
 
@@ -130,7 +130,7 @@ class Sweep(Generic[C]):
         write(file or self.file, self.columns, lines, self.provenance(len(results), seconds))
 
     def provenance(self, cells: int, seconds: float | None = None) -> dict[str, str]:
-        """Command, seed, machine, versions, and the commit if there is one."""
+        """Return command, seed, machine, versions, and the commit if there is one."""
         found = {
             "command": self.command,
             "seed": str(self.seed),
@@ -140,7 +140,7 @@ class Sweep(Generic[C]):
         return found if seconds is None else {**found, "processor seconds": f"{seconds:.0f}"}
 
     def seconds(self, directory: Path) -> float:
-        """Processor time of all saved cells."""
+        """Return the processor time of all saved cells."""
         saved = (self._saved(cell, directory) for cell in self.cells())
         return float(sum(each["seconds"] for each in saved if each is not None))
 
@@ -156,11 +156,11 @@ class Sweep(Generic[C]):
         return read(file or self.file, self.columns, self.command)
 
     def verify(self, count: int, seed: int, progress: bool = False) -> list[Difference]:
-        """Compute a seeded sample of the stored cells again, and compare digit by digit.
+        """Recompute a random sample of the stored cells, chosen by `seed`, and compare digit by digit.
 
         Parameters
         ----------
-        count : how many cells, all if there are no more.
+        count : number of cells; all are recomputed if there are not more.
         """
         stored = {row[: self.key]: row for row in self.load().rows}
         if len(stored) < len(self.load().rows):
@@ -180,7 +180,7 @@ class Sweep(Generic[C]):
         return differences
 
     def _is_stored(self, cell: C, stored: Mapping[Record, Record]) -> bool:
-        """Whether rows of a cell are stored; a sweep may be stored before all its cells are computed."""
+        """Whether rows of a cell are stored; a sweep may be stored before all cells are computed."""
         names = cell_key(cell)
         return any(key[: len(names)] == names for key in stored)
 
@@ -238,7 +238,7 @@ class Sweep(Generic[C]):
 
 
 def cell_key(cell: Any) -> Record:
-    """The first columns of a cell's rows: its `key`, or nothing."""
+    """Return the first columns of a cell's rows: its `key`, or nothing."""
     return tuple(getattr(cell, "key", ()))
 
 
@@ -252,14 +252,14 @@ def _some(compute: Callable[[C, Path | None], Any], chunk: Sequence[C], director
 
 
 def _is_of_the_worker(error: BaseException) -> bool:
-    """Whether a chunk failed because of where it ran: Dask has its own exceptions, which are not imported for this."""
+    """Whether a chunk failed because of its worker; Dask's own exceptions are recognized without importing Dask."""
     if isinstance(error, BrokenExecutor):
-        return False  # the executor takes nothing more
+        return False  # the executor accepts no more work
     return isinstance(error, CancelledError) or type(error).__module__.partition(".")[0] in ("distributed", "dask")
 
 
 def machine(packages: Sequence[str] = ("numpy", "numba", "llvmlite")) -> dict[str, str]:
-    """System, versions, and the commit if there is one."""
+    """Return system, versions, and the commit if there is one."""
     here = Path(__file__).parent
     try:
         found = subprocess.run(

@@ -1,7 +1,7 @@
 """A stored table: a CSV file with its provenance, row count and checksums, checked line by line when it is read.
 
 The file starts with lines ``# key: value``. The last column, ``crc32``, is the checksum of the row number and the row,
-so that damage is found at its line: a changed digit, a lost row and rows in another order alike. ``# sha256`` covers
+so damage is located at its line, whether a digit changed, a row was lost or rows changed places. ``# sha256`` covers
 everything else.
 """
 
@@ -26,7 +26,7 @@ Record = tuple[str, ...]
 
 
 class DamagedFileError(ValueError):
-    """A stored file that is not as it was written."""
+    """A stored file was changed after it was written."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,10 @@ class Column:
 
     Parameters
     ----------
-    name : as in the header.
+    name : name in the header.
     kind : "text", "integer" or "number".
-    low, high : smallest and largest number accepted; NaN never is.
-    choices : the texts accepted; any if empty.
+    low, high : smallest and largest number accepted; NaN is never accepted.
+    choices : the texts accepted; if empty, any text.
     optional : whether a cell may be empty.
     """
 
@@ -64,21 +64,21 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of text with their columns and their provenance."""
+    """Rows of text with their columns and provenance."""
 
     columns: tuple[Column, ...]
     rows: tuple[Record, ...]
     provenance: Mapping[str, str]
 
     def records(self, **where: str) -> list[dict[str, str]]:
-        """The rows whose columns have these values, each by column name."""
+        """Return the rows whose columns have these values, each as a dictionary by column name."""
         names = [column.name for column in self.columns]
         found = (dict(zip(names, row, strict=True)) for row in self.rows)
         return [each for each in found if all(each[name] == value for name, value in where.items())]
 
 
 def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provenance: Mapping[str, str]) -> None:
-    """Write a table; all of it, or nothing.
+    """Write a table, either completely or not at all.
 
     Raises
     ------
@@ -108,8 +108,8 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
 
     Parameters
     ----------
-    columns : those that the file must have.
-    cure : the command that computes the file again; part of every message.
+    columns : the columns that the file must have.
+    cure : the command that recomputes the file; it appears in every error message.
 
     Raises
     ------

@@ -1,1 +1,1 @@
-"""How many digits do you need? The chapter for a reader's own filter, integrator or matrix, above the topics."""
+"""Find the wordlength for a reader's own filter, integrator or matrix; this package combines the topics."""

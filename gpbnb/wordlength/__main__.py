@@ -19,7 +19,7 @@ Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file o
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
+    """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb.wordlength",
         description="Find how many digits a filter needs, so that rounding stays within a tolerance.",

@@ -1,4 +1,4 @@
-"""Problems of other fields, as a reader may have them."""
+"""Example problems from other fields."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from gpbnb.kalman.simulation import Simulation
 #: The states of :func:`tilt`, and their units.
 TILT_STATES = (("tilt", "°"), ("rate", "°/s"), ("gyro bias", "°/s"))
 
-#: Formats that processors compute in, by the name of their standard.
+#: Formats in which processors compute, by the name in their standard.
 STANDARD = {
     "binary16": FloatFormat(2, 11),
     "binary32": FloatFormat(2, 24),
     "binary64": FloatFormat(2, 53),
 }
 
-#: Least and largest powers of two of the normal numbers of processors, by the name of the format.
+#: Smallest and largest powers of two among the normal numbers of each format, by its name.
 NORMAL_RANGE = {
     name: cast(tuple[int, int], (fmt.emin, fmt.emax))
     for name, fmt in {
@@ -39,14 +39,14 @@ NORMAL_RANGE = {
 
 
 def tilt(bias_walk: str = "1e-10") -> LinearModel:
-    """A tilt filter of a balancing robot or a camera, 100 steps a second: n = 3, m = 2.
+    """A tilt filter for a balancing robot or a camera, with 100 steps a second, n = 3 and m = 2.
 
-    It merges a gyroscope, which shows rate plus bias with 0.05 °/s rms, and an accelerometer, which shows the tilt with
-    2° rms.
+    It combines a gyroscope, which measures rate plus bias with a noise of 0.05 °/s rms, and an accelerometer, which
+    measures the tilt with a noise of 2° rms.
 
     Parameters
     ----------
-    bias_walk : variance by which the bias moves in a step, (°/s)².
+    bias_walk : variance of the change of the bias in one step, (°/s)².
     """
     return LinearModel(
         Phi=exact([["1", "0.01", "0"], ["0", "0.98", "0"], ["0", "0", "1"]]),
@@ -60,19 +60,20 @@ def tilt(bias_walk: str = "1e-10") -> LinearModel:
 
 
 def tilt_measurements(steps: int, seed: int = 0) -> NDArray[np.float64]:
-    """Measurements of the tilt filter that begins 3° and 0.5 °/s off, in steps of 1/4096; (steps, 2)."""
+    """Simulate measurements (steps, 2), multiples of 1/4096, for a tilt filter that starts 3° and 0.5 °/s off."""
     return Simulation(tilt(), (3.0, -5.0, 0.5), seed, resolution=2.0**-12).measurements(steps)
 
 
 def altimeter(more: str = "0") -> LinearModel:
-    """Height (m), speed (m/s) and bias of an accelerometer (m/s²) by a barometer, 50 steps a second: n = 3, m = 1.
+    """An altimeter for height (m), speed (m/s) and accelerometer bias (m/s²), with 50 steps a second, n = 3 and m = 1.
 
-    The states are what the accelerometer alone gets wrong, so that it is no input here. Its noise of 0.35 m/s² enters
-    height and speed of a step together, as in textbooks: that part of Q has rank one.
+    A barometer measures the height. The states are the errors of the accelerometer's solution, so the accelerometer is
+    not an input. Its noise of 0.35 m/s² acts on height and speed together in each step, as in textbooks, so that part
+    of Q has rank one.
 
     Parameters
     ----------
-    more : what is added to the diagonal of Q.
+    more : number added to the diagonal of Q.
     """
     step, push = Fraction(1, 50), exact(["1/5000", "1/50", "0"])
     Q = np.multiply.outer(push, push) * Fraction("0.35") ** 2
@@ -90,11 +91,11 @@ def altimeter(more: str = "0") -> LinearModel:
 
 
 def tracker(origin: str = "0") -> LinearModel:
-    """A tracker of position (m) and velocity (m/s), ten measurements a second: n = 2, m = 1.
+    """A tracker of position (m) and velocity (m/s), with ten measurements a second, n = 2 and m = 1.
 
     Parameters
     ----------
-    origin : where it starts, m from the zero of its coordinates.
+    origin : distance in m of the starting point from the origin of the coordinates.
     """
     return LinearModel(
         Phi=exact([["1", "0.1"], ["0", "1"]]),
@@ -108,7 +109,7 @@ def tracker(origin: str = "0") -> LinearModel:
 
 
 def precise_tracker() -> LinearModel:
-    """A tracker whose sensor is far better than what is known at first: variances of 1e-12 and 1e4; n = 2, m = 1."""
+    """A tracker whose sensor is far more precise than the prior: variances of 1e-12 and 1e4; n = 2, m = 1."""
     return LinearModel(
         Phi=exact([["1", "0.1"], ["0", "1"]]),
         H=exact([["1", "0.5"]]),
@@ -125,7 +126,7 @@ def normal_matrix(degree: int, times: Sequence[int]) -> NDArray[Any]:
 
     Raises
     ------
-    ValueError : fewer different times than coefficients, so that the matrix is singular.
+    ValueError : fewer distinct times than coefficients, so the matrix is singular.
     """
     if degree < 0 or len(set(times)) <= degree:
         raise ValueError(

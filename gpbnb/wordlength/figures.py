@@ -13,8 +13,8 @@ from matplotlib.axes import Axes
 from gpbnb.display.style import BLACK, OBSERVED, REFERENCE, REFUTED, VALID, label, legend, line_styles
 from gpbnb.wordlength.examples import STANDARD
 
-#: The looks of each kind of answer, as an emulation observes and a bound bounds. Open markers, in the colour of refuted
-#: formulas, are of (125).
+#: Marker, edge colour and face colour for each kind of answer. Open markers in the colour of refuted formulas belong
+#: to (125).
 KINDS = {
     "emulation": ("o", OBSERVED, OBSERVED),
     "bound": ("|", VALID, VALID),
@@ -26,14 +26,14 @@ Curve = Sequence[tuple[int, float]]
 
 
 def standards(ax: Axes, upright: bool = True) -> list[Artist]:
-    """Lines at the precisions of IEEE's formats that lie within the axis; named at its end."""
+    """Draw lines at the precisions of the IEEE formats within the axis, and label them at its end."""
     artists: list[Artist] = []
     low, high = ax.get_xlim() if upright else ax.get_ylim()
     for name, fmt in STANDARD.items():
         if low <= fmt.precision <= high:
             draw = ax.axvline if upright else ax.axhline
             artists.append(draw(fmt.precision, color=REFERENCE, ls=":", lw=1.0))
-            above = 1.035 if name == "binary32" else 1.0  # beside binary16, whose name would touch it
+            above = 1.035 if name == "binary32" else 1.0  # binary16 is close, and the names would touch
             x, y = (fmt.precision, above) if upright else (1.0, fmt.precision)
             transform = ax.get_xaxis_transform() if upright else ax.get_yaxis_transform()
             side: Any = "center" if upright else "right"
@@ -44,7 +44,7 @@ def standards(ax: Axes, upright: bool = True) -> list[Artist]:
 
 
 def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes) -> list[Artist]:
-    """Error (points) and bound (lines) over the tolerance against the bits, one colour per form, finite values only."""
+    """Draw finite errors (points) and bounds (lines) over the tolerance against the bits, one colour for each form."""
     artists: list[Artist] = []
     for (name, curve), (marker, colour) in zip(emulated.items(), line_styles(len(emulated), "os^Dv"), strict=True):
         points = [(t, ratio) for t, ratio in curve if 0 < ratio < math.inf]
@@ -56,12 +56,12 @@ def survey(emulated: Mapping[str, Curve], bounded: Mapping[str, Curve], ax: Axes
     ax.set_yscale("log")
     artists += standards(ax)
     legend(ax, fontsize=8.5)
-    label(ax, "bits", "error or bound, over the tolerance")
+    label(ax, "bits", "error or bound / tolerance")
     return artists
 
 
 def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) -> list[Artist]:
-    """Bits (points: observed; lines: bounds and formulas) against the number of steps."""
+    """Draw bits against the number of steps: observed (points), bounds and formulas (lines)."""
     artists: list[Artist] = []
     for (name, curve), (marker, colour) in zip(points.items(), line_styles(len(points), "os^Dv"), strict=True):
         artists += ax.plot(*zip(*curve, strict=True), marker, color=colour, label=name)
@@ -71,16 +71,16 @@ def growth(points: Mapping[str, Curve], lines: Mapping[str, Curve], ax: Axes) ->
     ax.set_xscale("log")
     artists += standards(ax, upright=False)
     legend(ax, fontsize=8.5)
-    label(ax, "steps $k$", "bits for the tolerance")
+    label(ax, "steps $k$", "bits needed for the tolerance")
     return artists
 
 
 def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
-    """Bits of many problems, a line a problem, by kind of answer.
+    """Draw the bits that many problems need, one row for each problem, by kind of answer.
 
     Parameters
     ----------
-    found : by problem, then by kind, one of :data:`KINDS`.
+    found : bits by problem, then by kind of answer, one of :data:`KINDS`.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def overview(found: Mapping[str, Mapping[str, int]], ax: Axes) -> list[Artist]:
 
 
 def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axes) -> list[Artist]:
-    """Errors of several ways to compute over that of the first way, a line a way; a refused one is not drawn."""
+    """Draw the error for each way of computing over that for Hung's arithmetic, the first; skip rejected ones."""
     artists: list[Artist] = []
     for (label_, values), (marker, colour) in zip(errors.items(), line_styles(len(errors), "osD^"), strict=True):
         points = [(value / values[0], y) for y, value in enumerate(values) if math.isfinite(value)]
@@ -119,13 +119,13 @@ def changes(names: Sequence[str], errors: Mapping[str, Sequence[float]], ax: Axe
     ax.set_xscale("log")
     ax.set_yticks(range(len(names)), names)
     ax.invert_yaxis()
-    ax.set_xlabel("error over that of the first way")
+    ax.set_xlabel("error / error with Hung's arithmetic")
     legend(ax, loc="upper center", bbox_to_anchor=(0.3, -0.18), ncols=2)
     return artists
 
 
 def bands(found: Mapping[str, Sequence[tuple[int, Sequence[float]]]], ax: Axes, share: float = 0.9) -> list[Artist]:
-    """Median, a central share and the largest of many records' errors over the tolerance, against the bits."""
+    """Draw median, central share and largest error / tolerance of many records, against the bits."""
     artists: list[Artist] = []
     low, high = (1 - share) / 2, (1 + share) / 2
     for (name, points), (_, colour) in zip(found.items(), line_styles(len(found)), strict=True):
@@ -140,5 +140,5 @@ def bands(found: Mapping[str, Sequence[tuple[int, Sequence[float]]]], ax: Axes, 
     ax.annotate("tolerance", (1, 1), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=REFERENCE)
     ax.set_yscale("log")
     legend(ax, loc="lower left")
-    label(ax, "bits", "largest error over the tolerance")
+    label(ax, "bits", "largest error / tolerance")
     return artists

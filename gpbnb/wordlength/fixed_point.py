@@ -1,12 +1,12 @@
-r"""Filters with constant coefficients in fixed point: what each fraction bit buys, and how to scale.
+r"""Filters with constant coefficients in fixed point: how to scale them, and how accurate each fraction bit makes them.
 
-A signal processor computes :math:`Ax + Bz` with integers. Sums are exact there; only products are rounded, each to a
+A signal processor computes :math:`Ax + Bz` with integers. Sums are exact. Only products are rounded, each to a
 multiple of one unit, whatever its size. So the error has a bound that needs no limit on the measurements,
 
 .. math:: |e_i| \le \tfrac{q}{2} \sum_{l\ge0}\sum_o |(A^l G)_{io}|,
 
-with q the unit and, in column o of G, the effect of the rounding in operation o on the states. The integers behind it
-are exact; the infinite sum is enclosed in ball arithmetic.
+where q is the unit and column o of G holds the effect of the rounding in operation o on the states. The integers behind
+the formula are exact, and the infinite sum is enclosed in ball arithmetic.
 
 References
 ----------
@@ -43,9 +43,9 @@ class ScaledFilter:
 
     Parameters
     ----------
-    filter : for scaled states and measurements; its coefficients are exact.
-    state, measurement : (n,) and (m,), exponents: a state x is stored as x / 2**exponent.
-    gain : (n, m), the constant gain in the units of the model; empty if it has none.
+    filter : the filter for scaled states and measurements, with exact coefficients.
+    state, measurement : (n,) and (m,), exponents; a state x is stored as x / 2**exponent.
+    gain : (n, m), the constant gain in the units of the model; empty if there is none.
     """
 
     filter: LinearFilter
@@ -60,9 +60,9 @@ class FixedAnswer:
 
     Parameters
     ----------
-    fmt : the format; None if none of those tried does.
-    tried : fraction bits, and largest error or bound over tolerance; infinite where a number overflows.
-    why : why the next smaller format was refused.
+    fmt : the format; None if no format tried meets the tolerance.
+    tried : fraction bits, and largest error or bound / tolerance, infinite if a number overflows.
+    why : why the next smaller format was rejected.
     """
 
     fmt: FixedFormat | None
@@ -78,20 +78,21 @@ class FixedAnswer:
 
 
 def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilter:
-    """The filter in its steady state, scaled by the ranges that occur in a reference run.
+    """Return the filter in its steady state, scaled by the ranges that occur in a reference run.
 
-    The gain is that of the last step; states and measurements stay below 1 in the scaled units,
-    with the margin.
+    The gain is that of the last step. In the scaled units, states and measurements times the margin stay
+    below 1.
 
     Parameters
     ----------
-    model : with constant matrices. z : (steps, m), measurements like those to come.
-    margin : how much larger numbers may get than in this run.
+    model : a model with constant matrices. z : (steps, m), typical measurements.
+    margin : factor by which later numbers may exceed those of this run.
 
     Raises
     ------
     ValueError : a model whose matrices change.
     """
+    model.refuse_inputs("fixed point")
     if model.cycle != 1:
         raise ValueError(f"got {model.name} with a cycle of {model.cycle} steps; needed constant matrices")
     measured = np.asarray(z)
@@ -112,30 +113,30 @@ def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilt
 
 
 def unscaled(made: LinearFilter) -> ScaledFilter:
-    """A linear filter in the units that it has."""
+    """Return a linear filter in its own units."""
     n, m = made.program.n, made.program.m
     return ScaledFilter(made, np.zeros(n, np.int64), np.zeros(m, np.int64), np.zeros((0, m)))
 
 
 def integer_bits(given: ScaledFilter, z: Any) -> int:
-    """Bits before the binary point that no intermediate value of a run exceeds: scaling advice from what occurs."""
+    """Return the number of integer bits that all intermediate values of a run need, as advice for scaling."""
     return _bits_for(_largest(given, z))
 
 
 def emulated(
     given: ScaledFilter, z: Any, fmt: FixedFormat, coefficient_bits: int = 15, wide: bool = False
 ) -> NDArray[np.float64]:
-    """Errors of each state after each step, (steps, n), in the units of the model, against the same filter unrounded.
+    """Return the error of each state after each step, (steps, n), in the units of the model, due to rounding.
 
     Parameters
     ----------
     z : (steps, m), measurements in the units of the model; the converter rounds them into the format for both filters.
-    coefficient_bits : significant bits of each coefficient, which has a binary point of its own.
-    wide : whether sums of products are kept exactly, in a long accumulator, and rounded once.
+    coefficient_bits : significant bits of each coefficient; each coefficient has its own binary point.
+    wide : whether sums of products are kept exactly in a long accumulator and rounded once.
 
     Raises
     ------
-    OverflowError : naming operation and step, where the format does not saturate or wrap.
+    OverflowError : a number overflows and the format neither saturates nor wraps; names operation and step.
     """
     coefficients = stored_coefficients(given.filter, coefficient_bits)
     seen = _stored_measurements(given, z, fmt)
@@ -159,9 +160,9 @@ def emulated(
 def guaranteed(
     given: ScaledFilter, fmt: FixedFormat, coefficient_bits: int = 15, wide: bool = False
 ) -> NDArray[np.float64]:
-    """Bound on the error of each state, (n,), in the units of the model, for ever and for all measurements.
+    """Bound the error of each state, (n,), in the units of the model, for all time and all measurements.
 
-    It holds as long as nothing overflows; parameters as of :func:`emulated`.
+    The bound holds as long as nothing overflows. For the parameters, see :func:`emulated`.
 
     Raises
     ------
@@ -171,12 +172,12 @@ def guaranteed(
 
 
 def largest_rounding(rounding: Rounding) -> float:
-    """How large a rounding error gets, in units of the last bit."""
+    """Return the largest rounding error, in units of the last bit."""
     return 0.5 if rounding in (Rounding.NEAREST, Rounding.EVEN) else 1.0
 
 
 def bound_per_unit(given: ScaledFilter, coefficient_bits: int = 15, wide: bool = False) -> NDArray[np.float64]:
-    """The bound of :func:`guaranteed` if each rounding errs by at most one; it is proportional to that."""
+    """Return the bound of :func:`guaranteed` for rounding errors of at most one; the bound is proportional to them."""
     program = given.filter.program
     coefficients = stored_coefficients(given.filter, coefficient_bits)
     A, _ = _state_space(program, coefficients)
@@ -193,16 +194,16 @@ def required_fraction_bits(
     coefficient_bits: int = 15,
     wide: bool = False,
 ) -> FixedAnswer:
-    """Smallest number of fraction bits whose rounding errors stay within a tolerance.
+    """Find the smallest number of fraction bits with which rounding errors stay within a tolerance.
 
-    As for floating point, a format qualifies only if the next one does too. The integer bits are those that the run
-    needs.
+    As for floating point, a format qualifies only if the next one meets the tolerance, too. The integer bits are those
+    that the run needs.
 
     Parameters
     ----------
-    tolerance : for each state, in the units of the model; infinite where a state does not matter.
+    tolerance : for each state, in the units of the model; infinite if the state does not matter.
     basis : "emulation" of these measurements, or "guarantee" for all measurements that do not overflow.
-    rounding, coefficient_bits, wide : as of :func:`emulated`.
+    rounding, coefficient_bits, wide : as for :func:`emulated`.
     """
     goal = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (given.filter.program.n,))
     if not (goal > 0).all() or not np.isfinite(goal).any():
@@ -235,12 +236,12 @@ def required_fraction_bits(
 
 
 def stored_coefficients(made: LinearFilter, bits: int) -> NDArray[Any]:
-    """Coefficients with so many significant bits, rounded to nearest; (c,) Fractions."""
+    """Round coefficients to `bits` significant bits, to nearest; (c,) Fractions."""
     return FloatFormat(2, bits).array(made.coefficients).to_fractions()
 
 
 def _exponents(sizes: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The least k with size < 2**k; 0 for zero."""
+    """Return the smallest k with size < 2**k for each size; 0 for zero."""
     return np.where(sizes > 0, np.frexp(sizes)[1], 0).astype(np.int64)
 
 
@@ -256,7 +257,7 @@ def _stored_measurements(given: ScaledFilter, z: Any, fmt: FixedFormat) -> list[
 
 
 def _largest(given: ScaledFilter, z: Any) -> float:
-    """The largest intermediate value of the unrounded filter."""
+    """Return the largest intermediate value of the unrounded filter."""
     program = given.filter.program
     coefficients = given.filter.coefficients.astype(np.float64)
     state, largest = [0.0] * program.n, 0.0
@@ -277,7 +278,7 @@ def _largest(given: ScaledFilter, z: Any) -> float:
 def _integer_step(
     program: Program, coefficients: NDArray[Any], fmt: FixedFormat, wide: bool
 ) -> Callable[[list[int], list[int]], list[int]]:
-    """One step on integers, multiples of the unit; exact sums where `wide`, which is then rounded once when used."""
+    """Return one step on integers, multiples of the unit; if `wide`, sums are exact and rounded once when used."""
     pairs = [(c.numerator, c.denominator.bit_length() - 1) for c in coefficients]
     extra = max((shift for _, shift in pairs), default=0) if wide else 0
     low, high = (int(each / fmt.unit) for each in (fmt.lowest, fmt.largest))
@@ -316,14 +317,14 @@ def _integer_step(
 
 
 def _factors(program: Program) -> frozenset[int]:
-    """Operations whose result becomes a state or the factor of a product: those that a long accumulator stores."""
+    """List the operations whose result becomes a state or a factor, which a long accumulator must store."""
     first = program.n + program.m
     found = {int(b) - first for code, _, b in program.operations if code == MULTIPLY and b >= first}
     return frozenset(found | {int(o) - first for o in program.outputs if o >= first})
 
 
 def _shifted(n: int, shift: int, rounding: Rounding) -> int:
-    """``n / 2**shift``, rounded."""
+    """Return ``n / 2**shift``, rounded."""
     if shift <= 0:
         return n << -shift
     unit = 1 << shift
@@ -342,7 +343,7 @@ def _shifted(n: int, shift: int, rounding: Rounding) -> int:
 
 
 def _state_space(program: Program, coefficients: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The exact A and B of a step."""
+    """Return the exact A and B of a step."""
     n, m = program.n, program.m
     rows = [np.array([Fraction(int(i == j)) for j in range(n + m)], dtype=object) for i in range(n + m)]
     for code, a, b in program.operations.tolist():
@@ -355,7 +356,7 @@ def _state_space(program: Program, coefficients: NDArray[Any]) -> tuple[NDArray[
 
 
 def _peak_sums(A: NDArray[Any], G: NDArray[Any]) -> NDArray[np.float64]:
-    """Upper bounds of the sums over l and o of ``abs(A**l G)``, (n,); zeros are left out of the enclosures."""
+    """Return upper bounds (n,) of the sums over l and o of ``abs(A**l G)``; enclosures omit zeros."""
     n = len(A)
     identity, sums = exact(np.eye(n, dtype=int)), np.zeros(n)
     reached = (np.linalg.matrix_power((A != 0) + np.eye(n), n) @ (G != 0)) > 0
@@ -366,7 +367,7 @@ def _peak_sums(A: NDArray[Any], G: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _effects(program: Program, coefficients: NDArray[Any], wide: bool) -> NDArray[Any]:
-    """What a rounding error in each operation that rounds does to the states of the step; (n, roundings)."""
+    """Return the effect on the states of a step of an error in each rounding, (n, roundings)."""
     n, first = program.n, program.n + program.m
     count = first + len(program.operations)
     effects = [[Fraction(0)] * n for _ in range(count)]
@@ -386,7 +387,7 @@ def _effects(program: Program, coefficients: NDArray[Any], wide: bool) -> NDArra
 
 
 def _rounding(program: Program, coefficients: NDArray[Any], wide: bool) -> list[int]:
-    """Operations whose results are rounded: those that are not whole multiples of the unit when they are stored."""
+    """List the operations whose stored results are rounded because they are not multiples of the unit."""
     first, used = program.n + program.m, _factors(program)
     whole, found = [True] * first, list[int]()
     for o, (code, a, b) in enumerate(program.operations.tolist()):

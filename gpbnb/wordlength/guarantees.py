@@ -1,13 +1,12 @@
 """Guarantees for every measurement and for all time, for filters of this package and of other projects.
 
-``python -m gpbnb.wordlength.guarantees`` computes ``guarantees.csv`` anew; with words, only the filters whose names
-contain one of them.
+``python -m gpbnb.wordlength.guarantees`` recomputes ``guarantees.csv``. If words are given, it computes only the
+filters whose names contain one of them.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -22,8 +21,9 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.display.tables import Table
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.adversary import attack, random_errors
-from gpbnb.kalman.guarantee.bound import Guarantee, from_schedule, guarantee, limits
+from gpbnb.kalman.guarantee.bound import BUDGET, Guarantee, from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.linear import LinearFilter, biquad, controller, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.published import (
@@ -31,6 +31,7 @@ from gpbnb.kalman.guarantee.published import (
     dynamax_tracking,
     elaenia_gold,
     filterpy_fusion,
+    filterpy_velocity,
     fixif_longitudinal,
     nile_local_level,
     px4_landing_target,
@@ -38,9 +39,11 @@ from gpbnb.kalman.guarantee.published import (
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import Basis
+from gpbnb.sweeps import Column, machine, read, write
 from gpbnb.wordlength.examples import altimeter, tilt, tracker
 
 FILE = Path(__file__).with_name("guarantees.csv")
+COMMAND = "python -m gpbnb.wordlength.guarantees"
 FORMAT = FloatFormat(2, 24)
 SHARE = 1e-4
 """Tolerance of each state, as a share of its limit."""
@@ -55,11 +58,13 @@ class Case:
 
     Parameters
     ----------
-    make : the filter.
-    state, innovation : limits, for a Kalman filter. measurement : limit, for a linear filter.
-    center : where the adversary keeps the state.
-    steps : of the adversary's runs. candidates : among how many measurements it chooses at each step.
-    horizon : for filters without process noise, the number of steps that the bound is for.
+    make : function that returns the filter.
+    state, innovation : limits for a Kalman filter. measurement : limit for a linear filter.
+    center : the state near which the adversary stays.
+    steps : length of the adversary's runs. candidates : number of measurements to choose from at each step.
+    aims : the states whose errors the adversary tries to make large; all states if empty.
+    horizon : number of steps that the bound covers, for filters without process noise.
+    form : form of a Kalman filter. budget : budget of the guarantee in binary32, for filters that settle slowly.
     """
 
     make: Callable[[], LinearModel | LinearFilter]
@@ -69,7 +74,10 @@ class Case:
     center: tuple[float, ...] = ()
     steps: int = 2_000
     candidates: int = 200
+    aims: tuple[int, ...] = ()
     horizon: int | None = None
+    form: Form = Form.INNOVATION
+    budget: float = BUDGET
 
 
 def _longitudinal() -> LinearFilter:
@@ -79,13 +87,14 @@ def _longitudinal() -> LinearFilter:
 
 CASES = (
     Case(nile_local_level, (1500,), 1200, center=(1000,)),
-    Case(elaenia_gold, (1200,), 60, center=(1000,), steps=10, horizon=10),
+    Case(elaenia_gold, (1200,), 60, center=(1150,), steps=10, horizon=10),
     Case(tracker, (1000, 30), 8, center=(750, 0)),
     Case(filterpy_fusion, (1000, 30), 8, center=(750, 0)),
+    Case(filterpy_velocity, (2000, 150), 150, center=(1500, 0), form=Form.JOSEPH),
     Case(px4_landing_target, (10, 3), 1, center=(9, 0)),
     Case(dyer_mcreynolds, (10, 10, 10), 0.02, steps=1, horizon=1),
     Case(dynamax_tracking, (100, 100, 10, 10), 8, center=(80, 80, 0, 0)),
-    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000),
+    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000, budget=2e9),
     Case(tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000),
     Case(lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), measurement=1.0),
     Case(lambda: controller("0.999", "0.01", "2", "5"), measurement=1.0),
@@ -95,7 +104,7 @@ CASES = (
 
 
 class Row(NamedTuple):
-    """One line of the table; text as printed."""
+    """One row of the table, as text."""
 
     name: str
     n: str
@@ -113,8 +122,18 @@ class Row(NamedTuple):
     seconds: str
 
 
+_WHOLE = {"n", "m", "repeat", "period", "guarantee", "contraction", "three_sigma", "emulation"}
+COLUMNS = tuple(
+    Column(name, "text")
+    if name == "name"
+    else Column(name, "integer" if name in _WHOLE else "number", 0, optional=True)
+    for name in Row._fields
+)
+"""Columns of the stored table."""
+
+
 def compute(case: Case) -> Row:
-    """Guarantee in binary32, an attack on it, and the precision that each basis asks for."""
+    """Compute the guarantee in binary32, an attack on it, and the precision that each basis requires."""
     made = case.make()
     begin = time.process_time()
     found = _found(case, made, FORMAT)
@@ -123,8 +142,9 @@ def compute(case: Case) -> Row:
     worst = int((found.bound / sizes).argmax())
     center = case.center or None
     ramp = min(case.steps / 2, 1_000)
+    plans = 6 if case.measurement < math.inf else 3
     outcome = attack(
-        found, case.steps, case.candidates, center=center, plans=6 if case.measurement < math.inf else 3, ramp=ramp
+        found, case.steps, case.candidates, states=case.aims or None, center=center, plans=plans, ramp=ramp
     )
     if not outcome.admissible or outcome.ratio > 1:
         raise RuntimeError(f"{made.name}: {outcome}")
@@ -159,8 +179,9 @@ def _found(case: Case, made: LinearModel | LinearFilter, fmt: FloatFormat) -> Gu
     if isinstance(made, LinearModel):
         within = limits(made.n, made.m, state=case.state, innovation=case.innovation)
         if case.horizon is not None:
-            return guarantee(made, fmt, within, most=case.horizon, horizon=case.horizon)
-        return guarantee(made, fmt, within, most=100_000, horizon=1)
+            return guarantee(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
+        budget = case.budget if fmt == FORMAT else BUDGET
+        return guarantee(made, fmt, within, case.form, most=100_000, horizon=1, budget=budget)
     schedule = made.schedule(fmt)
     return from_schedule(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
 
@@ -172,12 +193,12 @@ def _bits(
     tolerance: NDArray[np.float64],
     known: NDArray[np.float64],
 ) -> str:
-    """Bits that a basis asks for; empty where it does not apply. `known` are its errors in binary32."""
+    """Return the bits that a basis requires, empty if it does not apply; `known` holds its errors in binary32."""
     finite = case.horizon is not None
     if basis == "bound" or (basis == "emulation" and isinstance(made, LinearModel)):
         if not isinstance(made, LinearModel):
             return ""
-        answer = required_precision(made, case.horizon or RECORD, list(tolerance), basis=basis)
+        answer = required_precision(made, case.horizon or RECORD, list(tolerance), basis=basis, form=case.form)
         return str(answer.fmt.precision) if answer.fmt else ""
     if basis == "probable" and finite:
         return ""
@@ -195,7 +216,7 @@ def _bits(
             errors = 3 * probable_error(found) if found.for_ever else np.full(len(tolerance), math.inf)
         return bool((errors <= tolerance).all())
 
-    # Errors are nearly proportional to the unit roundoff: look near the precision that this predicts first.
+    # Errors are nearly proportional to the unit roundoff, so first try near the precision that this predicts.
     near = FORMAT.precision + math.ceil(math.log2((known / tolerance).max()))
     least, largest = max(near - 2, 2), min(near + 3, LARGEST_PRECISION[2])
     fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=least, largest=largest)
@@ -205,7 +226,7 @@ def _bits(
 
 
 def fixed_and_floating_bits() -> tuple[int, int]:
-    """Bits with which the output of FixIF's controller is within its target, in fixed and in floating point.
+    """Return the bits with which the output of FixIF's controller meets its target, in fixed and in floating point.
 
     In fixed point, all states have the same number of bits and the coefficients that FixIF printed bound the output.
     """
@@ -223,13 +244,12 @@ def fixed_and_floating_bits() -> tuple[int, int]:
 
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
-    """The stored rows."""
-    with file.open(encoding="utf-8", newline="") as stream:
-        return tuple(Row(**line) for line in csv.DictReader(stream))
+    """Return the stored rows."""
+    return tuple(Row(**line) for line in read(file, COLUMNS, COMMAND).records())
 
 
 def table() -> Table:
-    """Bound and sharpness of each filter."""
+    """Tabulate the bound of each filter and its sharpness."""
     header = (
         "filter", "n, m", "repeats from step", "period", "bound", "achieved / bound", "probable error",
         "scatter / probable",
@@ -248,7 +268,7 @@ def table() -> Table:
 
 
 def bits_table() -> Table:
-    """Bits that each basis asks for."""
+    """Tabulate the bits that each basis requires."""
     header = ("filter", "guarantee", "contraction bound", "3 × probable error", "emulation", "seconds")
     body = [
         tuple(
@@ -262,16 +282,14 @@ def bits_table() -> Table:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compute the rows whose names contain one of the words, or all, and write them to a folder."""
-    parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.wordlength.guarantees", description="Guarantees of some filters, as a table."
-    )
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Guarantees of some filters, as a table.")
     parser.add_argument("words", nargs="*", help="only filters whose names contain one of them; the rest as stored")
     parser.add_argument("--output", type=Path, default=Path(".cache/guarantees"), help="folder for guarantees.csv")
     given = parser.parse_args(arguments)
     words, file = given.words, given.output / FILE.name
     given.output.mkdir(parents=True, exist_ok=True)
     rows = {row.name: row for row in load()} if words and FILE.exists() else {}
-    for case in (CASES[0], CASES[-2]):  # what is compiled or loaded now does not count as time of a guarantee
+    for case in (CASES[0], CASES[-2]):  # time for compiling and loading must not count as time of a guarantee
         _found(case, case.make(), FORMAT)
     for case in CASES:
         name = case.make().name
@@ -279,10 +297,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             rows[name] = compute(case)
             print(*rows[name], flush=True)
             order = [each.make().name for each in CASES]
-            with file.open("w", encoding="utf-8", newline="") as stream:
-                writer = csv.writer(stream, lineterminator="\n")
-                writer.writerow(Row._fields)
-                writer.writerows(rows[each] for each in order if each in rows)
+            found = [tuple(rows[each]) for each in order if each in rows]
+            write(file, COLUMNS, found, {"command": COMMAND, **machine()})
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Read a model: a TOML file, or an object of SciPy, python-control or FilterPy, none of which is imported here."""
+"""Read a model from a TOML file or from an object of SciPy, python-control or FilterPy, without importing these."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ SYSTEM = ("A", "B")
 
 
 def read_model(source: Any) -> LinearModel | LinearSystem:
-    """A model from a TOML file, a mapping of its matrices, or an object of another library.
+    """Read a model from a TOML file, a mapping of its matrices, or an object of another library.
 
     Parameters
     ----------
     source : a path to a TOML file with :data:`KALMAN` or :data:`SYSTEM`; a mapping with the same keys; a discrete
         ``scipy.signal.dlti``, ``scipy.signal.StateSpace`` or ``control.StateSpace``, read as a linear system; a
-        ``filterpy`` Kalman filter (``F, H, Q, R, x, P``), read with its present estimate as the first.
+        ``filterpy`` Kalman filter (``F, H, Q, R, x, P``), whose current estimate becomes the initial one.
 
     Raises
     ------
-    ValueError : a key that is missing or unknown; a continuous system; as the classes.
+    ValueError : a key is missing or unknown; a system is continuous; or the class of the model rejects a matrix.
     TypeError : an object of another kind.
     OSError : the file cannot be read.
 
@@ -101,13 +101,13 @@ def _from_mapping(given: Mapping[str, Any], where: str) -> LinearModel | LinearS
 
 
 def read_measurements(path: str | Path) -> NDArray[np.float64]:
-    """Measurements from a CSV file: a row a step, a column a measurement; (steps, m).
+    """Read measurements (steps, m) from a CSV file with a row for each step and a column for each measurement.
 
-    Lines of names before the first numbers are headers. An empty cell or ``nan`` is a missing measurement.
+    Lines of text before the first numbers are headers. An empty cell or ``nan`` is a missing measurement.
 
     Raises
     ------
-    ValueError : a cell that is no number, or rows of different lengths; the message has file and line.
+    ValueError : a cell is not a number, or rows differ in length; the message has file and line.
     OSError : the file cannot be read.
     """
     path, rows = Path(path), list[list[float]]()

@@ -18,11 +18,11 @@ from gpbnb.wordlength.processors import Outcome, Processor, Sum
 
 
 def outcomes(found: Mapping[str, Sequence[Outcome]], state: int = 0) -> Table:
-    """Largest error of one state of some problems on some processors, or why the processor is refused.
+    """Tabulate the largest error of one state on each processor, or why the filter fails there.
 
     Parameters
     ----------
-    found : by problem, with its unit; an outcome for each processor, in the same order.
+    found : for each problem, named with its unit, the outcome on each processor, in the same order.
     """
     columns = [[_error(each, state) for each in outcomes] for outcomes in found.values()]
     names = [each.processor.name for each in next(iter(found.values()))]
@@ -35,7 +35,7 @@ def _error(found: Outcome, state: int) -> str:
 
 
 def variants(processors: Sequence[Processor], errors: Mapping[str, NDArray[np.float64]], state: int = 0) -> Table:
-    """Typical errors of one state, a line for each way to compute."""
+    """Tabulate typical errors of one state, one row for each way of computing."""
     body = []
     for k, each in enumerate(processors):
         cells = [float(error[k, state]) for error in errors.values()]
@@ -44,7 +44,7 @@ def variants(processors: Sequence[Processor], errors: Mapping[str, NDArray[np.fl
 
 
 def integrators(sums: Sequence[Sum], x: NDArray[np.float64]) -> Table:
-    """Root mean square and mean error of sums of increments, (samples, paths), against float64."""
+    """Tabulate root mean square and mean error of sums of increments (samples, paths), relative to float64."""
     body, true = [], x.sum(axis=0)
     for each in sums:
         error = each.add(x) - true
@@ -55,12 +55,12 @@ def integrators(sums: Sequence[Sum], x: NDArray[np.float64]) -> Table:
 def fixed_point(
     given: Mapping[str, tuple[ScaledFilter, Any]], ways: Sequence[tuple[str, int, Mapping[str, Any]]], state: int = 0
 ) -> Table:
-    """Observed error and guarantee of one state in fixed point.
+    """Tabulate observed error and guarantee of one state in fixed point.
 
     Parameters
     ----------
-    given : by problem, with its unit, the scaled filter and its measurements.
-    ways : name, bits of the word, and options: `rounding`, of the format, and `wide`.
+    given : for each problem, named with its unit, the scaled filter and its measurements.
+    ways : name, bits of the word, and the options `rounding` and `wide`.
     """
     body = []
     peaks = {
@@ -84,7 +84,7 @@ def fixed_point(
 
 
 def formats(found: Mapping[str, FloatFormat]) -> Table:
-    """Formats with their rounding, unit roundoff and range."""
+    """Tabulate formats with rounding, unit roundoff and range."""
     body = []
     for name, fmt in found.items():
         low, high = fmt.limits.emin if fmt.limits else 0, fmt.limits.largest if fmt.limits else 0

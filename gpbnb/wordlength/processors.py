@@ -1,4 +1,4 @@
-"""The same filters on different processors: formats with a range, wide sums, fused operations, compensated updates."""
+"""Run filters as on different processors: limited range, wide sums, fused operations, compensated updates."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ PROCESSORS = (
 
 
 def variants(precision: int) -> tuple[Processor, ...]:
-    """One precision with the properties of processors added one by one; the first is Hung's arithmetic.
+    """Return processors of one precision that add properties one by one; the first has Hung's arithmetic.
 
     The range is that of binary32.
     """
@@ -75,7 +75,7 @@ def variants(precision: int) -> tuple[Processor, ...]:
 
 
 class Outcome(NamedTuple):
-    """What a filter does on a processor: the largest error of each state, or why it is refused."""
+    """Result of a filter on a processor: the largest error of each state, or why the filter fails."""
 
     processor: Processor
     error: NDArray[np.float64]
@@ -85,14 +85,14 @@ class Outcome(NamedTuple):
 def outcome(
     model: LinearModel, z: Any, processor: Processor, form: Form = Form.INNOVATION, true: Checkpoints | None = None
 ) -> Outcome:
-    """Run a filter on a processor and compare it with the filter as given, in double-double.
+    """Run a filter on a processor and compare it with the given filter in double-double.
 
     Errors of storing the model and the measurements are included.
 
     Parameters
     ----------
     z : (steps, m).
-    true : the reference at :func:`~gpbnb.kalman.filter_run.log_spaced` steps, 16 a decade, if it is known.
+    true : the reference at :func:`~gpbnb.kalman.filter_run.log_spaced` steps, 16 per decade, if known.
     """
     steps = log_spaced(len(z), 16)
     nothing = np.full(model.n, math.inf)
@@ -118,7 +118,7 @@ def typical_errors(
     processors: Sequence[Processor],
     form: Form = Form.INNOVATION,
 ) -> NDArray[np.float64]:
-    """Root mean square, over records, of the largest error of each state; (processors, n), infinite where refused."""
+    """Return the rms over records of each state's largest error, (processors, n), infinite if a filter fails."""
     squares = np.zeros((len(processors), model.n))
     for z in records:
         true = reference(model, z, log_spaced(len(z), 16))
@@ -129,14 +129,15 @@ def typical_errors(
 def by_arrays(
     model: LinearModel, z: Any, processor: Processor, order: linalg.Order = "left", block: int = 32
 ) -> NDArray[Any]:
-    """The innovation form written with arrays, slowly, for any order of summation; one measurement or more a step.
+    """Run the innovation form with arrays, slowly, for any order of summation and any number of measurements.
 
-    With the order "left" it gives the digits of :class:`~gpbnb.kalman.filter_run.Run`; a test compares them.
+    With the order "left" it gives the same digits as :class:`~gpbnb.kalman.filter_run.Run`; a test compares them.
 
     Returns
     -------
     estimates : (steps, n), exact Fractions.
     """
+    model.refuse_inputs("this emulation")
     fmt, n = processor.fmt, model.n
     Phi, H, Q, R = ([fmt.array(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R))
     increments = [fmt.array(each - np.eye(n, dtype=int)) for each in model.Phi]
@@ -177,7 +178,7 @@ class Sum(NamedTuple):
 
 
 def integrators() -> tuple[Sum, ...]:
-    """An integrator on several processors: increments (samples, paths) in, sums (paths,) out."""
+    """Return integrators for several processors, which turn increments (samples, paths) into sums (paths,)."""
     fixed = FixedFormat(1, 14)
     return (
         Sum("Cortex-M4F, binary32", lambda x: _left(BINARY32, BINARY32, x)),
@@ -201,7 +202,7 @@ def _left(stored: Format, kept: Format, x: NDArray[np.float64]) -> NDArray[np.fl
 
 
 def compensated_sum(x: FloatArray) -> NDArray[np.float64]:
-    """Kahan's sum along the first axis, each operation rounded in the format of the array."""
+    """Compute Kahan's sum along the first axis, with each operation rounded in the format of the array."""
     total = x[0]
     carried = total - total
     for each in x[1:]:
@@ -212,9 +213,10 @@ def compensated_sum(x: FloatArray) -> NDArray[np.float64]:
 
 
 def increments(samples: int, paths: int, seed: int = 0) -> NDArray[np.float64]:
-    """Angles that a gyroscope adds in each step, (samples, paths): 1 °/s rms, 50 Hz bandwidth, 1024 samples a second.
+    """Simulate the angles that a gyroscope adds in each step, (samples, paths).
 
-    Each is the product of half the period and the sum of two samples of a Gauss-Markov process.
+    Each is the product of half the period and the sum of two samples of a Gauss-Markov process, with 1 °/s rms, a
+    bandwidth of 50 Hz and 1024 samples a second.
     """
     rate, rng = 1024.0, np.random.default_rng(seed)
     keep = math.exp(-2 * math.pi * 50 / rate)

@@ -1,4 +1,4 @@
-"""A report on the wordlength of one filter: computed once, then written as JSON and as one HTML page."""
+"""A report on the wordlength of one filter, computed once and written as JSON and as one HTML page."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from typing import Any
 
 import numpy as np
 
+from gpbnb.kalman.array_forms import AnyForm
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import log_spaced, reference
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import Basis, Requirement
-from gpbnb.kalman.simulation import Simulation, fine_resolution
 from gpbnb.kalman.system import LinearSystem
 from gpbnb.sweeps import machine
 from gpbnb.wordlength.study import binary_ranges
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
-"""Forms that a report compares; the one asked for comes first."""
+"""Forms that a report compares; the requested form comes first."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """One search as plain numbers: `tried` has precision and error over tolerance, None where there is no number."""
+    """One search as plain numbers; `tried` holds precision and error / tolerance, None if there is no number."""
 
     label: str
     basis: str
@@ -41,18 +42,18 @@ class Answer:
 
 @dataclass(frozen=True)
 class Report:
-    """What the command found, in plain numbers and texts.
+    """The findings of the command, as plain numbers and texts.
 
     Parameters
     ----------
-    name, kind : of the model; "Kalman filter" or "linear system".
-    digits : the answer, None if there is none. text : the same, with what it rests on.
-    base, rounding, steps, tolerance : of the question.
-    source : where the measurements come from.
-    answers : one for each basis and form, the one asked for first.
-    errors : error over tolerance of each state at the answer; None where the tolerance is infinite.
-    ranges : name, least and largest power of two.
-    command : reproduces the report. versions : of the machine and packages.
+    name, kind : name of the model, and "Kalman filter" or "linear system".
+    digits : the answer, None if there is none. text : the answer in words, with its basis.
+    base, rounding, steps, tolerance : the question.
+    source : origin of the measurements.
+    answers : one answer for each basis and form, the requested one first.
+    errors : error / tolerance of each state at the answer; None if the tolerance is infinite.
+    ranges : name, smallest and largest power of two.
+    command : the command that reproduces the report. versions : versions of the machine and packages.
     """
 
     name: str
@@ -72,16 +73,16 @@ class Report:
 
     @property
     def limiting(self) -> int | None:
-        """The state with the largest error over its tolerance, from 0."""
+        """The index, from 0, of the state with the largest error / tolerance."""
         ratios = [(ratio, i) for i, ratio in enumerate(self.errors) if ratio is not None]
         return max(ratios)[1] if ratios else None
 
     def to_json(self) -> str:
-        """All of it as JSON, with the limiting state; without NaN or infinity."""
+        """Return the report as JSON, with the limiting state and without NaN or infinity."""
         return json.dumps({**asdict(self), "limiting": self.limiting}, indent=1, ensure_ascii=False, allow_nan=False)
 
     def to_html(self) -> str:
-        """One page that needs no other file."""
+        """Return the report as one HTML page that needs no other file."""
         return page(self)
 
 
@@ -99,27 +100,27 @@ def study(
     tell: Callable[[str], Any] = lambda text: None,
     progress: bool = False,
 ) -> Report:
-    """Answer for each basis and form, and collect what explains the answers.
+    """Find the answer for each basis and form, and collect what explains it.
 
     Parameters
     ----------
     z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
-    steps : how many to simulate; by default as many as there are measurements, or 1000.
-    tell : is given a line of text before each search.
+    steps : number of steps to simulate; by default the number of measurements, or 1000.
+    tell : function called with a line of text before each search.
 
     Raises
     ------
-    ValueError : as :func:`gpbnb.kalman.precision.required_precision`.
+    ValueError : for a reason given in :func:`gpbnb.kalman.precision.required_precision`.
     """
     count = steps if steps is not None else 1000 if z is None else len(z)
     if isinstance(model, LinearSystem):
-        questions: list[tuple[str, Basis, Form | None]] = [(basis, basis, None) for basis in bases]
+        questions: list[tuple[str, Basis, AnyForm | None]] = [(basis, basis, None) for basis in bases]
     else:
         first = form_named(form)
         forms = [first, *(each for each in SIDE_BY_SIDE if each is not first)]
         questions = [(f"{each}, {basis}", basis, each) for each in forms for basis in bases]
         if z is None:
-            z = Simulation(model, tuple(map(float, model.x0)), 0, fine_resolution(model)).measurements(count)
+            z = simulated_measurements(model, count)
     found: list[tuple[str, Requirement]] = []
     for label, basis, chosen in questions:
         tell(f"{label} …")
@@ -155,9 +156,9 @@ def study(
 
 
 def _errors(
-    model: LinearModel, z: Any, answer: Requirement, form: Form, tolerances: np.ndarray
+    model: LinearModel, z: Any, answer: Requirement, form: AnyForm, tolerances: np.ndarray
 ) -> tuple[float | None, ...]:
-    """Largest error over tolerance of each state at the answer."""
+    """Return the largest error / tolerance of each state at the answer."""
     if answer.fmt is None:
         return ()
     sound, filled = without_missing(model, z)
@@ -190,7 +191,7 @@ pre { background: #f3f3f3; padding: .6rem; white-space: pre-wrap; overflow-wrap:
 
 
 def page(report: Report) -> str:
-    """A self-contained HTML page of a report."""
+    """Return a report as a self-contained HTML page."""
     unit = "bits" if report.base == 2 else f"digits of base {report.base}"
     answer = f"{report.digits} {unit}" if report.digits is not None else "no precision that can be run"
     limiting = ""
@@ -207,7 +208,7 @@ def page(report: Report) -> str:
         "within the tolerance.</p>",
         f"<p>{html.escape(report.text)}.</p>",
         limiting,
-        "<h2>What the answer rests on</h2>",
+        "<h2>Basis of the answer</h2>",
         _table(
             ("question", "value"),
             [
@@ -219,7 +220,7 @@ def page(report: Report) -> str:
         ),
         "<p>An emulation holds for these measurements. A bound holds for the arithmetic of this run, whatever its "
         "roundings. Neither limits the exponent range: see the ranges below.</p>",
-        "<h2>Forms and bases side by side</h2>",
+        "<h2>Forms and bases compared</h2>",
         _table(("form and basis", unit, "answer"), rows),
         "<h2>Error against precision</h2>",
         _curves(report.answers, unit),
@@ -257,7 +258,7 @@ _COLOURS = ("#0b5cad", "#a3341f", "#2e7d32", "#7b3fa0", "#8a6d00", "#555555")
 
 
 def _curves(answers: Sequence[Answer], unit: str) -> str:
-    """Error over tolerance against precision as inline SVG; the tolerance is the dashed line."""
+    """Draw error / tolerance against precision as inline SVG; the dashed line is the tolerance."""
     points = [(t, r) for each in answers for t, r in each.tried if r is not None and r > 0]
     if len(points) < 2:
         return "<p>Too few precisions have a finite error for a figure.</p>"
@@ -286,8 +287,8 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
         drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
         drawn.append(f'<text x="440" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
     return (
-        '<svg viewBox="0 0 640 330" role="img" aria-label="Error over tolerance against precision, one line for each '
-        f'form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
+        '<svg viewBox="0 0 640 330" role="img" aria-label="Error divided by tolerance, against precision; one line '
+        f'for each form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
         f'<text x="340" y="320" text-anchor="middle">{html.escape(unit)}</text></svg>'
-        "<p>Error or bound over the tolerance; the dashed line is the tolerance.</p>"
+        "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance.</p>"
     )

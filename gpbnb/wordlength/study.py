@@ -1,4 +1,4 @@
-"""What decides a wordlength, measured: the steps, the range of the numbers, what an addition loses."""
+"""Measure what determines a wordlength: the number of steps, the range of the numbers, losses in additions."""
 
 from __future__ import annotations
 
@@ -32,11 +32,12 @@ from gpbnb.kalman.year import Year
 def printed_precision(
     k: int, n: int, m: int, tolerance: Fraction, size: Fraction, base: int = 2, **faults: bool
 ) -> int:
-    r"""Digits that (125) asks for when :math:`\|x_k\| = B` = size, for an error of `tolerance`.
+    r"""Return the digits that (125) requires if :math:`\|x_k\| = B` = size, for an error of `tolerance`.
 
     Parameters
     ----------
-    tolerance, size : in one unit. faults : of :func:`gpbnb.kalman.report_bounds.coefficients`, which correct (125).
+    tolerance, size : in the same unit. faults : options of :func:`gpbnb.kalman.report_bounds.coefficients` that
+        correct (125).
 
     References
     ----------
@@ -55,15 +56,15 @@ def printed_precision(
 def required_precision_by_steps(
     model: LinearModel, z: NDArray[Any], tolerance: float | Sequence[float], steps: Sequence[int], **options: Any
 ) -> tuple[Requirement, ...]:
-    """What :func:`gpbnb.kalman.precision.required_precision` answers for the first few steps, and for more of them.
+    """Return answers of :func:`gpbnb.kalman.precision.required_precision` for several numbers of first steps.
 
     Parameters
     ----------
-    options : form, basis, base and rounding of that function.
+    options : form, basis, base and rounding for that function.
 
     Raises
     ------
-    ValueError : a number of steps below 1, or more than there are measurements; as that function.
+    ValueError : a number of steps is below 1 or exceeds the measurements; or for a reason given in that function.
     """
     if not all(1 <= k <= len(z) for k in steps):
         raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
@@ -71,17 +72,20 @@ def required_precision_by_steps(
 
 
 def _first(model: LinearModel, steps: int) -> LinearModel:
-    """The same for so many steps, without what a longer cycle has later, which would be rounded and checked in vain."""
-    cut = {letter: getattr(model, letter)[:steps] for letter in ("Phi", "H", "Q", "R")}
-    return replace(model, **cut)
+    """Return the model for `steps` steps; later matrices of its cycle need not be rounded and checked."""
+    given = [letter for letter in ("Phi", "H", "Q", "R", "B", "b", "d") if getattr(model, letter) is not None]
+    cut = {letter: getattr(model, letter)[:steps] for letter in given}
+    if model.u is not None and model.u.ndim == 2:
+        cut["u"] = model.u[:steps]
+    return replace(model, **cut, steps=None if model.steps is None else steps)
 
 
 def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int, int], ...]:
-    """For each step, the fewest digits of the runs that keep drift (mas) and rate (mas/yr) within `tolerance` so far.
+    """For each step, find the fewest digits that keep drift (mas) and rate (mas/yr) within `tolerance` up to this step.
 
     Raises
     ------
-    ValueError : runs of several bases, roundings or forms, whose digits are not to be compared.
+    ValueError : runs of several bases, roundings or forms, whose digits are not comparable.
     """
     kinds = {(run.case.model, run.case.base, run.case.rounding, run.case.form) for run in runs}
     if len(kinds) != 1:
@@ -96,7 +100,7 @@ def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int
 
 
 class BinaryRange(NamedTuple):
-    """Powers of two between which the magnitudes of numbers lie, zeros aside."""
+    """Powers of two between which the magnitudes of nonzero numbers lie."""
 
     name: str
     least: int
@@ -104,7 +108,7 @@ class BinaryRange(NamedTuple):
 
 
 def binary_ranges(model: LinearModel, z: NDArray[Any]) -> tuple[BinaryRange, ...]:
-    """Of a filter's model, and its estimates, gains and covariances after sixteen steps a decade."""
+    """Return the ranges of a model, and of its estimates, gains and covariances at sixteen steps per decade."""
     checkpoints = reference(model, z, log_spaced(len(z), 16))
     given = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
     numbers = {"model": given, "estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
@@ -120,9 +124,9 @@ class UpdateStagnation(NamedTuple):
 
     Parameters
     ----------
-    variance : its last computed variance over the true one.
-    unchanged : share of the last steps in which its estimate did not change at all.
-    error : the largest error of the first state, in its unit.
+    variance : last computed variance of the state / true variance.
+    unchanged : share of the last steps in which the estimate did not change at all.
+    error : largest error of the first state, in its unit.
     """
 
     fmt: FloatFormat
@@ -139,17 +143,17 @@ def update_stagnation(
     form: Form = Form.INNOVATION,
     last: int = 200,
 ) -> tuple[UpdateStagnation, ...]:
-    """Measure how far updates of a slow state stagnate in some formats.
+    """Measure how much the updates of a slow state stagnate in several formats.
 
-    Errors are those of :func:`gpbnb.kalman.precision.survey`.
+    Errors are defined as in :func:`gpbnb.kalman.precision.survey`.
 
     Parameters
     ----------
-    state : its index. last : how many steps at the end are watched one by one.
+    state : index of the state. last : number of steps at the end that are examined one by one.
 
     Raises
     ------
-    ValueError : no such state; not more measurements than the steps to be watched.
+    ValueError : no such state, or not more measurements than the steps to be examined.
     """
     _check_state(model, state)
     if not 0 < last < len(z):
@@ -167,9 +171,9 @@ def update_stagnation(
 
 
 def bits_hiding_process_noise(model: LinearModel, z: NDArray[Any], state: int) -> float:
-    r""":math:`\log_2 P_{ii}/Q_{ii}` after the last step: with fewer bits than about that, adding Q changes nothing.
+    r"""Return :math:`\log_2 P_{ii}/Q_{ii}` after the last step; with roughly fewer bits, adding Q has no effect.
 
-    Infinite where the state has no process noise.
+    The value is infinite if the state has no process noise.
 
     Raises
     ------
@@ -186,20 +190,20 @@ def _check_state(model: LinearModel, state: int) -> None:
 
 
 def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
-    """The largest entry of the estimates after the steps of :func:`gpbnb.kalman.filter_run.log_spaced`."""
+    """Return the largest entry of the estimates at the steps of :func:`gpbnb.kalman.filter_run.log_spaced`."""
     return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
 
 
 def companion_run(
     model: LinearModel, z: NDArray[Any], fmt: FloatFormat, form: Form = Form.INNOVATION
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Bound a run by its distance from the same filter in double-double and the contraction bound of that one.
+    """Bound a run by its distance from a companion run in double-double plus the bound of the companion.
 
-    Model and measurements are those that the format stores.
+    Both use the model and the measurements as the format stores them.
 
     Returns
     -------
-    error, bound : (n,), the largest of each state at the steps of :func:`gpbnb.kalman.filter_run.log_spaced`.
+    error, bound : (n,), largest value for each state at the steps of :func:`gpbnb.kalman.filter_run.log_spaced`.
     """
     stored, measured, checkpoint_steps = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
     run = Run(stored, fmt, form, checkpoint_steps)
@@ -214,32 +218,33 @@ def companion_run(
 def native(
     model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]], progress: bool = False
 ) -> NDArray[np.float64]:
-    """Run the form by the innovation in a type of NumPy, with what a processor does and the emulation does not.
+    """Run the innovation form in a NumPy type, with the limited range of a processor.
 
-    Operations and their order are those of the emulation. Here they are rounded half to even, numbers too small become
-    subnormal or zero, and too large ones infinite. Products and sums are rounded one by one: none is fused.
+    Operations and their order are those of the emulation. Here results are rounded to nearest, ties to even. Small
+    numbers become subnormal or zero, and large numbers infinite. Products and sums are rounded one by one, not fused.
 
     Parameters
     ----------
-    model, z : as of :func:`gpbnb.kalman.precision.survey`; each entry is read as float64, and then as the type.
+    model, z : as for :func:`gpbnb.kalman.precision.survey`; each entry is converted to float64, then to the type.
     dtype : numpy.float16, numpy.float32 or numpy.float64.
-    progress : show a bar, a tick a step.
+    progress : show a progress bar that counts steps.
 
     Returns
     -------
-    x : (steps, n), the estimate after each step; not finite where the range did not suffice.
+    x : (steps, n), the estimate after each step; not finite if the range is too small.
     """
     if not (isinstance(dtype, type) and issubclass(dtype, np.floating)):
         raise TypeError(f"got dtype {dtype!r}; needed numpy.float16, numpy.float32 or numpy.float64")
+    model.refuse_inputs("NumPy's own types")
     with np.errstate(all="ignore"):
         given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
         return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
 
 
 def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]]) -> NDArray[np.float64]:
-    """Largest error of each state of :func:`native`, (n,), as :func:`gpbnb.kalman.precision.survey` takes it.
+    """Return the largest errors (n,) of :func:`native`, as :func:`gpbnb.kalman.precision.survey` defines them.
 
-    The errors of storing model and measurements are among them; infinite or NaN where the range did not suffice.
+    It includes the errors of storing model and measurements, and is infinite or NaN if the range is too small.
     """
     checkpoint_steps = log_spaced(len(z), 16)
     true = reference(model, z, checkpoint_steps).x.astype(np.float64)
@@ -247,11 +252,11 @@ def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[An
 
 
 def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
-    """The form by the innovation, in whatever numbers the arrays hold; see :func:`native`.
+    """Run the innovation form in the number type of the arrays; see :func:`native`.
 
     Parameters
     ----------
-    given : Phi, H, Q, R with a leading axis, x0 and P0, as of :meth:`gpbnb.kalman.model.LinearModel.to_float`.
+    given : Phi, H, Q, R with a leading axis, x0 and P0, as from :meth:`gpbnb.kalman.model.LinearModel.to_float`.
     z : (steps, m).
 
     Returns
@@ -273,7 +278,7 @@ def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress
 
 
 def _times(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """The product, each entry summed from left to right; NumPy's own is summed otherwise."""
+    """Multiply matrices, each entry summed from left to right; NumPy sums in another order."""
     result = a[:, :1] * b[:1]
     for k in range(1, a.shape[1]):
         result = result + a[:, k : k + 1] * b[k : k + 1]
@@ -281,7 +286,7 @@ def _times(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 
 def _inverse(a: NDArray[Any]) -> NDArray[Any]:
-    """By elimination without exchange of rows."""
+    """Invert a matrix by elimination without pivoting."""
     upper, m = a.copy(), len(a)
     result = np.eye(m, dtype=a.dtype)
     for k in range(m):
@@ -297,7 +302,7 @@ def _inverse(a: NDArray[Any]) -> NDArray[Any]:
 
 
 class InversePrecision(NamedTuple):
-    """Bits that the inverse of a matrix needs, and what its condition lets one expect."""
+    """Bits that the inverse of a matrix needs, and the bits that its condition number suggests."""
 
     name: str
     condition: float
@@ -309,10 +314,10 @@ class InversePrecision(NamedTuple):
 def inverse_precision(
     name: str, matrix: NDArray[Any], tolerance: float, rounding: Rounding = Rounding.NEAREST
 ) -> InversePrecision:
-    r"""Bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and proved.
+    r"""Return bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and proved bits.
 
-    D scales by powers of two to a diagonal near 1, as a choice of units would; elimination rounds the same with and
-    without. What is proved is of :func:`gpbnb.inversion.bounds.smallest_precision`.
+    D scales by powers of two to a diagonal near 1, as a choice of units would. Elimination makes the same rounding
+    errors with and without D. :func:`gpbnb.inversion.bounds.smallest_precision` proves the other number.
 
     Parameters
     ----------
@@ -338,15 +343,15 @@ def inverse_precision(
 
 
 def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
-    """The same filter with states in other units.
+    """Return the same filter with states in other units.
 
     Parameters
     ----------
-    sizes : (n,), exact: how many of the new units an old one is.
+    sizes : (n,), exact, old unit / new unit for each state.
 
     Raises
     ------
-    ValueError : not one positive number a state.
+    ValueError : `sizes` does not have one positive number for each state.
     """
     given = exact(sizes)
     if given.shape != (model.n,) or not (given > 0).all():
@@ -359,4 +364,6 @@ def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
         Q=model.Q * square,
         x0=model.x0 * given,
         P0=model.P0 * square,
+        B=None if model.B is None else model.B * given[:, np.newaxis],
+        b=None if model.b is None else model.b * given,
     )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import io
+import math
 import operator
 import pickle
 from collections.abc import Callable
@@ -15,6 +17,8 @@ import gmpy2
 import numpy as np
 import oracles
 import pytest
+import scipy.fft
+import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -182,7 +186,11 @@ class TestConversion:
         if expected:
             assert x.to_float() == expected
             assert base != 10 or x.to_float() == float(str(x))
-            assert float(x) == expected
+            if Fraction(expected) == value:
+                assert float(x) == expected
+            else:
+                with pytest.raises(ValueError, match=r"needed an explicit conversion: x\.to_float"):
+                    float(x)
         else:
             with pytest.raises(OverflowError, match="within the range of float64"):
                 x.to_float()
@@ -215,7 +223,7 @@ class TestConversion:
         assert x.to_fractions().tolist() == [[Fraction(3, 2), -2], [0, Fraction(1, 1000)]]
         assert isinstance(x[0, 0].to_fractions(), Fraction)
         assert isinstance(x[0, 0].to_float(), float)
-        assert np.asarray(x).tolist() == x.to_float().tolist()
+        assert np.asarray(x[0]).tolist() == x[0].to_float().tolist()
         assert np.asarray(x, dtype=object).tolist() == x.to_fractions().tolist()
         assert x.astype(float).tolist() == x.to_float().tolist()
         assert x[0, 0].astype(object).shape == ()
@@ -654,3 +662,69 @@ def test_bad_input(call: Callable[[], Any], kind: type[Exception], message: str)
     assert caught.type is kind
     assert message in str(caught.value)
     assert ([repr(x) for x in (V, W, HUGE, TINY)], ONE.tolist()) == before
+
+
+class TestLeavingTheFormat:
+    """Whatever asks for float64 by itself gets it if it is exact, and an error that names the cure if not."""
+
+    TENTH, HALF = D4.array(["0.1", "0.5"]), D4.array(["0.5", "-2", "0"])
+    LONG = FloatFormat(2, 113).array(["0.1", "0.5"])
+
+    @pytest.mark.parametrize("x", [TENTH, LONG], ids=str)
+    @pytest.mark.parametrize(
+        ("name", "leave"),
+        [
+            ("asarray", np.asarray),
+            ("array", lambda x: np.array(x, dtype=float)),
+            ("float", lambda x: float(x[0])),
+            ("sqrt", lambda x: math.sqrt(x[0])),
+            ("save", lambda x: np.save(io.BytesIO(), x)),
+            ("solve", lambda x: scipy.linalg.solve(np.eye(2), x)),
+            ("fft", lambda x: scipy.fft.fft(x)),
+        ],
+    )
+    def test_no_entry_is_rounded_unseen(self, name, leave, x) -> None:
+        with pytest.raises(
+            ValueError, match=r"got (an array|float\(\)) of a FloatArray in .*; needed an explicit conv"
+        ):
+            leave(x)
+
+    def test_what_is_exact_passes(self) -> None:
+        assert np.asarray(self.HALF).tolist() == [0.5, -2.0, 0.0]
+        assert math.sqrt(self.HALF[0]) == math.sqrt(0.5)
+        assert scipy.linalg.solve(np.eye(3), self.HALF).tolist() == [0.5, -2.0, 0.0]
+        assert np.asarray(FloatFormat(2, 53).array([0.1])).tolist() == [0.1]
+        stream = io.BytesIO()
+        np.save(stream, self.HALF)
+        stream.seek(0)
+        assert np.load(stream).tolist() == [0.5, -2.0, 0.0]
+        assert pickle.loads(pickle.dumps(self.LONG)).tolist() == self.LONG.tolist()
+
+    def test_numbers_below_the_normal_ones_count(self) -> None:
+        tiny = FloatFormat(2, 2).array(Fraction(3, 2**1075))  # 1.5 times the least subnormal number
+        with pytest.raises(ValueError, match="is no float64"):
+            float(tiny)
+        assert float(FloatFormat(2, 2).array(Fraction(1, 2**1074))) == 5e-324
+
+    def test_the_nearest_and_the_exact_are_asked_for(self) -> None:
+        assert self.TENTH.to_float().tolist() == [0.1, 0.5]
+        assert self.TENTH.astype(float).tolist() == [0.1, 0.5]
+        assert f"{self.TENTH[0]:.3f}" == "0.100"
+        assert self.TENTH.to_fractions().tolist() == [Fraction(1, 10), Fraction(1, 2)]
+
+    @pytest.mark.parametrize(
+        ("wrong", "near"),
+        [
+            (lambda x: x.summ(), "the nearest is x.sum"),
+            (lambda x: x.dtype, "the nearest is x.format"),
+            (lambda x: x.argmax(), "the nearest is x.max"),
+            (lambda x: np.argsort(x), "the nearest is np.sort"),
+            (lambda x: np.std(x), "the nearest is np.mean"),
+            (lambda x: np.log2(x), "the nearest is np.log"),
+            (lambda x: np.hypot(x, x), "the nearest is np.sqrt"),
+            (lambda x: np.cumprod(x), "the nearest is np.prod"),
+        ],
+    )
+    def test_unknown_names_have_a_hint(self, wrong, near) -> None:
+        with pytest.raises((AttributeError, TypeError), match=near):
+            wrong(self.HALF)

@@ -44,7 +44,7 @@ def expected(x: Fraction, fmt: FloatFormat) -> Fraction | None:
     """The number of the format for an exact result; None if it overflows."""
     if x == 0:
         return x
-    power = 0
+    power = int((x.numerator.bit_length() - x.denominator.bit_length()) / math.log2(fmt.base))
     while abs(x) >= Fraction(fmt.base) ** (power + 1):
         power += 1
     while abs(x) < Fraction(fmt.base) ** power:
@@ -68,6 +68,8 @@ TINY = [
     FloatFormat(10, 1, emin=-1, emax=0, subnormal=False),
     FloatFormat(3, 2, emin=-1, emax=1),
     FloatFormat(2, 4),
+    FloatFormat(2, 1),
+    FloatFormat(2, 1, emin=-3, emax=3, subnormal=False),
 ]
 
 
@@ -134,6 +136,35 @@ def test_fused_multiply_add_with_cancellation(fmt: FloatFormat, mode: Rounding) 
     near = fmt.array(-(a * b).to_float() * rng.choice([1, 1, 1 + 2.0**-20, 2.0**-30, 2.0**30], 300))
     exact = [expected(p * q + r, fmt) for p, q, r in zip(*(u.to_fractions() for u in (a, b, near)), strict=True)]
     assert a.multiply_add(b, near).to_fractions().tolist() == exact
+
+
+CONVERTED = [named.BINARY16, named.BFLOAT16, named.TF32, named.FP8_E4M3, FloatFormat(2, 11), FloatFormat(2, 52)]
+
+
+@pytest.mark.parametrize("fmt", [*CONVERTED, replace(named.BINARY16, subnormal=False)], ids=str)
+def test_conversion_of_every_power_of_two(fmt: FloatFormat) -> None:
+    fmt = replace(fmt, rounding=Rounding.EVEN)
+    rng = np.random.default_rng(5)
+    powers = np.ldexp(1.0, rng.integers(-1074, 1024, 300))
+    ties = np.ldexp(rng.integers(2 ** (fmt.precision - 1), 2**fmt.precision, 300) + 0.5, 1 - fmt.precision)
+    x = np.concatenate([powers, powers * rng.uniform(1, 2, 300), powers * ties, powers * rng.choice([0.5, 1.5], 300)])
+    largest = 2.0**900 if fmt.limits is None else float(fmt.limits.largest)
+    edge = largest * (1 + np.arange(9) / 4 * 2.0**-fmt.precision)
+    x = np.concatenate([[0.0], x, -x, edge, -edge])
+    x = x[np.isfinite(x)]
+    results = [expected(Fraction(float(value)), fmt) for value in x]
+    held = [result is not None for result in results]
+    # An array with a number out of reach of the compiled loop is converted by the exact kernel as a whole.
+    large, small = np.abs(x) > 2.0**-900, np.abs(x) < 2.0**960
+    for part in (large & small, large, np.full(x.shape, True)):
+        kept = np.array(held) & part
+        found = fmt.array(x[kept]).to_fractions().tolist()
+        assert found == [result for result, keep in zip(results, kept, strict=True) if keep]
+    for value in x[~np.array(held)][-20:]:
+        with pytest.raises(OverflowError):
+            fmt.array([value])
+    with pytest.raises((OverflowError, ValueError)):
+        fmt.array([np.inf])
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)

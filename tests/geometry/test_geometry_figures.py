@@ -120,7 +120,7 @@ def test_table_of_fates():
     size = 20 * ARCSEC
     names = ("alpha1", "alpha2", "beta1", "beta3", "gamma1", "gamma2")
     table = tables.fates({name: experiment.parts(theory.Case().with_angle(name, size)) for name in names})
-    assert table.header == ("angle", "telescope", "gyro", "difference", "fate")
+    assert table.header == ("angle", "telescope", "gyro", "difference", "outcome")
     assert [row[-1] for row in table.body] == [
         "stays",
         "is measured",

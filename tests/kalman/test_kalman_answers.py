@@ -110,7 +110,7 @@ def test_the_headline_says_beside_each_mark_what_it_is():
     assert shown == sum(run.case.fmt is not None for run in found.runs)
     for name, faults in (
         ("(125) as printed", {}),
-        ("(125) with its faults corrected", report_bounds.CORRECTIONS["and errors carried on"]),
+        ("(125) with its faults corrected", report_bounds.ALL_CORRECTED),
     ):
         each = report_bounds.coefficients(*report_bounds.EXAMPLE, **faults)
         t, height = words[name]

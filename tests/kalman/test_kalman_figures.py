@@ -130,4 +130,4 @@ def test_violations(ax):
     assert [bar.get_height() for bar in bars] == pytest.approx([50, 25, 25, 0, 2.5, 10])
     assert [label.get_text() for label in ax.get_xticklabels()] == ["Hung (1984)", "UD"]
     assert legend_of(ax) == ["(105)", "(108)", "(125)"]
-    assert ax.get_ylabel() == "filters that violate it (%)"
+    assert ax.get_ylabel() == "filters that violate the bound (%)"

@@ -119,8 +119,8 @@ def test_the_error_is_what_its_terms_add_up_to(form: Form) -> None:
     none = np.full(len(program.operations), np.inf)
     within = limits(2, 2, state=100, innovation=100, measurement=100)
     found = disturbances(
-        program.operations, program.outputs, program.groups, program.roots, given.coefficients, units(fmt),
-        given.Phi, given.HPhi, given.exact, given.dK, within, np.zeros(2), none,
+        program.operations, program.outputs, program.groups, program.roots, given.coefficients, given.offsets,
+        units(fmt), given.Phi, given.HPhi, given.exact, given.dK, within, np.zeros(2), none,
     )  # fmt: skip
     rng, x, true, P = np.random.default_rng(3), [Fraction(0)] * n, [Fraction(0)] * n, stored.P0
     for k in range(7):

@@ -42,8 +42,8 @@ def test_the_misprints():
     assert "84" in rows["first coefficient"][2]
     assert r"\cdot84$" in rows["second coefficient"][2]
     assert rows["first beta"] == [r"$.3775\times10^{-8}$", r"$3.867\times10^{-9}$", "one over the printed coefficient"]
-    assert rows["first digits"] == ["$9$", "10", "the printed β is that of 9.12 digits; it needs 10"]
-    assert rows["second digits"] == ["$17$", "16", "the printed β is that of 16.81 digits; it needs 17"]
+    assert rows["first digits"] == ["$9$", "10", "the printed β corresponds to 9.12 digits, so 10 are needed"]
+    assert rows["second digits"] == ["$17$", "16", "the printed β corresponds to 16.81 digits, so 17 are needed"]
 
 
 def test_misprints_that_are_none_are_not_claimed():
@@ -67,7 +67,7 @@ def test_violations():
 def test_the_order():
     assert cells(tables.order()) == [
         ["first", "(100) → (99) → (101) → (98)"],
-        ["second", "none: (99) waits for (101), and (101) for (99)"],
+        ["second", "none: (99) needs the result of (101), and (101) that of (99)"],
     ]
 
 
@@ -110,10 +110,10 @@ def run(**changes):
 
 def test_year_ends():
     table = tables.year_ends([run(), run(indefinite=2)])
-    assert table.header[:4] == ("arithmetic", "form", "drift (mas)", "rate (mas/yr)")
+    assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
     rows = cells(table)
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
-    assert rows[1][-1] == "-0.5, a variance lost at step 2"
+    assert rows[1][-1] == "-0.5; first non-positive variance at step 2"
     other = run(case=run().case._replace(model=year_cases.MODELS[1]))
     table = tables.year_ends([run(), other])
     assert table.header[0] == "model"
@@ -190,9 +190,11 @@ def share(precision, within, records, **changes):
 
 def test_needed_precisions():
     found = [share(32, 9, 10), share(33, 300, 300), share(27, 5, 5, states="deviation")]
+    chopped = share(36, 1, 30)._replace(fmt=FloatFormat(2, 36, Rounding.CHOP))
+    assert cells(tables.needed_precisions([chopped]))[0][2:5] == ["none", "–", "–"]
     assert cells(tables.needed_precisions(found)) == [
-        ["simple, absolute", "hung, nearest", "33 bits", "32 bits", "33 bits"],
-        ["simple, deviation", "hung, nearest", "27 bits", "27 bits", "none"],
+        ["simple, absolute", "hung, nearest", "33 bits", "300 of 300", "0.990 to 1.000", "32 bits", "33 bits"],
+        ["simple, deviation", "hung, nearest", "27 bits", "5 of 5", "0.549 to 1.000", "27 bits", "none"],
     ]
 
 
@@ -215,5 +217,5 @@ def test_what_a_bound_costs():
     rows = cells(tables.bound_costs([(fmt, found)], terms, reference, 8.2))
     beta = float(fmt.unit_roundoff)
     assert rows[0] == ["(125), least $B$", "a formula", "none", f"{beta * (7 * first + 5 * second) / 0.5:.3g}"]
-    assert rows[1] == ["running bound", "8 times the run", "106 bits for each step again", "8"]
-    assert rows[2] == ["companion bound", "8 times the run", "106 bits for a second run", "1.25"]
+    assert rows[1] == ["running bound", "8 times the run", "106 bits, to repeat each step", "8"]
+    assert rows[2] == ["companion bound", "8 times the run", "106 bits, for a second run", "1.25"]

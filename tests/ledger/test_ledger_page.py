@@ -109,6 +109,25 @@ def test_the_error_table_lists_disagreements_with_the_most_serious_first():
     assert {by_address[link].finding.verdict for link in links} == {Verdict.WRONG, Verdict.MISPRINT}
 
 
+def test_the_error_table_has_a_row_for_each_root_error_with_all_its_statements():
+    root = next(iter(ledger.load_roots()))
+    shared = [Row(s, compare(False, "1", Verdict.WRONG, f"note {i}", root=root)) for i, s in enumerate(STATEMENTS[:3])]
+    alone = Row(STATEMENTS[3], compare(False, "1", Verdict.MISPRINT, "a note of its own"))
+    html = ledger.error_table([alone, *shared]).html
+    lines = re.findall(r"<tr><th scope=\"row\">(.*?)</tr>", html, re.DOTALL)
+    assert len(lines) == 2
+    assert f"errata.html#root-{root}" in lines[0]
+    assert all(page.address(row.statement) in lines[0] and f"note {i}" in lines[0] for i, row in enumerate(shared))
+    assert "a note of its own" in lines[1]
+    assert "<details>" not in lines[1]
+
+
+def test_printed_statements_are_collapsed_under_their_title():
+    html = ledger.printed_table(ROWS[:3], "Three <equations>").html
+    assert html.startswith('<details class="derivation"><summary>Three &lt;equations&gt;</summary>')
+    assert [a["href"] for a in Elements(html).all("a")] == [page.address(row.statement) for row in ROWS[:3]]
+
+
 def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
     root = next(iter(ledger.load_roots()), None)
     if root is None:

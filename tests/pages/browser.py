@@ -28,8 +28,10 @@ FLAGS = [
     "--disable-sync",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
 ]
-# Formulas are set and fonts are there.
-SETTLED = "async () => { await window.MathJax?.startup?.promise; await document.fonts.ready }"
+# Formulas are typeset, except those in closed details, and fonts are there.
+SETTLED = "async () => { await window.formulasTypeset; await document.fonts.ready }"
+HIGHEST = 20_000  # pixels, on a desktop
+HEAVIEST = 300_000  # bytes of HTML
 SIZES = {"desktop": {"width": 1280, "height": 900}, "phone": {"width": 390, "height": 844}}
 
 

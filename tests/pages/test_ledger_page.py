@@ -124,14 +124,22 @@ UNSET = (
 )
 
 
-def test_formulas_are_set_when_they_come_near_and_all_before_printing(page):
-    formulas = page.locator(".ledger span.notranslate")
-    page.locator('input[name="words"]').fill("eq125")
-    page.locator('[id="hung1984.II.eq125"]').scroll_into_view_if_needed()
-    page.locator('[id="hung1984.II.eq125"] mjx-container').first.wait_for()
-    page.locator(".ledger-form button").click()
-    page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-    assert formulas.evaluate_all(UNSET) == []
+def test_collapsed_formulas_are_typeset_when_opened_and_all_before_printing(open_page):
+    with open_page(LEDGER) as page:
+        evidence = page.locator("details:has(.math):not([open])").first
+        assert evidence.locator("mjx-container").count() == 0
+        evidence.locator("summary").click()
+        evidence.locator("mjx-container").first.wait_for()
+        page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        assert page.locator(".ledger .math").evaluate_all(UNSET) == []
+        assert page.faults == []
+
+
+def test_evidence_is_collapsed_only_where_nothing_depends_on_an_error(page):
+    collapsed = page.evaluate(
+        "[...document.querySelectorAll('.ledger tr[id]:has(details)')].map(r => r.dataset.verdict)"
+    )
+    assert set(collapsed) == {"verified", "given", "misprint"}
     assert page.faults == []
 
 

@@ -28,9 +28,9 @@ def test_loads_from_this_machine_alone(page):
     assert page.title().strip()
 
 
-def test_every_formula_is_rendered(page):
+def test_every_formula_that_is_shown_is_rendered(page):
     raw = page.locator(".math").evaluate_all(
-        "all => all.filter(e => !e.querySelector('mjx-container')).map(e => e.textContent)"
+        "all => all.filter(e => e.checkVisibility() && !e.querySelector('mjx-container')).map(e => e.textContent)"
     )
     assert raw == []
     assert page.locator("mjx-merror, [data-mjx-error]").all_text_contents() == []
@@ -40,7 +40,7 @@ def test_no_formula_or_table_is_left_as_typed(page):
     """An output that is not parsed as MyST shows its dollars and bars; code is meant to, and a script is not seen."""
     text = page.locator("main").evaluate(
         "e => { e = e.cloneNode(true);"
-        " e.querySelectorAll('pre, code, dt, script, mjx-container').forEach(x => x.remove()); return e.textContent }"
+        " e.querySelectorAll('pre, code, dt, script, .math').forEach(x => x.remove()); return e.textContent }"
     )
     assert [line for line in text.splitlines() if "$" in line or "| --" in line or "| —" in line] == []
 
@@ -124,6 +124,7 @@ def test_nothing_is_cut_on_paper(page):
         page.set_viewport_size({"width": 688, "height": 974})  # A4 without margins, at 96 dots an inch
         page.emulate_media(media="print")
         assert page.evaluate(CUT) == []
+        assert page.locator(".math:not(:has(mjx-container))").all_text_contents() == []
     finally:
         page.emulate_media(media="screen")
         page.set_viewport_size(tools.SIZES["desktop"])
@@ -283,6 +284,43 @@ def test_every_link_within_the_book_leads_somewhere():
             ):
                 dead.append(f"{address}: {link}")
     assert dead == []
+
+
+@pytest.mark.parametrize("address", PAGES)
+def test_no_page_is_too_heavy(address):
+    assert (tools.HTML / address).stat().st_size <= tools.HEAVIEST
+
+
+def test_no_page_is_too_high(page):
+    if page.viewport_size != tools.SIZES["desktop"]:
+        pytest.skip("a phone is narrow")
+    assert page.evaluate("document.documentElement.scrollHeight") <= tools.HIGHEST
+
+
+LONG_PAGES = ("book/kalman.html", "book/inversion.html", "book/ledger-1984-3.html")
+
+
+@pytest.mark.parametrize("address", LONG_PAGES)
+def test_a_page_can_be_read_before_all_its_formulas_are_typeset(open_page, address):
+    """Counts, which do not depend on the machine, and a limit of time far above what an idle one takes."""
+    with open_page(address) as page:
+        near, shown = page.evaluate("[window.formulas.near, window.formulas.shown]")
+        every = page.locator("article .math").count()
+        assert every > 200
+        assert near["count"] < shown["count"] / 4
+        assert shown["count"] <= every
+        assert near["time"] < shown["time"] < 60_000  # ms
+
+
+def test_formulas_far_away_are_typeset_at_once_when_scrolled_to(open_page):
+    with open_page("book/kalman.html") as page:
+        page.add_init_script("window.requestIdleCallback = () => {}")  # a browser that is never idle
+        page.reload(wait_until="load")
+        page.wait_for_function("window.formulas.near")
+        last = page.locator("article section .math:visible").last
+        assert last.locator("mjx-container").count() == 0
+        last.scroll_into_view_if_needed()
+        last.locator("mjx-container").wait_for()
 
 
 @pytest.mark.parametrize("address", PAGES)

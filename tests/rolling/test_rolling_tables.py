@@ -17,7 +17,7 @@ def test_registers():
     assert [cells[:2] for cells in body] == [
         (name, case)
         for name in ("6 decimal digits", "10 decimal digits, chopped", "24 bits")
-        for case in ("worst", "as rounded")
+        for case in ("worst", "actual rounding")
     ]
     for i, fmt in enumerate(formats):
         for j, error in enumerate(

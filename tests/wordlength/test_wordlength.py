@@ -428,7 +428,7 @@ def test_units_change_the_estimates_and_nothing_else():
 
 def test_answers():
     table = tables.answers({"report": [("a minute", FOUND), ("an hour", NONE)]})
-    assert table.header == ("bits by", "a minute", "an hour")
+    assert table.header == ("form", "a minute", "an hour")
     assert table.body == (("report", "17", "none"),)
     with pytest.raises(ValueError, match="got lines of 2 kinds"):
         tables.answers({"a": [("x", FOUND)], "b": [("y", FOUND)]})

@@ -201,15 +201,15 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     base, precision, rounding, limits, seed = rules
     random = rounding is Rounding.STOCHASTIC
     longest = 53 - DRAW_BITS if random else 52 if base == 2 else 13
+    # The one digit has no bit in float64 that would be even or odd.
+    hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
     digits = tags.Two() if base == 2 else tags.Sixteen()
     mode = _random(seed) if random else _MODES[rounding]()
     if limits is None:
-        nan, least, largest = math.nan, 2.0**-960, 2.0**1023
+        nan, least, largest = math.nan, 2.0**-960, 2.0**960
         return (
-            tags.Limited(
-                digits, mode, tags.Separate(), precision, 0.0, 2.0**-960, nan, -(2.0**1023), 2.0**1023, nan, nan
-            )
-            if precision <= longest and not (random and base == 16)
+            tags.Limited(digits, mode, tags.Separate(), precision, 0.0, least, nan, -largest, largest, nan, nan)
+            if precision <= longest and not (random and base == 16) and not hidden
             else None
         )
     emin, emax = limits.emin, _emax(rules)
@@ -221,6 +221,7 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     bits = base.bit_length() - 1
     if (
         precision > longest
+        or hidden
         or (precision == 1 and limits.subnormal)
         or (random and base == 16)
         or limits.overflow == "wrap"

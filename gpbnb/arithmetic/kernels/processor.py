@@ -24,6 +24,7 @@ from gpbnb.arithmetic.kernels.tags import Away, Down, Even, Odd, Random, Sixteen
 EXACT_PRODUCT = 26  # digits up to which a product has at most 53
 _ONE = np.int64(1)
 _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
+_EXPONENT, _ONE_BITS = np.int64(0x7FF << 52), np.int64(1023 << 52)
 _LARGEST_32 = float(np.finfo(np.float32).max)
 _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _DRAWN = np.uint64(64 - DRAW_BITS)
@@ -170,20 +171,22 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
 
 @inner(forceinline=True)
 def _round_even(fmt: Any, x: Any) -> Any:
-    """Round a float64 in as few vector instructions as there can be; the result is that of the general way."""
+    """Round a float64 in as few vector instructions as there can be; the result is that of the general way.
+
+    The float64 between C and 2C, with C = 2**(e + 53 - t), have the spacing of the t-digit numbers from 2**e to
+    2**(e + 1), and the machine's ties go to even. So C with the sign of x is added and taken away.
+    """
     u = bits(x)
-    m = u & _MAGNITUDE
-    unit = _ONE << (np.int64(53) - fmt.precision)
-    a = from_bits(m)
-    y = from_bits((m + ((unit >> 1) - 1) + np.int64((m & unit) != 0)) & -unit)
-    # The float64 between this number and its double have the spacing of the subnormal numbers, and ties go to even.
-    large = fmt.gradual * np.float64(unit)
-    y = (a + large) - large if a < fmt.gradual else y
-    y = y if (y >= fmt.least) | (a == 0.0) else fmt.below
-    y = from_bits(bits(y) | (u & _SIGN)) + 0.0  # no negative zero
+    shift = (np.int64(53) - fmt.precision) << 52
+    # Below the least normal number the spacing does not get smaller. If x is beyond every range, C may be anything.
+    large, least = from_bits((u & _EXPONENT) + shift), fmt.gradual * from_bits(_ONE_BITS + shift)
+    large = from_bits(bits(large if large > least else least) | (u & _SIGN))
+    y = (x + large) - large
+    if fmt.least > 0.0:
+        y = y if (abs(y) >= fmt.least) | (x == 0.0) else fmt.below
     y = fmt.over if y > fmt.largest else y
     y = fmt.under if y < fmt.lowest else y
-    return y if a < np.inf else np.nan
+    return y + (x - x)  # NaN for infinities
 
 
 @inner(forceinline=True)

@@ -71,6 +71,28 @@ def _scaled(x: float) -> Any:
     return np.int64(x), np.int64(e)
 
 
+@njit(nogil=True)
+def _times(a: Any, x: Any, c: Any) -> None:
+    """c = a x, for a matrix and a column in double-double."""
+    exactly = DoubleDouble()
+    for i in range(a.shape[0]):
+        s = (0.0, 0.0)
+        for j in range(a.shape[1]):
+            p = doubledouble.multiply(exactly, load(exactly, a, (i, j)), load(exactly, x, j))
+            s = doubledouble.add(exactly, s, p)
+        put(exactly, c, i, s)
+
+
+@njit(nogil=True)
+def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
+    """What the error of an estimate is worth."""
+    exactly, total = DoubleDouble(), 0.0
+    for i in range(x_exact.shape[0]):
+        e = doubledouble.subtract(exactly, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
+        total += row[i] * e[0]
+    return total
+
+
 @compiled
 def greedy(
     fmt: Any,
@@ -94,6 +116,9 @@ def greedy(
 ) -> Any:
     """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
 
+    Most products of a step depend on the estimate alone. So each candidate is judged by the error after one step more,
+    with a measurement from the middle of what is admissible there.
+
     Parameters
     ----------
     rows : (steps, n), what an error after each step is worth.
@@ -111,27 +136,23 @@ def greedy(
     exactly = DoubleDouble()
     n, m, steps = Phi.shape[1], HPhi.shape[1], rows.shape[0]
     count = Phi.shape[0]
-    trial, best = np.empty_like(x), np.empty_like(x)
+    trial, best, ahead = np.empty_like(x), np.empty_like(x), np.empty_like(x)
     values = np.empty((n + m + operations.shape[0], *x.shape[1:]), x.dtype)
-    z, taken = np.empty((m, *x.shape[1:]), x.dtype), np.empty((m, *x.shape[1:]), x.dtype)
+    z, taken, tried = (
+        np.empty((m, *x.shape[1:]), x.dtype),
+        np.empty((m, *x.shape[1:]), x.dtype),
+        np.empty((m, *x.shape[1:]), x.dtype),
+    )
     predicted, following, best_exact = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
+    beyond, moved = np.empty((n, 2)), np.empty((n, 2))
     seen, nu, pull = np.empty((m, 2)), np.empty((m, 2)), np.zeros(m)
     violations = 0
     for k in range(steps):
         at = k if k < count else first + (k - first) % (count - first)
-        for i in range(n):
-            s = (0.0, 0.0)
-            for j in range(n):
-                p = doubledouble.multiply(exactly, load(exactly, Phi[at], (i, j)), load(exactly, x_exact, j))
-                s = doubledouble.add(exactly, s, p)
-            put(exactly, predicted, i, s)
-        for r in range(m):
-            s = (0.0, 0.0)
-            for j in range(n):
-                p = doubledouble.multiply(exactly, load(exactly, HPhi[at], (r, j)), load(exactly, x_exact, j))
-                s = doubledouble.add(exactly, s, p)
-            put(exactly, seen, r, s)
-            if by_range:
+        _times(Phi[at], x_exact, predicted)
+        _times(HPhi[at], x_exact, seen)
+        if by_range:
+            for r in range(m):
                 pull[r] = steer[r, n] * min(1.0, k / ramp)
                 for j in range(n):
                     pull[r] += steer[r, j] * predicted[j, 0]
@@ -149,21 +170,34 @@ def greedy(
                 put(exactly, nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
                 excess = max(excess, abs(nu[r, 0]) / limits.innovation[r])
                 excess = max(excess, abs(c_exact[0]) / limits.measurement[r])
+            _times(K[at], nu, following)
             for i in range(n):
-                s = load(exactly, predicted, i)
-                for r in range(m):
-                    p = doubledouble.multiply(exactly, load(exactly, K[at], (i, r)), load(exactly, nu, r))
-                    s = doubledouble.add(exactly, s, p)
+                s = doubledouble.add(exactly, load(exactly, predicted, i), load(exactly, following, i))
                 put(exactly, following, i, s)
                 excess = max(excess, abs(s[0]) / limits.state[i])
             trial[:] = x
             execute(fmt, operations, outputs, coefficients[at], trial, z, values)
-            score = 0.0
-            for i in range(n):
-                e = doubledouble.subtract(exactly, widened(fmt, load(fmt, trial, i)), load(exactly, following, i))
-                score += rows[k, i] * e[0]
             if excess > 1.0:
                 score = -1e300 * excess
+            elif k + 1 == steps:
+                score = _worth(fmt, rows[k], trial, following)
+            else:
+                tried[:] = z
+                then = k + 1 if k + 1 < count else first + (k + 1 - first) % (count - first)
+                _times(Phi[then], following, beyond)
+                _times(HPhi[then], following, nu)
+                for r in range(m):
+                    c = number(fmt, nu[r, 0] if by_range else pool[k + 1, 0, r])
+                    put(fmt, z, r, c)
+                    put(exactly, nu, r, doubledouble.subtract(exactly, widened(fmt, c), load(exactly, nu, r)))
+                _times(K[then], nu, moved)
+                for i in range(n):
+                    s = doubledouble.add(exactly, load(exactly, beyond, i), load(exactly, moved, i))
+                    put(exactly, beyond, i, s)
+                ahead[:] = trial
+                execute(fmt, operations, outputs, coefficients[then], ahead, z, values)
+                score = _worth(fmt, rows[k + 1], ahead, beyond)
+                z[:] = tried
             if score > largest or found < 0:
                 largest, found = score, q
                 best[:] = trial
@@ -202,6 +236,8 @@ def attack(
     ramp: float | None = None,
 ) -> Attack:
     """Attack a guarantee with measurements chosen step by step, within its limits.
+
+    A gain that never repeats is replaced by one of those that the guarantee covers, the same in every cycle.
 
     Parameters
     ----------

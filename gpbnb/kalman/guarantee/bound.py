@@ -44,6 +44,9 @@ from gpbnb.kalman.model import LinearModel
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
 
+BUDGET = 3e8
+"""Multiplications that a guarantee spends on the steps before the gain settles, about; a few seconds."""
+
 
 @dataclass(frozen=True, eq=False)
 class Guarantee:
@@ -80,6 +83,8 @@ class Guarantee:
         numbers = ", ".join(f"{b:.3g}" for b in self.bound)
         if self.steps is None:
             at = f"; its gain repeats from step {self.schedule.repeat}" if self.schedule.repeat is not None else ""
+            if self.schedule.enclosed is not None:
+                at = f"; its gain is enclosed from step {self.schedule.enclosed}"
             return f"within {numbers} for ever ({self.schedule.fmt}{at})"
         return f"within {numbers} for {self.steps} steps only, for {self.why} ({self.schedule.fmt})"
 
@@ -113,6 +118,7 @@ def guarantee(
     form: Form = Form.INNOVATION,
     most: int = 20_000,
     horizon: int = 1_000,
+    budget: float = BUDGET,
 ) -> Guarantee:
     """Bound what rounding does to the estimates of a Kalman filter, for every admissible measurement sequence.
 
@@ -122,15 +128,18 @@ def guarantee(
     within : limits on the exact filter, from :func:`limits`.
     most : how many steps to emulate until the gain settles.
     horizon : for how many steps to give a bound where there is none for ever.
+    budget : about how many multiplications the disturbances of the steps before the gain settles may cost. With more of
+        them, the bound of a filter that takes long to settle is smaller.
 
     Raises
     ------
     ValueError : a format without compiled loops, or in which a covariance is not definite.
     """
-    return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon)
+    model.refuse_inputs("a guarantee")
+    return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
 
 
-def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000) -> Guarantee:
+def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget: float = BUDGET) -> Guarantee:
     """As :func:`guarantee`, of a filter whose coefficients are known; for linear filters of any origin."""
     n = given.program.n
     why, radius = given.why, _radius(given)
@@ -146,7 +155,7 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000) -> Guar
         caps = _caps(given, known, most) if for_ever and given.first == 0 else None
     for _ in range(40):
         found = _disturbances(given, known, b, caps)
-        history, parts, lags = _sums(given, found, b, most, for_ever, steps)
+        history, parts, lags = _sums(given, found, b, most, for_ever, steps, budget)
         new = history.max(axis=0)
         if (new <= b).all() or not np.isfinite(new).all():
             break
@@ -172,6 +181,7 @@ def _disturbances(
             program.groups,
             program.roots,
             given.coefficients,
+            given.offsets,
             units(given.fmt),
             given.Phi,
             given.HPhi,
@@ -217,10 +227,10 @@ def _enough_lags(radius: float, period: int) -> int:
     return -(-lags // period) * period
 
 
-def _window(given: Schedule, columns: int, steps: int) -> int:
+def _window(given: Schedule, columns: int, steps: int, budget: float) -> int:
     """For how many steps disturbances are kept apart: for all, if that is cheap."""
     n = given.program.n
-    return int(np.clip(3e8 / (max(steps, 1) * (columns + n) * n * n), 8, max(steps, 1)))
+    return int(np.clip(budget / (max(steps, 1) * (columns + n) * n * n), 8, max(steps, 1)))
 
 
 def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], float]:
@@ -233,7 +243,13 @@ def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], flo
 
 
 def _sums(
-    given: Schedule, found: Disturbances, b: NDArray[np.float64], most: int, for_ever: bool, steps: int
+    given: Schedule,
+    found: Disturbances,
+    b: NDArray[np.float64],
+    most: int,
+    for_ever: bool,
+    steps: int,
+    budget: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """Bounds after each step, and their parts; the last rows are those of the period."""
     n, part = given.program.n, _parts_of(given)
@@ -242,7 +258,7 @@ def _sums(
     arrays = (found.F, found.spread, *columns, found.slack, part[used])
     scale, small = _scale(found, _radius(given) if for_ever else math.nan)
     size = np.where(scale > 0, scale, 1.0)
-    window = _window(given, int(used.sum()), given.first if for_ever else steps)
+    window = _window(given, int(used.sum()), given.first if for_ever else steps, budget)
     if not for_ever:
         at = np.arange(steps)
         at = np.where(at < given.steps, at, given.first + (at - given.first) % max(given.steps - given.first, 1))

@@ -86,3 +86,30 @@ def ellipsoid() -> Derivation:
             ),
         )
     )
+
+
+def joseph() -> Derivation:
+    r"""What an error δ of the gain does to Joseph's form, for every n and m; primes mark transposes.
+
+    With :math:`C = I - KH` and :math:`S = HVH^T + R`, the first remainder is zero for the gain of V, and the second if
+    V is symmetric too.
+    """
+    h, ht, v, r, k, kt, d, dt = sp.symbols("H H' V R K K' \\delta \\delta'", commutative=False)
+    one = sp.S.One
+    c, ct = one - k * h, one - ht * kt
+    first, second = unevaluated(c * v * ht - k * r), unevaluated(h * v * ct - r * kt)
+    return Derivation(
+        (
+            Step(
+                "Joseph's form with a gain that is off by δ",
+                unevaluated(c - d * h) * v * unevaluated(ct - ht * dt) + unevaluated(k + d) * r * unevaluated(kt + dt),
+                together(
+                    unevaluated(c) * v * unevaluated(ct),
+                    k * r * kt,
+                    d * unevaluated(h * v * ht + r) * dt,
+                    -first * dt,
+                    -d * second,
+                ),
+            ),
+        )
+    )

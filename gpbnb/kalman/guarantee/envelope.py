@@ -131,6 +131,7 @@ def disturbances(
     groups: Any,
     roots: Any,
     coefficients: Any,
+    offsets: Any,
     units: Any,
     Phi: Any,
     HPhi: Any,
@@ -142,10 +143,15 @@ def disturbances(
 ) -> Any:
     r"""Disturbances of each step, :math:`e_k = \hat F e_{k-1} + q_k + \Delta F x_{k-1} + (\hat K - K)\nu_k`.
 
+    If the coefficients of a step are known only within limits, each value differs by at most its drift from what the
+    given coefficients would make of the same operands and rounding errors. The drift of the results is a further
+    disturbance.
+
     Parameters
     ----------
     operations, outputs, groups, roots : of a :class:`gpbnb.kalman.guarantee.program.Program`.
     coefficients : (steps, c, 2), double-double.
+    offsets : (steps, c), how far the coefficients of a step may be from these.
     units : of the format.
     Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), double-double.
     exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain, double-double, and a bound of its error.
@@ -162,6 +168,7 @@ def disturbances(
     rows, sizes = np.empty((first + o_count, first, 2)), np.empty((first + o_count, first))
     effect, effect_sizes = np.empty((first + o_count, n)), np.empty((first + o_count, n))
     off, none = np.empty(first + o_count), np.empty(first + o_count, np.bool_)
+    drift, largest = np.empty(first + o_count), np.empty(first + o_count)
     X, V, Z = limits.state, limits.innovation, limits.measurement
     result_of = np.full(first + o_count, -1)
     for i in range(n):
@@ -174,6 +181,15 @@ def disturbances(
         effects(operations, outputs, plain, first, effect, effect_sizes)
         off[:first] = 0.0
         none[:first] = False
+        drift[:first] = 0.0
+        for j in range(n):
+            largest[j] = (X[j] + b[j]) * _UP
+        for i in range(m):
+            largest[n + i] = V[i]
+            for j in range(n):
+                if HPhi[k, i, j, 0] != 0.0:
+                    largest[n + i] += abs(HPhi[k, i, j, 0]) * X[j]
+            largest[n + i] = min(Z[i], largest[n + i] * _UP)
         for o in range(o_count):
             v = first + o
             code, a, c = operations[o, 0], operations[o, 1], operations[o, 2]
@@ -199,17 +215,25 @@ def disturbances(
             if code == MULTIPLY:
                 factor = abs(plain[a])
                 before = factor * off[c]
-                none[v] = none[c] or factor == 0.0
-                is_exact = none[v] or _is_power(units, coefficients[k, a, 0], coefficients[k, a, 1])
+                drift[v] = factor * drift[c]
+                if offsets[k, a] != 0.0:
+                    drift[v] += offsets[k, a] * largest[c]
+                none[v] = none[c] or (factor == 0.0 and offsets[k, a] == 0.0)
+                is_exact = none[v] or (
+                    offsets[k, a] == 0.0 and _is_power(units, coefficients[k, a, 0], coefficients[k, a, 1])
+                )
             else:
                 before = off[a] + off[c]
+                drift[v] = drift[a] + drift[c]
                 none[v] = none[a] and none[c]
                 is_exact = none[a] or none[c]
-            size = (size + before) * _UP
+            drift[v] *= _UP
+            size = (size + before + drift[v]) * _UP
             if result_of[v] >= 0:
                 size = min(size, (X[result_of[v]] + b[result_of[v]]) * _UP)
             h = 0.0 if is_exact else _largest_error(units, size)
             off[v] = (before + h) * _UP
+            largest[v] = (size + h) * _UP
             lim[k, groups[o]] += h
         for g in range(g_count):
             v = first + roots[g]
@@ -220,6 +244,7 @@ def disturbances(
                 slack[k, i] += (6 * o_count + 2 * n + 16) * _U * effect_sizes[v, i] * h
         for i in range(n):
             v = outputs[i]
+            slack[k, i] += drift[v]
             for j in range(n):
                 F[k, i, j] = rows[v, j, 0]
                 spread[k, i, j] = (n + 4) * _U * abs(F[k, i, j]) + 2.0**-89 * sizes[v, j]

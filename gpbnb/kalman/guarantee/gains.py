@@ -24,6 +24,7 @@ from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee.enclosure import enclose
 from gpbnb.kalman.guarantee.program import Program, innovation_program, loop_program, sequential_program
 from gpbnb.kalman.model import LinearModel
 
@@ -46,6 +47,8 @@ class Schedule:
     first : where the period begins. settled : whether the rows after it repeat for ever.
     repeat, period : step at which the computed covariance was first what it would be again, `period` steps later.
     why : if not settled, why not.
+    enclosed : if the computed gain never repeats but stays within limits, the step from which it does.
+    limits : (steps, c), how far the coefficients of a step may be from these; None if they are known exactly.
     """
 
     program: Program
@@ -62,10 +65,17 @@ class Schedule:
     repeat: int | None
     period: int | None
     why: str = ""
+    enclosed: int | None = None
+    limits: NDArray[np.float64] | None = None
 
     @property
     def steps(self) -> int:
         return len(self.coefficients)
+
+    @property
+    def offsets(self) -> NDArray[np.float64]:
+        """How far the coefficients of each step may be from those given, (steps, c)."""
+        return np.zeros(self.coefficients.shape[:2]) if self.limits is None else self.limits
 
 
 @compiled
@@ -123,6 +133,9 @@ def schedule(
     end = max(bad - bool(run.stopped), 0) if bad else run.steps if repeat is None or period is None else repeat + period
     if end == 0:
         raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed: {why}")
+    enclosure = enclose(stored, run, fmt, form) if repeat is None and not bad else None
+    if enclosure is not None:
+        repeat, period, why = enclosure.start - stored.cycle, stored.cycle, ""
     if repeat is None or period is None or why:
         end = end if horizon is None else min(end, horizon)
         K, dK, settled, first = _exact_gains(stored, end, None, most, fmt)[:4]
@@ -141,7 +154,16 @@ def schedule(
     HPhi = double_doubles(products)[phases % cycle]
     x0 = model.rounded(fmt).x0
     coefficients = widened_array(packed)
-    return Schedule(program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why)
+    enclosed = wide = None
+    if enclosure is not None:
+        enclosed, repeat, period = enclosure.start, None, None
+        wide = np.zeros(coefficients.shape[:2])
+        late = phases[enclosed:]
+        count = model.n * model.m  # the gain has the last coefficients
+        wide[enclosed:, -count:] = enclosure.gain[(late - enclosed) % stored.cycle].reshape(len(late), count)
+    return Schedule(
+        program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why, enclosed, wide
+    )
 
 
 def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int64]:

@@ -4,15 +4,15 @@ Gravity Probe B's filter is one: its drift rates have a time constant of months.
 fill 10 GB, and this module keeps those of one cycle of the model at a time. Several limits share a pass: the two
 choices of state, drift or deviations from the predicted drift, have the same gains.
 
-``python -m gpbnb.kalman.guarantee.horizon`` computes ``horizon.csv``; if it is interrupted, what it has written holds
-for the steps done so far.
+``python -m gpbnb.kalman.guarantee.horizon`` computes ``horizon.csv`` and resumes where it was interrupted. The rows
+that it has written hold for the steps done so far.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import math
+import pickle
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
@@ -36,8 +37,20 @@ from gpbnb.kalman.kernels.step import NEXT_CHECKPOINT
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year_cases import MODELS
 from gpbnb.kalman.year_cases import model as year_model
+from gpbnb.sweeps import Column, machine, read, write
 
 FILE = Path(__file__).with_name("horizon.csv")
+COMMAND = "python -m gpbnb.kalman.guarantee.horizon"
+COLUMNS = (
+    Column("precision", "integer", 2, 53),
+    Column("steps", "integer", 1),
+    Column("states", "text", choices=("absolute", "deviation")),
+    *(Column(f"bound {i}", low=0) for i in range(10)),
+    *(Column(f"gain part {i}", low=0) for i in range(10)),
+)
+"""Columns of the stored table."""
+SAVE_EVERY = 50
+"""Blocks between two saved states of a long run."""
 
 
 @dataclass
@@ -72,6 +85,7 @@ def bounds_in_blocks(
     form: Form = Form.INNOVATION,
     block: int | None = None,
     window: int = 8,
+    saved: Path | None = None,
 ) -> Iterator[tuple[int, list[Bounds]]]:
     """Bound what rounding does to the estimates of the first steps, block by block.
 
@@ -82,6 +96,8 @@ def bounds_in_blocks(
     assumed : for each, (n,), an error that is not exceeded. It enters the size of the computed estimate; a bound above
         it ends the iteration with an ``ArithmeticError``.
     steps : how many. block : how many at a time; by default a cycle of the model.
+    saved : file for the state of the run, written now and then. If it exists, the run continues from there; the
+        arguments must be the same.
 
     Yields
     ------
@@ -107,6 +123,8 @@ def bounds_in_blocks(
     ]
     silence = ((run, fmt.array(np.zeros((block, m)))), (true, np.zeros((block, m))))
     done = 0
+    if saved is not None and saved.exists():
+        done, each = _restored(saved, run, true)
     while done < steps:
         count = min(block, steps - done)
         for filter_run, z in silence:
@@ -118,8 +136,10 @@ def bounds_in_blocks(
         rows = np.arange(count)
         at = (done + rows) % cycle
         program, packed = packed_coefficients(run, fmt, form, rows, done)
+        coefficients = widened_array(packed)
         arrays = (
-            widened_array(packed),
+            coefficients,
+            np.zeros(coefficients.shape[:2]),
             units(fmt),
             np.ascontiguousarray(Phi[at % len(Phi)]),
             np.ascontiguousarray(HPhi[at]),
@@ -145,7 +165,26 @@ def bounds_in_blocks(
             if not (one.worst <= one.assumed).all():
                 raise ArithmeticError(f"the bound {one.worst} exceeds the assumed {one.assumed} by step {done + count}")
         done += count
+        if saved is not None and (done // block) % SAVE_EVERY == 0:
+            _save(saved, done, run, true, each)
         yield done, [Bounds(one.worst, one.last, one.parts) for one in each]
+
+
+def _save(file: Path, done: int, run: Run, true: BoundedRun, each: list[_Carried]) -> None:
+    """Write what the next block needs; a file that exists is replaced as a whole."""
+    draft = file.with_suffix(".draft")
+    runs = [(given.x, given.P, given.notes) for given in (run, true)]
+    draft.write_bytes(pickle.dumps((done, runs, true.bound, each)))
+    draft.replace(file)
+
+
+def _restored(file: Path, run: Run, true: BoundedRun) -> tuple[int, list[_Carried]]:
+    """Put both runs into the state of a file that :func:`_save` wrote; return the rest of it."""
+    done, runs, true.bound, each = pickle.loads(file.read_bytes())
+    for given, state in zip((run, true), runs, strict=True):
+        for array, value in zip((given.x, given.P, given.notes), state, strict=True):
+            array[...] = value
+    return done, each
 
 
 def _follow(one: _Carried, found: Disturbances, part: NDArray[np.int64], done: int, count: int, window: int) -> None:
@@ -189,11 +228,9 @@ class Row(NamedTuple):
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
     """The stored rows."""
-    with file.open(encoding="utf-8", newline="") as stream:
-        lines = list(csv.reader(stream))[1:]
     return tuple(
         Row(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13])), tuple(map(float, line[13:])))
-        for line in lines
+        for line in read(file, COLUMNS, COMMAND).rows
     )
 
 
@@ -225,42 +262,37 @@ def bits(row: Row, tolerance: float = 1.0) -> int:
     return math.ceil(row.precision + math.log2(max(row.bounds[:4]) / tolerance))
 
 
-def gravity_probe_b_bounds(precision: int, steps: int = YEAR) -> Iterator[tuple[int, list[Bounds]]]:
+def gravity_probe_b_bounds(
+    precision: int, steps: int = YEAR, saved: Path | None = None
+) -> Iterator[tuple[int, list[Bounds]]]:
     """Bounds of a year of Gravity Probe B in a binary format, absolute states first, then deviations."""
     within = [limits(10, 2, state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
     assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
-    return bounds_in_blocks(year_model(MODELS[0], 2), FloatFormat(2, precision), within, assumed, steps)
+    fmt = FloatFormat(2, precision)
+    return bounds_in_blocks(year_model(MODELS[0], 2), fmt, within, assumed, steps, saved=saved)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Follow a year of Gravity Probe B in a format; two lines of the file for each 1 % of it."""
-    parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.kalman.guarantee.horizon",
-        description="Bounds for a year of Gravity Probe B.",
-    )
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Bounds for a year of Gravity Probe B.")
     parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the format")
+    parser.add_argument("--steps", type=int, default=YEAR, help="steps of 10 s")
     parser.add_argument("--output", type=Path, default=Path(".cache/horizon"), help=f"folder for {FILE.name}")
     given = parser.parse_args(arguments)
     given.output.mkdir(parents=True, exist_ok=True)
-    header = [
-        "precision",
-        "steps",
-        "states",
-        *(f"bound {i}" for i in range(10)),
-        *(f"gain part {i}" for i in range(10)),
-    ]
-    every = 0
-    with (given.output / FILE.name).open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(header)
-        for done, found in gravity_probe_b_bounds(given.precision):
-            if done < every and done != YEAR:
-                continue
-            every = done + YEAR // 100
-            for name, each in zip(("absolute", "deviation"), found, strict=True):
-                bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
-                writer.writerow([given.precision, done, name, *bounds, *parts])
-            stream.flush()
+    file, saved = given.output / FILE.name, given.output / f"state_{given.precision}.pickle"
+    rows = list(read(file, COLUMNS, COMMAND).rows) if saved.exists() and file.exists() else []
+    every = int(rows[-1][1]) + YEAR // 100 if rows else 0
+    with tqdm(total=given.steps, unit="step") as bar:
+        for done, found in gravity_probe_b_bounds(given.precision, given.steps, saved):
+            bar.update(done - bar.n)
+            if done == given.steps or done >= every:
+                every = done + YEAR // 100
+                rows = [row for row in rows if int(row[1]) < done]
+                for name, each in zip(("absolute", "deviation"), found, strict=True):
+                    bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
+                    rows.append((str(given.precision), str(done), name, *bounds, *parts))
+                write(file, COLUMNS, rows, {"command": COMMAND, **machine()})
     return 0
 
 

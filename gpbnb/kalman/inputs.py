@@ -1,0 +1,39 @@
+"""Known inputs and offsets: simulated measurements of a model that has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.simulation import Simulation, fine_resolution
+
+
+def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
+    """Measurements of a truth that begins at the first estimate and gets the known inputs; (steps, m).
+
+    They are rounded to :func:`gpbnb.kalman.simulation.fine_resolution`. The response to inputs and offsets is added to
+    measurements that are simulated without them.
+    """
+    model.check_steps(steps)
+    start, resolution = tuple(map(float, model.x0)), fine_resolution(model)
+    z = Simulation(model.without_inputs(), start, seed, resolution).measurements(steps)
+    if not model.has_inputs:
+        return z
+    given, response, unit = model.to_float(), np.zeros(model.n), np.asarray(resolution)
+    for k in range(steps):
+        Phi, H = given["Phi"][k % len(given["Phi"])], given["H"][k % len(given["H"])]
+        state, measurement = (part.astype(np.float64) for part in model.known(k))
+        response = _times(Phi, response) + state
+        z[k] += _times(H, response) + measurement
+    return np.asarray(np.rint(z / unit) * unit)
+
+
+def _times(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[Any]:
+    """Sums from left to right, the same on every machine."""
+    total = np.zeros(len(a))
+    for column, value in zip(a.T, x, strict=True):
+        total = total + column * value
+    return total

@@ -1,0 +1,146 @@
+"""The precision of a recursion of your own: a function written with arrays of a format."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.search import CHECKED, Search
+from gpbnb.kalman.missing import real_numbers
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance
+
+Recursion = Callable[..., Any]
+"""Called as ``run(fmt, z)``, or ``run(fmt)`` without z; gives the outputs of all steps as arrays of the format."""
+
+REFERENCE_DIGITS = {2: (237, 355), 10: (72, 108), 16: (60, 90)}
+"""Digits of the reference, and of a second run that shows that these are enough."""
+
+SETTLED = 2.0**-20
+"""The two runs of the reference differ by at most this share of the tolerance."""
+
+
+def required_recursion_precision(
+    run: Recursion,
+    steps: int,
+    tolerance: Any,
+    z: Any = None,
+    base: int = 2,
+    rounding: Rounding = Rounding.NEAREST,
+    basis: Basis = "emulation",
+    progress: bool = False,
+) -> Requirement:
+    """Find the smallest precision with which a recursion stays within a tolerance.
+
+    Parameters
+    ----------
+    run : gets a format, and `z` rounded into it; gives an output a step, as one array (steps,) or (steps, p), or as a
+        list of arrays. All of its operations must be of the format: constants are ``fmt.array("0.1")``.
+    tolerance : largest error of each output, in its unit; one number, or (p,).
+    z : inputs, a row a step.
+    basis : only "emulation": the errors are differences from the same function in :data:`REFERENCE_DIGITS`.
+
+    Raises
+    ------
+    ValueError : another basis; outputs for fewer or more steps; a reference that depends on its digits, as where a
+        comparison decides between results far apart.
+    TypeError : the function leaves the format.
+
+    Examples
+    --------
+    >>> def smoother(fmt, z):
+    ...     old, new, x, estimates = fmt.array("0.9"), fmt.array("0.1"), fmt.array(0), []
+    ...     for value in z:
+    ...         x = old * x + new * value
+    ...         estimates.append(x)
+    ...     return estimates
+    >>> print(required_recursion_precision(smoother, 4, 0.01, z=[1, 2, 3, 4]))
+    7 digits of base 2, nearest: 0.15 of the tolerance (emulation, 4 steps)
+    """
+    error = _question(run, steps, tolerance, z, base, basis)
+    with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
+        found = Search(error, base, rounding, CHECKED[base], bar.update)
+    return Requirement(found.fmt, basis, steps, found.tried, found.why, None, found.irregular)
+
+
+def survey_recursion(
+    run: Recursion,
+    z: Any,
+    tolerance: Any,
+    formats: Sequence[FloatFormat],
+    basis: Basis = "emulation",
+) -> tuple[tuple[int, float], ...]:
+    """Precision, and largest error over tolerance, in each of some formats of one base."""
+    error = _question(run, None, tolerance, z, formats[0].base, basis)
+    return tuple((fmt.precision, error(fmt)[0]) for fmt in formats)
+
+
+def _question(
+    run: Recursion, steps: int | None, tolerance: Any, z: Any, base: int, basis: Basis
+) -> Callable[[FloatFormat], tuple[float, str]]:
+    """A function that gives the error over the tolerance in a format, and why it is infinite."""
+    checked_tolerance(tolerance, max(np.size(tolerance), 1), "outputs", base, basis)
+    if basis != "emulation":
+        raise ValueError(f'got basis "{basis}" of a function; needed "emulation": bounds exist for models')
+    inputs = None if z is None else real_numbers(z)
+    if inputs is not None and steps is not None and (not inputs.ndim or len(inputs) != steps):
+        raise ValueError(f"got inputs of shape {inputs.shape}; needed one row for each of the {steps} steps")
+    short, long = (_outputs(run, FloatFormat(base, digits), inputs, steps) for digits in REFERENCE_DIGITS[base])
+    true = np.asarray(long.to_fractions(), dtype=object)
+    tolerances = checked_tolerance(tolerance, true.shape[1], "outputs", base, basis)
+    asked = np.isfinite(tolerances)
+    off = _largest(np.asarray(short.to_fractions(), dtype=object) - true)[asked] / tolerances[asked]
+    if not off.max() <= SETTLED:
+        raise ValueError(
+            f"got a function whose reference in {REFERENCE_DIGITS[base][0]} digits is {off.max():.2g} of the tolerance "
+            f"from that in {REFERENCE_DIGITS[base][1]}; needed one that settles: do comparisons decide between results "
+            "far apart?"
+        )
+
+    def error(fmt: FloatFormat) -> tuple[float, str]:
+        try:
+            found = np.asarray(_outputs(run, fmt, inputs, len(true)).to_fractions(), dtype=object)
+        except (ZeroDivisionError, OverflowError, NegativeRootError, np.linalg.LinAlgError) as fault:
+            return math.inf, f"the function stops: {fault}"
+        return float((_largest(found - true)[asked] / tolerances[asked]).max()), ""
+
+    return error
+
+
+def _largest(errors: NDArray[Any]) -> NDArray[np.float64]:
+    return np.array([_float(max(abs(each) for each in column)) for column in errors.T])
+
+
+def _float(value: Fraction) -> float:
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
+
+
+def _outputs(run: Recursion, fmt: FloatFormat, z: NDArray[Any] | None, steps: int | None) -> FloatArray:
+    """What the function gives, (steps, p)."""
+    found = run(fmt) if z is None else run(fmt, fmt.array(z))
+    if isinstance(found, (list, tuple)) and found and all(isinstance(each, FloatArray) for each in found):
+        found = np.stack(found)
+    if not isinstance(found, FloatArray) or found.format != fmt:
+        kind = f"a FloatArray in {found.format}" if isinstance(found, FloatArray) else f"a {type(found).__name__}"
+        raise TypeError(
+            f"got {kind} from the function; needed arrays of the format that it was given, {fmt}; round constants with "
+            "fmt.array(...), and do not convert to floats on the way"
+        )
+    if found.ndim == 1:
+        found = found.reshape(-1, 1)
+    if found.ndim != 2 or not found.size or steps not in (None, len(found)):
+        raise ValueError(
+            f"got outputs of shape {found.shape} from the function; needed ({steps or 'steps'},) or "
+            f"({steps or 'steps'}, p), one output or more for each step"
+        )
+    return found

@@ -1,0 +1,198 @@
+"""Run many measurement records in many formats, on any executor, with progress and resumption."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.array_forms import AnyForm
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.inputs import simulated_measurements
+from gpbnb.kalman.missing import real_numbers
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import form_named, whole_number
+from gpbnb.kalman.precision import survey
+from gpbnb.kalman.requirement import Basis, checked_tolerance
+from gpbnb.sweeps import Column, Sweep
+
+
+class RecordCell(NamedTuple):
+    """One record of a survey; a digest of everything that the result depends on identifies the survey."""
+
+    question: str
+    record: int
+
+
+class RecordSurvey(NamedTuple):
+    """Results for each record in each format.
+
+    Parameters
+    ----------
+    formats : the formats of the survey.
+    ratios : (records, formats), largest error or bound / tolerance; infinite if a run stopped, a variance was no
+        longer positive, or no bound exists.
+    """
+
+    formats: tuple[FloatFormat, ...]
+    ratios: NDArray[np.float64]
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """For each format, the share of records that stay within the tolerance."""
+        return tuple(float(share) for share in (self.ratios <= 1).mean(axis=0))
+
+    def enough(self) -> tuple[FloatFormat, ...]:
+        """For each base and rounding, the format of fewest digits with which all records stay within the tolerance.
+
+        A format counts only if the formats with more digits in the survey also meet the tolerance.
+        """
+        met = {fmt: bool((self.ratios[:, i] <= 1).all()) for i, fmt in enumerate(self.formats)}
+        found = []
+        for kind in dict.fromkeys((fmt.base, fmt.rounding) for fmt in self.formats):
+            least = None
+            falling = sorted((fmt for fmt in met if (fmt.base, fmt.rounding) == kind), key=lambda fmt: -fmt.precision)
+            for fmt in falling:
+                if not met[fmt]:
+                    break
+                least = fmt
+            found += [] if least is None else [least]
+        return tuple(found)
+
+
+def survey_records(
+    model: LinearModel,
+    records: Any,
+    tolerance: float | Sequence[float],
+    formats: Sequence[FloatFormat],
+    form: AnyForm | str = Form.INNOVATION,
+    basis: Basis = "emulation",
+    *,
+    steps: int | None = None,
+    executor: Executor | None = None,
+    directory: Path | str | None = None,
+    chunk: int = 1,
+    progress: bool = False,
+) -> RecordSurvey:
+    """Run a filter on many records in many formats; see :func:`gpbnb.kalman.precision.survey`.
+
+    Parameters
+    ----------
+    records : (records, steps, m), or a list of (steps, m) of any lengths, NaN where a measurement is missing. Or the
+        number of records to simulate, with the seeds 0, 1, …, of `steps` steps each.
+    tolerance, form, basis : as for :func:`gpbnb.kalman.precision.required_precision`; basis "emulation" or "bound".
+    formats : formats of any base and rounding, with compiled loops and an unlimited range.
+    executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
+    directory : folder for finished records. After an interruption, the same call resumes; other arguments start a new
+        survey. By default nothing is saved.
+    chunk : number of records sent to a worker at once.
+    progress : show a progress bar that counts records.
+
+    Raises
+    ------
+    ValueError : no records or formats; a format with a limited range; or for a reason given in ``survey``.
+
+    Examples
+    --------
+    >>> from gpbnb import FloatFormat, LinearModel
+    >>> walk = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+    >>> found = survey_records(walk, 3, 0.01, [FloatFormat(2, 4), FloatFormat(2, 24)], steps=20)
+    >>> found.shares
+    (0.0, 1.0)
+    """
+    if not isinstance(model, LinearModel):
+        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
+    form = form_named(form)
+    given = tuple(formats)
+    if not given or len(set(given)) != len(given):
+        raise ValueError(f"got {len(given)} formats, {len(set(given))} different; needed different ones, at least one")
+    for fmt in given:
+        if not isinstance(fmt, FloatFormat) or fmt != FloatFormat(fmt.base, fmt.precision, fmt.rounding):
+            raise ValueError(f"got {fmt!r}; needed a FloatFormat without limits on its range")
+    tolerances = checked_tolerance(tolerance, model.n, "states", given[0].base, basis)
+    if basis not in ("emulation", "bound"):
+        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"')
+    data = _data(model, records, steps)
+    digests = tuple(_digest(model, z, tolerances, given, form, basis) for z in data)
+    cells = tuple(RecordCell(digest, number) for number, digest in enumerate(digests))
+    sweep = Sweep(
+        name="records",
+        file=Path("records.csv"),
+        columns=(Column("record"), Column("ratios")),
+        key=1,
+        cells=lambda: cells,
+        compute=partial(_ratios, model, data, tolerances, given, form, basis),
+        rows=lambda cell, ratios: [(str(cell.record), " ".join(f"{ratio:.6g}" for ratio in ratios))],
+        command="gpbnb.wordlength.records.survey_records(...)",
+        seed=0,
+        version="1",
+    )
+    if directory is None:
+        with tempfile.TemporaryDirectory() as folder:
+            found = sweep.run(Path(folder), executor, chunk=chunk, progress=progress)
+    else:
+        found = sweep.run(Path(directory), executor, chunk=chunk, progress=progress)
+    return RecordSurvey(given, np.array([ratios for _, ratios in found], dtype=np.float64))
+
+
+def _data(model: LinearModel, records: Any, steps: int | None) -> tuple[Any, ...]:
+    """Return the measurements of each record."""
+    if isinstance(records, (int, np.integer)):
+        count = whole_number("records", records)
+        if steps is None:
+            raise ValueError(f"got {count} records to simulate without steps; needed steps=, how many each has")
+        length = whole_number("steps", steps)
+        return tuple(simulated_measurements(model, length, seed) for seed in range(count))
+    if steps is not None:
+        raise ValueError("got steps with records; needed steps only for records to simulate")
+    data = tuple(z if isinstance(z, np.ma.MaskedArray) else real_numbers(z) for z in records)
+    if not data:
+        raise ValueError("got no records; needed at least one")
+    for number, z in enumerate(data):
+        if z.ndim != 2 or z.shape[1] != model.m or not len(z):
+            raise ValueError(f"got record {number} of shape {z.shape}; needed (steps, {model.m})")
+    return data
+
+
+def _ratios(
+    model: LinearModel,
+    data: tuple[Any, ...],
+    tolerances: NDArray[np.float64],
+    formats: tuple[FloatFormat, ...],
+    form: AnyForm,
+    basis: Basis,
+    cell: RecordCell,
+    directory: Path | None,
+) -> list[float]:
+    """Return the error / tolerance of one record in each format."""
+    found: dict[FloatFormat, float] = {}
+    for base, rounding in dict.fromkeys((fmt.base, fmt.rounding) for fmt in formats):
+        alike = [fmt for fmt in formats if (fmt.base, fmt.rounding) == (base, rounding)]
+        precisions = [fmt.precision for fmt in alike]
+        tried = survey(model, data[cell.record], tolerances.tolist(), precisions, base, rounding, form, basis)
+        found |= {fmt: ratio for fmt, (_, ratio) in zip(alike, tried, strict=True)}
+    return [found[fmt] for fmt in formats]
+
+
+def _digest(
+    model: LinearModel,
+    z: Any,
+    tolerances: NDArray[np.float64],
+    formats: tuple[FloatFormat, ...],
+    form: AnyForm,
+    basis: Basis,
+) -> str:
+    """Return a name for everything that a result depends on."""
+    letters = ("Phi", "H", "Q", "R", "x0", "P0", "B", "u", "b", "d")
+    matrices = [None if each is None else each.tolist() for each in (getattr(model, letter) for letter in letters)]
+    measured = z.filled(np.nan) if isinstance(z, np.ma.MaskedArray) else z
+    parts = (matrices, np.asarray(measured).tolist(), tolerances.tolist(), formats, repr(form), basis)
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:20]

@@ -1,0 +1,314 @@
+"""Every label, colour and reference line in the figures of the Kalman filter belongs to the data it stands at."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from drawn import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    NAVY,
+    ORANGE,
+    PINK,
+    PURPLE,
+    SKY,
+    at,
+    labelled,
+    legend_of,
+    look,
+    named,
+    near,
+    pictured,
+)
+from matplotlib.colors import to_hex
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.kalman import figures, year, year_cases
+from gpbnb.kalman.answers import Answers
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee import figures as guarantee_figures
+from gpbnb.kalman.probability import Share
+
+NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
+STEPS = np.array([1, 10, 100])
+
+
+def run(precision, rounding, form, size, base=2):
+    """A year with errors of its own: the rate's are largest, 4 size, half-way; the drift's reach 3 size."""
+    case = year_cases.Case(year_cases.MODELS[0], base, precision, rounding, form)
+    drift = size * np.array([[1.0, -2.0], [-3.0, 1.0], [0.5, 0.25]])
+    rate = size * np.array([[0.0, 0.0], [1.0, -4.0], [2.0, 1.5]])
+    one = size * np.array([5.0, 6.0, 7.0])
+    return year.Year(case, STEPS, drift, rate, one, 2 * one, 3 * one, one, None, None, 0.0)
+
+
+def digits(precision, chopped=False):
+    """t for which 0.5 · 10^(1−t) is the unit roundoff of so many bits."""
+    return 1 - math.log10(2 * 2.0 ** ((1 if chopped else 0) - precision))
+
+
+@pytest.mark.parametrize(
+    ("quantity", "values", "words"),
+    [
+        ("drift", [2.0, 3.0, 0.5], "error of the drift angle (mas)"),
+        ("rate", [None, 4.0, 2.0], "error of the drift rate (mas/yr)"),
+        ("gain", [10.0, 12.0, 14.0], "error / gain, norms (no unit)"),
+        ("covariance", [15.0, 18.0, 21.0], "error / covariance, norms (no unit)"),
+    ],
+    ids=["drift", "rate", "gain", "covariance"],
+)
+@pictured
+def test_years(ax, quantity, values, words):
+    runs = [
+        run(24, NEAREST, Form.HUNG, 1.0),
+        run(30, CHOP, Form.HUNG_SECOND_GAIN, 10.0),
+        run(24, NEAREST, Form.INNOVATION, 100.0),
+        run(24, CHOP, Form.JOSEPH, 1000.0),
+        run(7, NEAREST, Form.UD, 1e4, base=10),
+    ]
+    *curves, tolerance = figures.years(runs, quantity, ax, tolerance=0.3)
+    for curve, size in zip(curves, (1.0, 10.0, 100.0, 1000.0, 1e4), strict=True):
+        assert at(curve, *((step, size * v) for step, v in zip((1, 10, 100), values, strict=True) if v))
+    assert [look(curve) for curve in curves] == [
+        (BLUE, "-", "o"),
+        (PURPLE, "-", "P"),
+        (PINK, "-", "^"),
+        (NAVY, "-", "s"),
+        (SKY, "-", "D"),
+    ]
+    assert [curve.get_label() for curve in curves] == [
+        "24 bits",
+        "30 bits, chopped, Hung (1984), second gain",
+        "24 bits, innovation",
+        "24 bits, chopped, Joseph",
+        "7 decimal digits, UD",
+    ]
+    assert (set(tolerance.get_ydata()), look(tolerance)[:2], tolerance.get_label()) == ({0.3}, (GREY, ":"), "tolerance")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("step $k$", words)
+    return ax.figure
+
+
+@pictured
+def test_lines_and_level(ax):
+    curves = [(name, [1, 2], [i + 3.0, i + 5.0]) for i, name in enumerate(("first", "second", "third", "last"))]
+    artists = figures.lines(curves, ax)
+    for i, line in enumerate(artists):
+        assert at(line, (1, i + 3), (2, i + 5))
+    assert {line.get_label(): look(line)[:2] for line in artists} == {
+        "first": (ORANGE, "-"),
+        "second": (ORANGE, "--"),
+        "third": (ORANGE, "-."),
+        "last": (GREEN, "-"),
+    }
+    level = figures.level("printed", 9.0, ax)
+    assert (look(level)[:2], level.get_label(), set(level.get_ydata())) == ((ORANGE, "-"), "printed", {9.0})
+    return ax.figure
+
+
+@pictured
+def test_bound_by_digits(ax):
+    (printed,) = figures.bound_by_digits(ax, {}, ls="--")
+    assert look(printed)[:2] == (ORANGE, "--")
+    places = np.array(printed.get_xdata())
+    assert (places[0], places[-1], len(places)) == (3.5, 23, 50)
+    beta = Fraction(0.5 * 10.0 ** (1 - places[7]))
+    steps = figures.report_bounds.EXAMPLE[0]
+    assert printed.get_ydata()[7] == figures.report_bounds.gravity_probe_b_bound(beta, steps)
+    # First order in β: a straight line down, a decade for a digit.
+    slope = np.diff(np.log10(np.array(printed.get_ydata(), dtype=float))) / np.diff(places)
+    assert slope == pytest.approx(-1, abs=1e-9)
+    heights = figures.bound_by_steps([10, 1000], FloatFormat(2, 24), {})
+    assert heights == [figures.report_bounds.gravity_probe_b_bound(Fraction(1, 2**24), k) for k in (10, 1000)]
+    return ax.figure
+
+
+ANSWERS = {
+    "tolerance": 0.7,
+    "printed": (9, 17),
+    "formula": (10, 16),
+    "corrected": (12, 13),
+    "observed": {NEAREST: 10.25, CHOP: 11.75},
+}
+
+
+def answers():
+    runs = [
+        run(24, NEAREST, Form.HUNG, 1.0),
+        run(32, NEAREST, Form.HUNG, 2.0),
+        run(24, CHOP, Form.HUNG, 8.0),
+        run(40, NEAREST, Form.UD, 16.0),
+        run(40, CHOP, Form.JOSEPH, 32.0),
+    ]
+    return Answers(runs=runs, **ANSWERS)
+
+
+@pictured
+def test_digits_needed(ax):
+    figures.digits_needed(answers(), ax)
+    lines = {line.get_label(): line for line in ax.lines}
+    assert list(lines) == legend_of(ax)
+    assert at(lines["Hung (1984), nearest"], (digits(24), 4), (digits(32), 8))
+    assert at(lines["UD, nearest"], (digits(40), 64))
+    assert at(lines["Hung (1984), chop"], (digits(24, True), 32))
+    assert at(lines["Joseph, chop"], (digits(40, True), 128))
+    size = 6.6e3  # mas, the geodetic drift of a year
+    assert float(figures.report_bounds.YEAR_SIZE) == pytest.approx(size, rel=0.01)
+    size = float(figures.report_bounds.YEAR_SIZE)
+    assert at(lines["printed answers"], (9, size), (17, size))
+    assert at(lines["formula"], (10, size), (16, size))
+    assert at(lines["all faults corrected"], (12, size), (13, size))
+    assert at(lines["observed"], (10.25, 0.7))
+    assert set(lines["tolerance"].get_ydata()) == {0.7}
+    expected = {
+        "Hung (1984), nearest": (BLUE, "", "o"),
+        "UD, nearest": (BLUE, "", "D"),
+        "Hung (1984), chop": (NAVY, "", "o"),
+        "Joseph, chop": (NAVY, "", "s"),
+        "(125), printed formula": (ORANGE, "-", ""),
+        "(125), all faults corrected": (ORANGE, "--", ""),
+        "tolerance": (GREY, ":", ""),
+        "printed answers": (ORANGE, "-", "o"),
+        "formula": (BLACK, "-", "s"),
+        "all faults corrected": (BLACK, "-", "^"),
+        "observed": (BLACK, "", "|"),
+    }
+    for name, line in lines.items():
+        paint, _, mark = expected[name]
+        drawn = line.get_markeredgecolor() if mark else line.get_color()
+        assert (to_hex(drawn).upper(), look(line)[2]) == (paint, mark)
+    printed, corrected = (lines[f"(125), {word}"] for word in ("printed formula", "all faults corrected"))
+    assert (look(printed)[1], look(corrected)[1]) == ("-", "--")
+    bound, x = figures.report_bounds.gravity_probe_b_bound, Fraction(0.5 * 10.0 ** (1 - 3.5))
+    assert printed.get_ydata()[0] == bound(x, figures.report_bounds.EXAMPLE[0])
+    every = {"once": True, "free_signs": True, "carried": True}
+    assert all(every.values())
+    assert corrected.get_ydata()[0] == bound(x, figures.report_bounds.EXAMPLE[0], **every)
+    assert printed.get_ydata()[0] != corrected.get_ydata()[0]
+    return ax.figure
+
+
+@pictured
+def test_headline(ax):
+    figures.headline(answers(), ax)
+    chopped, rounded, printed, corrected, goal, drift, marks = ax.lines
+    assert at(chopped, (digits(24, True), 32), (digits(40, True), 128))
+    assert at(rounded, (digits(24), 4), (digits(32), 8), (digits(40), 64))
+    assert labelled(ax) == {"emulated, chopped": (NAVY, "", "o"), "emulated, rounded": (BLUE, "", "o")}
+    assert (look(chopped), look(rounded)) == ((NAVY, "", "o"), (BLUE, "", "o"))
+    size = float(figures.report_bounds.YEAR_SIZE)
+    assert (set(goal.get_ydata()), set(drift.get_ydata())) == ({0.7}, {size})
+    assert [look(each)[:2] for each in (printed, corrected, goal, drift)] == [
+        (ORANGE, "-"),
+        (ORANGE, "--"),
+        (GREY, ":"),
+        (GREY, ":"),
+    ]
+    bound, beta = figures.report_bounds.gravity_probe_b_bound, Fraction(0.5 * 10.0 ** (1 - 3.5))
+    every = {"once": True, "free_signs": True, "carried": True}
+    assert printed.get_ydata()[0] == bound(beta, figures.report_bounds.EXAMPLE[0])
+    assert corrected.get_ydata()[0] == bound(beta, figures.report_bounds.EXAMPLE[0], **every)
+    assert at(marks, (9, size), (17, size))
+    assert (marks.get_markeredgecolor(), marks.get_markerfacecolor()) == (ORANGE, "none")
+    names = named(ax)
+    assert near(names.pop("(125) as printed"), ORANGE, (3.5, printed.get_ydata()[0]))
+    x = float(corrected.get_xdata()[12])
+    assert near(names.pop("(125) with its faults corrected"), ORANGE, (x, corrected.get_ydata()[12]))
+    assert near(names.pop("goal: one milliarcsecond"), GREY, (3.5, 0.7))
+    assert near(names.pop("as large as the drift of a year"), GREY, (16.9, size))
+    assert near(names.pop("9 printed"), ORANGE, (9, size))
+    assert near(names.pop("17 printed"), ORANGE, (17, size))
+    assert not names
+    assert ax.get_ylabel() == "largest error in a year (mas, mas/yr)"
+    return ax.figure
+
+
+@pictured
+def test_contraction(ax):
+    state = np.array([[9.0, -1.0], [9.0, 0.0], [9.0, 3.0]])
+    bound = np.array([[8.0, 2.0], [8.0, 4.0], [8.0, 6.0]])
+    found = SimpleNamespace(history=SimpleNamespace(steps=STEPS, state=state), state=bound)
+    points, line = figures.contraction(found, 1, ax, "rate (mas/yr)")
+    assert at(points, (1, 1), (100, 3))  # a logarithmic axis has no place for zero
+    assert at(line, (1, 2), (10, 4), (100, 6))
+    assert labelled(ax) == {"observed": (BLUE, "", "o"), "contraction bound": (GREEN, "-", "")}
+    assert (points.get_label(), line.get_label()) == ("observed", "contraction bound")
+    return ax.figure
+
+
+@pictured
+def test_violations(ax):
+    def summary(form, trials, *violated):
+        names = dict(zip(("violations_105", "violations_108", "violations_125"), violated, strict=True))
+        return SimpleNamespace(form=form, trials=trials, **names)
+
+    found = [summary("hung", 10, 10, 5, 0), summary("hung", 30, 10, 5, 1), summary("ud", 20, 5, 0, 2)]
+    bars = figures.violations(found, ax)
+    assert [(bar.get_x() + bar.get_width() / 2, bar.get_height()) for bar in bars] == [
+        (pytest.approx(x), pytest.approx(y))
+        for x, y in [(-0.27, 50), (0.73, 25), (0, 25), (1, 0), (0.27, 2.5), (1.27, 10)]
+    ]
+    assert [to_hex(bar.get_facecolor()).upper() for bar in bars] == [BLUE, BLUE, PURPLE, PURPLE, PINK, PINK]
+    shown = {
+        text.get_text(): to_hex(handle.patches[0].get_facecolor()).upper()
+        if hasattr(handle, "patches")
+        else to_hex(handle.get_facecolor()).upper()
+        for text, handle in zip(ax.get_legend().get_texts(), ax.get_legend().legend_handles, strict=True)
+    }
+    assert shown == {"(105)": BLUE, "(108)": PURPLE, "(125)": PINK}
+    return ax.figure
+
+
+@pictured
+def test_shares(ax):
+    def share(states, precision, errors):
+        return Share("", states, "", FloatFormat(2, precision), np.array(errors), 0, 0.0, 0.0, 0.0)
+
+    found = [
+        share("7 states", 24, [3.0, 1.0]),
+        share("9 states", 24, [8.0, 4.0, 6.0]),
+        share("7 states", 32, [0.5, 0.25]),
+    ]
+    *artists, tolerance = figures.shares(found, ax, tolerance=2.5)
+    first, second, median, third, other = artists
+    assert at(first, (24 + 0.15 - 0.3, 1), (24 + 0.45 - 0.3, 3))
+    assert at(second, (32 + 0.15 - 0.3, 0.25), (32 + 0.45 - 0.3, 0.5))
+    assert at(median, (24, 2), (32, 0.375))
+    assert at(third, (23.8, 4), (24, 6), (24.2, 8))
+    assert at(other, (24, 6))
+    assert labelled(ax) == {
+        "7 states, median": (BLUE, "", "_"),
+        "9 states, median": (PURPLE, "", "_"),
+        "tolerance": (GREY, ":", ""),
+    }
+    assert [look(each)[0] for each in artists] == [BLUE, BLUE, BLUE, PURPLE, PURPLE]
+    assert set(tolerance.get_ydata()) == {2.5}
+    assert ax.get_xlabel() == "bits"
+    ax.clear()
+    figures.shares([found[0]._replace(fmt=FloatFormat(10, 8))], ax)
+    assert ax.get_xlabel() == "decimal digits"
+    return ax.figure
+
+
+@pictured
+def test_guarantee(ax):
+    found = SimpleNamespace(history=np.array([[9.0, 1.0], [9.0, 2.0]]), bound=np.array([9.0, 3.0]))
+    chosen, random = np.array([[5.0, -0.5], [5.0, 1.5], [5.0, 2.5]]), np.array([[4.0, 0.1], [4.0, -0.2], [4.0, 0.3]])
+    guarantee_figures.draw_errors(ax, found, chosen, random, 1, "speed, m/s")
+    bound, adversary, noise = ax.lines
+    assert at(bound, (1, 1), (2, 2), (3, 3))  # the limit, once the history ends
+    assert at(adversary, (1, 0.5), (2, 1.5), (3, 2.5))
+    assert at(noise, (1, 0.1), (2, 0.2), (3, 0.3))
+    assert labelled(ax) == {
+        "bound for every measurement sequence": (GREEN, "-", ""),
+        "measurements chosen by the adversary": (BLUE, "-", ""),
+        "random measurements": (GREY, "-", ""),
+    }
+    assert [look(each)[0] for each in (bound, adversary, noise)] == [GREEN, BLUE, GREY]
+    assert ax.get_ylabel() == "rounding error of the speed, m/s"
+    return ax.figure
