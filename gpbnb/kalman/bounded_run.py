@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,20 +12,14 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble
-from gpbnb.kalman.contraction import (
-    contraction_start,
-    contraction_step,
-    covariance_error_bound,
-    evaluation_errors,
-    gain_error_bound,
-    state_error_bound,
-)
+from gpbnb.arithmetic.kernels.tags import Decimal
+from gpbnb.kalman.bounded_steps import advance_bound
+from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import residuals, symmetric_parts, whole_gain, widen
-from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED, advance
+from gpbnb.kalman.kernels.bounded import widen
+from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED
 from gpbnb.kalman.model import LinearModel
 
 _BLOCK = 256  # steps whose results are kept for the bound
@@ -127,75 +120,12 @@ class BoundedRun(Run):
             self.reason = self.stopped_by(failure) if failure else pivot
         if not done:
             return
-        computed = x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR
-        wide_x, wide_P, wide_K, UR = (_widened(each) for each in computed)
-        covariances = np.empty_like(wide_P)
-        symmetric_parts(int(self.form), wide_P, covariances)
-        exact = self._repeated(exact_z[:done], first, wide_x, covariances)
-        self._bound_steps(first, at, exact_z, wide_x, covariances, wide_K, UR, exact)
-        if len(exact[0]) < done:  # beyond double-double: no bound from here on
+        x, P, K, UR = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        steps = self.bound, self.checkpoint_steps, at, self.bounds
+        try:
+            self.bound = advance_bound(self.form, self._exact, self._plain, exact_z[:done], first, x, P, K, UR, *steps)
+        except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
             self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
-
-    def _bound_steps(
-        self,
-        first: int,
-        at: int,
-        exact_z: NDArray[np.float64],
-        x: NDArray[np.float64],
-        P: NDArray[np.float64],
-        gains: NDArray[np.float64],
-        UR: NDArray[np.float64],
-        exact: tuple[NDArray[np.float64], ...],
-    ) -> None:
-        """Take the bound over steps, and save it at checkpoint steps.
-
-        Parameters
-        ----------
-        first, at : how many steps were taken before these, and which checkpoint step is next.
-        x, P : states and symmetric covariances, before and after each step.
-        gains, UR : of each step, and the factors of R, as the run computed them.
-        exact : what :meth:`_repeated` returned.
-        """
-        xe, Ke, Pe, Se = exact
-        steps, n, m = len(xe), self.model.n, self.model.m
-        y, q, T = np.empty((steps, m)), np.empty((steps, n)), np.empty((steps, n, n))
-        residuals(self._exact, exact_z[:steps], first, x[: steps + 1], P[: steps + 1], (xe, Pe), (y, q, T))
-        before, z, K, S, size = (
-            np.ascontiguousarray(each) for each in (x[..., 0, 0], exact_z[..., 0, 0], Ke[..., 0], Se[..., 0], P[..., 0])
-        )
-        if self.form is Form.UD:
-            diagonal = np.diagonal(size, axis1=1, axis2=2)
-            size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
-        bounds_x, bounds_K, bounds_P = self.bounds
-        for i, k in enumerate(range(first, first + steps)):
-            phi, h, Q, R = (each[k % len(each)] for each in self._plain)
-            dq, dT, dK, dy = evaluation_errors(phi, h, Q, R, before[i], size[i], z[i], K[i], S[i], 2.0**-100)
-            self.bound = contraction_step(self.bound, phi, h, Q, R, K[i], S[i], y[i], q[i], T[i], dq, dT, dK, dy)
-            if at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == k + 1:
-                used = np.empty_like(gains[i])
-                whole_gain(int(self.form), gains[i], self._exact[2][k % len(self._exact[2])], UR[k % len(UR)], used)
-                bounds_x[at], bounds_P[at] = state_error_bound(self.bound), covariance_error_bound(self.bound)
-                bounds_K[at] = gain_error_bound(self.bound, K[i], np.ascontiguousarray(used[..., 0]), dK)
-                at += 1
-
-    def _repeated(
-        self, z: NDArray[np.float64], first: int, x: NDArray[np.float64], P: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], ...]:
-        """Repeat each step in double-double from where the run stood, as far as that goes.
-
-        Returns
-        -------
-        repeated : estimates, gains, covariances and innovation covariances after each step.
-        """
-        steps, n, m = len(z), self.model.n, self.model.m
-        after = np.empty((steps, n, 1, 2)), np.empty((steps, n, m, 2)), np.empty((steps, n, n, 2))
-        S, notes, every = np.empty((steps, m, m, 2)), np.zeros(4, dtype=np.int64), np.arange(1, steps + 1) + first
-        tag, form = DoubleDouble(), int(Form.INNOVATION)
-        with contextlib.suppress(OverflowError, ZeroDivisionError):
-            repeated, kept = (x[:-1], P[:-1], S), (every, *after)
-            advance(tag, form, self._exact, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes)
-        done = int(notes[NEXT_CHECKPOINT])
-        return tuple(each[:done] for each in (*after, S))
 
 
 def _widened(packed: NDArray[Any]) -> NDArray[np.float64]:

@@ -71,7 +71,7 @@ def _scaled(x: float) -> Any:
     return np.int64(x), np.int64(e)
 
 
-@njit(nogil=True)
+@inner
 def _times(a: Any, x: Any, c: Any) -> None:
     """c = a x, for a matrix and a column in double-double."""
     exactly = DoubleDouble()
@@ -83,7 +83,7 @@ def _times(a: Any, x: Any, c: Any) -> None:
         put(exactly, c, i, s)
 
 
-@njit(nogil=True)
+@inner
 def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
     """What the error of an estimate is worth."""
     exactly, total = DoubleDouble(), 0.0
