@@ -155,9 +155,9 @@ def kalman_bound() -> Definitions:
 
 @cache
 def across() -> sp.Expr:
-    """Return the cross drift that a least-squares fit finds for a drift of 1, as a function of the final phase error.
+    r"""Return the cross drift that a least-squares fit finds for a drift of 1, as a function of the final phase error.
 
-    This is the step of the chapter, with :math:`\\sin\\Delta t` in place of its first order :math:`\\Delta t`.
+    This is the step of the chapter, with :math:`\sin\Delta t` in place of its first order :math:`\Delta t`.
     """
     fit = step(rolling.fits(), "off-tuned").left
     (k,) = (each for each in fit.function.free_symbols if each.name == "k")

@@ -27,7 +27,7 @@ _BLOCK = 256  # steps whose results are kept for the bound
 
 @dataclass(frozen=True, eq=False)
 class BoundedHistory:
-    """A history, and the contraction bound of each entry of its errors, infinite where there is none.
+    """A history, and the contraction bound for each entry of its errors, infinite if there is none.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class BoundedHistory:
 class BoundedRun(Run):
     """A run together with its contraction bound, :mod:`gpbnb.kalman.contraction`; see ``Run``.
 
-    Of the reference itself, in double-double, the bound says how far it may be from what is exact.
+    For the reference itself, in double-double, the bound limits the distance from the exact filter.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class BoundedRun(Run):
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
         zero_n, size = np.zeros(n), np.zeros((n, n))
-        if self.form is Form.UD:  # the first factors may be off
+        if self.form is Form.UD:  # the first factors may have errors
             size = np.abs((self._covariance() - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
         self.bound = contraction_start(given["P0"], zero_n, size)
 
@@ -99,7 +99,7 @@ class BoundedRun(Run):
                 return
 
     def _take_block(self, z: NDArray[Any], exact_z: NDArray[Any]) -> None:
-        """Take some steps, keep all that they give, and take the bound over them."""
+        """Take some steps, keep all their results, and extend the bound over them."""
         first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
         x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
         x[0], P[0] = self.x, self.P
@@ -129,7 +129,7 @@ class BoundedRun(Run):
 
 
 def _widened(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """What the compiled loops of any format gave, (k, n, m) or (k, n, m, 2), as double-double."""
+    """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double."""
     if packed.ndim == 3:
         return np.stack([packed, np.zeros_like(packed)], axis=-1)
     if packed.dtype == np.float64:
@@ -146,7 +146,7 @@ def emulate_with_bound(
     form: Form = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
 ) -> BoundedHistory:
-    """Run the filter rounded, in double-double, and with its contraction bound; arguments as of ``emulate``."""
+    """Run the filter rounded, in double-double, and with its contraction bound; for the arguments, see ``emulate``."""
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     run = BoundedRun(model, fmt, form, chosen)

@@ -1,4 +1,4 @@
-"""A filter run that can stop and go on: every operation rounded, or in double-double as the reference."""
+"""A resumable filter run with every operation rounded, or in double-double as the reference."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.forms import Form
@@ -38,17 +39,20 @@ class Run:
     Parameters
     ----------
     model : n states, m measurements.
-    fmt : the format in which all of it is stored and computed; None for double-double.
-    form : how a step is computed.
-    checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in rising order.
+    fmt : the format in which everything is stored and computed; None for double-double.
+    form : form in which a step is computed.
+    checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in ascending order.
     fused : whether products are added by fused multiply-add; base 2 or 16.
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
-    compensated : whether the estimate is updated by Kahan's compensated summation, which carries what a step rounds
-        away over to the next; only for the innovation form and Joseph's.
+    compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
+        a step over to the next; only for the innovation form and Joseph's.
+    order, block : of the additions in matrix products, as of :func:`gpbnb.linalg.matmul`; any but "left" in bases 2 and
+        16, and not in the UD form, which has few matrix products.
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation in another form.
+    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation or another order of
+        additions in a form that does not have it.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -61,6 +65,8 @@ class Run:
         fused: bool = False,
         sums: FloatFormat | FixedFormat | None = None,
         compensated: bool = False,
+        order: Order = "left",
+        block: int = 32,
     ) -> None:
         model.refuse_inputs("a run in compiled loops")
         self.model, self.fmt, self.form = model, fmt, Form(form)
@@ -75,8 +81,10 @@ class Run:
             )
         if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
-        #: In which arithmetic the compiled loops work.
-        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums)
+        if order != "left" and form == Form.UD:
+            raise ValueError(f"got {order} sums in the UD form; needed another form")
+        #: The arithmetic of the compiled loops.
+        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
         Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
@@ -100,7 +108,7 @@ class Run:
         self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
         rest = (identity, increment, np.zeros_like(self.x), self._place)
         self.matrices = (Phi, PhiT, H, HT, Q, R, RI, *rest)
-        #: Why the run stopped, if it has.
+        #: Why the run stopped, if it did.
         self.reason = ""
 
     def _prepare(self, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
@@ -115,7 +123,7 @@ class Run:
 
     @property
     def steps(self) -> int:
-        """How many steps are done."""
+        """Number of steps done."""
         return int(self.notes[DONE])
 
     @property
@@ -125,11 +133,11 @@ class Run:
 
     @property
     def stopped(self) -> int | None:
-        """The step that a division by zero, or a number beyond the range of the backend, ended."""
+        """The step at which a division by zero, or a number beyond the range of the backend, ended the run."""
         return int(self.notes[STOPPED]) or None
 
     def take(self, z: Any) -> None:
-        """Go on by as many steps as there are measurements, (steps, m); a run that has stopped stays where it is."""
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
         if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped:
@@ -172,7 +180,7 @@ class Run:
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
     def as_packed(self, values: Any) -> NDArray[Any]:
-        """Numbers, each rounded into the format, as the compiled loops take them."""
+        """Round numbers into the format, and return them as the compiled loops expect them."""
         if self.fmt is None:
             entries = np.asarray(values)
             if entries.dtype == np.float64:
@@ -188,7 +196,7 @@ class Run:
         return array.backend.pack(array.components)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
-        """Exact Fractions of what the compiled loops gave."""
+        """Convert results of the compiled loops to exact Fractions."""
         if self.fmt is None:
             high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
             return np.asarray(np.frompyfunc(lambda h, s: Fraction(h) + Fraction(s), 2, 1)(high, low), dtype=object)
@@ -198,7 +206,7 @@ class Run:
         )
 
     def checkpoints(self) -> Checkpoints:
-        """Estimate, gain and covariance at the checkpoint steps that were reached."""
+        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
         count = int(self.notes[NEXT_CHECKPOINT])
         x, K, P = (self.exactly(each[:count]) for each in (self.X, self.G, self.C))
         if self.form is Form.UD:
@@ -206,7 +214,7 @@ class Run:
         return Checkpoints(tuple(int(step) for step in self.checkpoint_steps[:count]), x[..., 0], K, P)
 
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Gains and covariances that the factors, and the gains of one measurement after the other, stand for."""
+        """Return gains and covariances from factors and from the gains of one measurement after the other."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
         H, UR, n = self.exactly(self.matrices[2]), self.exactly(self.UR), self.model.n
         unit = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
@@ -246,11 +254,11 @@ class Checkpoints:
 
 
 def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
-    """Steps from 1 to the last, at equal ratios.
+    """Return steps from 1 to the last, at equal ratios.
 
     Raises
     ------
-    ValueError : no steps, or none a decade.
+    ValueError : no steps, or none per decade.
     """
     if steps < 1 or per_decade < 1:
         raise ValueError(f"got {steps} steps, {per_decade} a decade; needed both at least 1")
@@ -269,7 +277,7 @@ def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form:
 
     Raises
     ------
-    ArithmeticError : a division by zero or a number beyond 2**1000, even so: the model is degenerate.
+    ArithmeticError : a division by zero or a number beyond 2**1000; the model is degenerate.
     """
     run = Run(model.without_inputs(), None, form, checkpoint_steps)
     if model.has_inputs:

@@ -1,7 +1,7 @@
 """One filter for many measurement records at once.
 
 Covariance and gain do not depend on the measurements. They are computed once per step, and the estimates of all
-records are the columns of one matrix. Each record gets the same digits as in a run of its own.
+records are the columns of one matrix. Each record gets the same digits as in a separate run.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ class Records(Run):
 
     Parameters
     ----------
-    model, fmt, form : as of :class:`~gpbnb.kalman.filter_run.Run`; not the UD form, which computes gain and estimate
+    model, fmt, form : as for :class:`~gpbnb.kalman.filter_run.Run`; not the UD form, which computes gain and estimate
         together.
-    records : how many.
+    records : number of records.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class Records(Run):
 
         Parameters
         ----------
-        decimals : if given, entries are rounded to so many decimals first; that is exact in base 10, and fast.
+        decimals : if given, entries are first rounded to this number of decimals, which is exact in base 10 and fast.
         """
         if np.shape(H)[1:] != (self.model.m, self.model.n):
             raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
@@ -69,7 +69,7 @@ class Records(Run):
         Parameters
         ----------
         z : (steps, m, records).
-        states : how many of the first states to return.
+        states : number of first states to return.
 
         Returns
         -------

@@ -14,7 +14,7 @@ from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.render import FORMATS, describe
 from gpbnb.ledger.statements import Statement, load_statements, select
 
-COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # 2 is argparse's, for misuse
+COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # argparse uses 2 for wrong arguments
 _EPILOG = (
     "exit status: 0, every entry of the selection has its finding; 1, some lack their check; 2, bad arguments, or the "
     "ledger or the output file cannot be used; 3, a check raised an exception (the other rows are written all the same)"
@@ -58,7 +58,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.buffer.flush()
         _report(rows)
     except BrokenPipeError:
-        # The reader of the pipe has what it wanted; what the interpreter flushes at exit goes nowhere.
+        # The reader of the pipe has closed it, so discard what the interpreter flushes at exit.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
     except OSError as error:

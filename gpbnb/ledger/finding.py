@@ -13,14 +13,14 @@ from enum import Enum
 class Verdict(Enum):
     """The judgement of a printed statement.
 
-    VERIFIED : correct as printed; to first order in the unit roundoff where the document says so.
+    VERIFIED : correct as printed, to first order in the unit roundoff if the document says so.
     MISPRINT : a slip on which nothing later depends.
     WRONG : an error on which a later result or a conclusion depends.
     INCONSISTENT : contradicts another place in the documents.
     NOT_REPRODUCED : a number that no reading of the documents reproduces, and no derivation shows to be wrong.
     OCR : the scan is wrong, not the author.
-    UNVERIFIABLE : the data or the picture it rests on is not in the documents; the note says what is missing.
-    GIVEN : a definition, given data or a heading: there is nothing to check.
+    UNVERIFIABLE : the underlying data or picture is not in the documents; the note names what is missing.
+    GIVEN : a definition, given data or a heading, which cannot be checked.
     OPEN : left undone in the documents and here.
     ANSWERED : left undone in the documents and done here; the note says where.
     """
@@ -64,11 +64,11 @@ class Finding:
 
     Parameters
     ----------
-    recomputed : what the project gets; prose with math between single dollar signs.
-    agrees : whether print and recomputation agree; None where there is nothing to compare.
+    recomputed : the project's result; prose with math between single dollar signs.
+    agrees : whether print and recomputation agree; None if there is nothing to compare.
     verdict : the judgement of the statement; it must fit `agrees`.
-    note : why, or where; same markup. Needed for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
-    root : id of the root error in ``roots.csv`` that makes the statement disagree; empty where it agrees.
+    note : reason or place, in the same markup. Required for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
+    root : id of the root error in ``roots.csv`` that makes the statement disagree; empty if it agrees.
 
     Raises
     ------
@@ -124,14 +124,14 @@ def compare(
     ----------
     agrees : outcome of the comparison.
     recomputed : what was computed.
-    otherwise : the verdict where `agrees` is False, one of `DISAGREEMENTS`.
-    note : goes with either outcome.
-    otherwise_note : replaces `note` where `agrees` is False.
-    root : id of the root error, used where `agrees` is False.
+    otherwise : the verdict if `agrees` is False, one of `DISAGREEMENTS`.
+    note : note for either outcome.
+    otherwise_note : replaces `note` if `agrees` is False.
+    root : id of the root error, used if `agrees` is False.
 
     Returns
     -------
-    finding : verified where `agrees`, else `otherwise`.
+    finding : verified if `agrees`, otherwise `otherwise`.
 
     Raises
     ------
@@ -148,17 +148,17 @@ def compare(
 
 
 def answer(holds: bool, recomputed: str, note: str) -> Finding:
-    """Judge what the documents left undone by the check of the answer given here.
+    """Judge an item that the documents leave undone, by checking the answer given here.
 
     Parameters
     ----------
     holds : whether the answer passes its own check.
     recomputed : the answer.
-    note : where it stands.
+    note : where the answer is.
 
     Returns
     -------
-    finding : answered where `holds`, else open.
+    finding : answered if `holds`, otherwise open.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def answer(holds: bool, recomputed: str, note: str) -> Finding:
 
 
 def unverifiable(recomputed: str, note: str) -> Finding:
-    """Record that a statement rests on data that is not in the documents.
+    """Record that a statement depends on data that is not in the documents.
 
     Parameters
     ----------

@@ -4,14 +4,14 @@ A form is one or more parts, separated by semicolons. Each part is one of:
 
 - a relation: a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``;
 - a number: ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional;
-- words: ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others
-  are what it could have said instead.
+- words: ``label: printed phrase | another phrase | ...``; the first phrase is printed in the document, and the others
+  are alternatives that it could have used.
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
 printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that
-a printed series leaves out; a check gives it a value, such as ``sp.O(mu**4)``.
+a printed series omits; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
@@ -55,12 +55,12 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 class Undefined(ValueError):
-    """A printed expression has no value: an index without a quantity, or an operation on quantities that do not fit."""
+    """A printed expression has no value, because an index has no quantity or operands do not fit."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """One comparison of a chain: ``left symbol right``, both sides evaluated."""
+    """One comparison of a chain, ``left symbol right``, with both sides evaluated."""
 
     left: Any
     symbol: str
@@ -126,15 +126,15 @@ class Relation:
 
         Parameters
         ----------
-        names : values of names, as in ``{"n": 3}``; functions for calls and for indices:
-            ``{"a": lambda i, j: ...}`` gives ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
+        names : values of names, as in ``{"n": 3}``. Functions give the values of calls and of indexed names:
+            ``{"a": lambda i, j: ...}`` defines ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
             ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy
             symbol, an indexed name the symbol ``a[i,j]``, and a call a SymPy function.
-        number : turns the exact value of a printed number into the arithmetic wanted; SymPy rationals by default.
+        number : function that converts the exact value of a printed number to another type; by default SymPy rationals.
 
         Returns
         -------
-        links : one a comparison; a part without a comparison has none.
+        links : one for each comparison; a part without a comparison has none.
 
         Raises
         ------
@@ -154,14 +154,16 @@ class Relation:
         return _Evaluation(names or {}, number)(tree.comparators[-1] if isinstance(tree, ast.Compare) else tree)
 
     def latex(self) -> str:
+        """Typeset the relation."""
         return typeset(self.tree, 0)
 
     def markdown(self) -> str:
+        """Typeset the relation as a formula in Markdown."""
         return f"${self.latex()}$"
 
 
 def _terms(node: ast.expr) -> list[tuple[bool, ast.expr]]:
-    """The terms of a sum, each with whether it is subtracted."""
+    """Return the terms of a sum, each with a flag that tells whether it is subtracted."""
     match node:
         case ast.BinOp(left=left, op=ast.Add(), right=right):
             return [*_terms(left), *_terms(right)]
@@ -185,19 +187,22 @@ class Number:
 
     @property
     def text(self) -> str:
+        """The number as the file of statements has it."""
         return f"{self.label}: {self.literal} {self.unit}".strip()
 
     def latex(self) -> str:
+        """Typeset the digits and the unit."""
         unit = rf"\ \text{{{self.unit.replace(chr(37), chr(92) + chr(37))}}}" if self.unit else ""
         return number_latex(self.literal) + unit
 
     def markdown(self) -> str:
+        """Typeset the number as a formula in Markdown."""
         return f"${self.latex()}$"
 
 
 @dataclass(frozen=True)
 class Words:
-    """A claim in words: what the document says, and what it could have said instead."""
+    """A claim in words: the document's phrase, and alternatives that it could have used."""
 
     label: str
     printed: str
@@ -205,9 +210,11 @@ class Words:
 
     @property
     def text(self) -> str:
+        """The claim as the file of statements has it."""
         return f"{self.label}: {' | '.join((self.printed, *self.others))}"
 
     def markdown(self) -> str:
+        """The claim as it is printed."""
         return self.printed
 
 
@@ -330,7 +337,7 @@ class _Evaluation:
         return operation(inner, (sp.Symbol(index, integer=name != "Int"), first, last))
 
     def _cases(self, arguments: list[ast.expr]) -> Any:
-        """The value of the only case whose condition holds."""
+        """Return the value of the only case whose condition holds."""
         values = [
             self(argument.elts[0])
             for argument in arguments

@@ -16,7 +16,7 @@ def both(place: str) -> tuple[str, str]:
 
 
 Check = Callable[..., Finding]
-"""Takes the printed :class:`~gpbnb.ledger.statements.Statement`, or nothing where there is nothing to judge in it."""
+"""A check takes the printed :class:`~gpbnb.ledger.statements.Statement`, or no argument if it does not need it."""
 _C = TypeVar("_C", bound=Check)
 
 

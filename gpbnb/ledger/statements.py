@@ -31,11 +31,11 @@ class Statement:
     ----------
     id : unique; ``document.chapter.place``, as in ``hung1984.II.eq20``.
     document : short name, one of `DOCUMENTS`.
-    chapter, section : as numbered there; ``-`` where the document has none.
-    item : what it is called there, as in ``eq (20)``.
+    chapter, section : as numbered there; ``-`` if the document has none.
+    item : its name in the document, as in ``eq (20)``.
     kind : one of `KINDS`.
     text : the printed text, with math between single dollar signs; ``{{1}}`` stands for the first part of the form.
-    form : the machine-readable form, see :mod:`gpbnb.ledger.formula`; empty where there is none.
+    form : the machine-readable form, see :mod:`gpbnb.ledger.formula`; empty if there is none.
     """
 
     id: str
@@ -58,11 +58,11 @@ class Statement:
         return _PLACE.sub(lambda place: self.parts[int(place[1]) - 1].markdown(), self.text)
 
     def relation(self, number: int = 1) -> Relation:
-        """The relation with this number among the relations of the form, counted from 1.
+        """Return the relation with this number among the relations of the form, counted from 1.
 
         Raises
         ------
-        LookupError : the form has no such relation.
+        LookupError : the form has no relation with this number.
         """
         relations = [part for part in self.parts if isinstance(part, Relation)]
         if not 1 <= number <= len(relations):
@@ -77,7 +77,7 @@ class Statement:
         return tuple(link for relation in relations for link in relation.links(names, number))
 
     def number(self, label: str) -> Number:
-        """The printed number with this label.
+        """Return the printed number with this label.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Statement:
         return self._labelled(Number, label)
 
     def says(self, label: str) -> str:
-        """The phrase that the document prints for this label.
+        """Return the phrase that the document prints for this label.
 
         Raises
         ------
@@ -99,11 +99,11 @@ class Statement:
 
         Parameters
         ----------
-        meanings : every phrase that it could print, and whether it would be right.
+        meanings : every phrase that could be printed, and whether it would be right.
 
         Raises
         ------
-        LookupError : the form has no phrase of this label, or prints one that `meanings` does not have.
+        LookupError : the form has no phrase with this label, or prints one that is not in `meanings`.
         """
         return meanings[self.says(label)]
 
@@ -124,7 +124,7 @@ def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
 
     Parameters
     ----------
-    source : a CSV file, such as a ``pathlib.Path``; the one of the package by default.
+    source : a CSV file, such as a ``pathlib.Path``; by default that of the package.
 
     Returns
     -------
@@ -166,7 +166,7 @@ def _by_id() -> dict[str, Statement]:
 
 
 def statement(key: str) -> Statement:
-    """The statement with the id `key`.
+    """Return the statement with the id `key`.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def statement(key: str) -> Statement:
 
 
 def quote(key: str) -> str:
-    """The printed text of the statement `key`; KeyError as for :func:`statement`."""
+    """Return the printed text of the statement `key`; KeyError as for :func:`statement`."""
     return statement(key).printed
 
 
@@ -214,13 +214,13 @@ def select(
 
     Parameters
     ----------
-    entries : where from.
+    entries : the entries to choose from.
     document, chapter : all by default.
-    sections : numbers or names; ``9`` takes 9.1 and 9.2 too. All by default.
+    sections : numbers or names; ``9`` includes 9.1 and 9.2. All by default.
 
     Raises
     ------
-    ValueError : nothing is there of that document, of that chapter, or of one of the sections.
+    ValueError : there are no entries of this document, of this chapter, or of one of the sections.
     """
     found = tuple(entries)
     if document is not None:

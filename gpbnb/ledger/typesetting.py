@@ -66,7 +66,7 @@ def _wrap(text: str, needed: bool) -> str:
 
 
 def typeset(node: ast.expr, level: int) -> str:
-    """Typeset an expression; parentheses where its operator binds less tightly than `level`."""
+    """Typeset an expression, in parentheses if its operator binds less tightly than `level`."""
     match node:
         case ast.Constant(value=value):
             return r"\cdots" if value is Ellipsis else number_latex(getattr(node, "literal", None) or ast.unparse(node))
@@ -108,7 +108,7 @@ def typeset(node: ast.expr, level: int) -> str:
 
 
 def _without_minus(node: ast.expr) -> ast.expr | None:
-    """The product whose first factor has lost its minus sign; None if that factor has none."""
+    """Return the product without the minus sign of its first factor; None if that factor has none."""
     match node:
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return operand
@@ -118,7 +118,7 @@ def _without_minus(node: ast.expr) -> ast.expr | None:
 
 
 def _times(a: str, b: str) -> str:
-    """What stands between two factors."""
+    """Return the symbol between two factors."""
     if b[:1].isdigit() or b[:1] == ".":
         return r"\times "
     return r"\," if a[-1:].isalpha() and b[:1].isalpha() else ""

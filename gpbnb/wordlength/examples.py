@@ -135,3 +135,28 @@ def normal_matrix(degree: int, times: Sequence[int]) -> NDArray[Any]:
         )
     powers = np.array([[Fraction(t) ** j for j in range(degree + 1)] for t in times], dtype=object)
     return np.asarray(powers.T @ powers)
+
+
+def cyclic(n: int, m: int, cycle: int = 1, decay: float = 0.95, seed: int = 7) -> LinearModel:
+    """Random stable states that decay slowly, seen by a measurement matrix that goes through a cycle.
+
+    Parameters
+    ----------
+    n, m : numbers of states and of measurements.
+    cycle : steps after which the measurement matrix is the same again.
+    decay : of each state in a step, about.
+    """
+    rng = np.random.default_rng([seed, n, m])
+    Phi = decay * np.eye(n) + 0.03 * rng.standard_normal((n, n))
+    H = rng.standard_normal((m, n))
+    turned = [H * np.cos(2 * np.pi * k / cycle + np.arange(n)) for k in range(cycle)]
+    unit = exact(np.eye(n, dtype=np.int64))
+    return LinearModel(
+        Phi=np.round(Phi * 2**20) / 2**20,
+        H=np.round(np.array(turned) * 2**20) / 2**20,
+        Q=unit / 10,
+        R=exact(np.eye(m, dtype=np.int64)),
+        x0=np.array([Fraction(0)] * n, dtype=object),
+        P0=unit,
+        name=f"n = {n}, m = {m}, cycle {cycle}, decay {decay}",
+    )

@@ -98,7 +98,7 @@ CASES = (
     Case(tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000),
     Case(lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), measurement=1.0),
     Case(lambda: controller("0.999", "0.01", "2", "5"), measurement=1.0),
-    Case(_longitudinal, measurement=10.0, candidates=100),
+    Case(_longitudinal, measurement=10.0, steps=1_000, candidates=100),
 )
 """Filters with their limits."""
 
@@ -141,8 +141,7 @@ def compute(case: Case) -> Row:
     sizes = np.array(case.state) if case.state else found.limits.state
     worst = int((found.bound / sizes).argmax())
     center = case.center or None
-    ramp = min(case.steps / 2, 1_000)
-    plans = 6 if case.measurement < math.inf else 3
+    plans, ramp = 6 if case.measurement < math.inf else 3, min(case.steps / 2, 1_000) if case.horizon is None else 1
     outcome = attack(
         found, case.steps, case.candidates, states=case.aims or None, center=center, plans=plans, ramp=ramp
     )

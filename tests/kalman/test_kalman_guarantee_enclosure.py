@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from flint import arb
 
-from benchmarks.guarantee import model as slow_model
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.emulation import emulate
@@ -20,6 +19,7 @@ from gpbnb.kalman.guarantee.bound import guarantee, limits
 from gpbnb.kalman.guarantee.enclosure import FORMS, Enclosed, enclose, gain, predicted, updated
 from gpbnb.kalman.guarantee.gains import schedule
 from gpbnb.kalman.model import LinearModel
+from gpbnb.wordlength.examples import cyclic
 
 FORMATS = [FloatFormat(2, 12), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5)]
 
@@ -153,7 +153,7 @@ def test_other_forms_and_gains_that_fall_for_ever_have_no_enclosure() -> None:
 
 def test_a_filter_whose_gain_never_repeats_has_a_guarantee_for_ever() -> None:
     """Ten states, a cycle of 31: no run with random or steady inputs leaves the bound."""
-    given, fmt = slow_model(10, 2, 31, 0.8), FloatFormat(2, 24)
+    given, fmt = cyclic(10, 2, 31, 0.8), FloatFormat(2, 24)
     within = limits(10, 2, measurement=50)
     found = guarantee(given, fmt, within, most=1000)
     assert found.for_ever
@@ -174,7 +174,7 @@ def test_a_filter_whose_gain_never_repeats_has_a_guarantee_for_ever() -> None:
 
 
 def test_limits_of_the_coefficients_begin_with_the_enclosure() -> None:
-    given = schedule(slow_model(10, 2, 31, 0.8), FloatFormat(2, 24), Form.INNOVATION, 1000)
+    given = schedule(cyclic(10, 2, 31, 0.8), FloatFormat(2, 24), Form.INNOVATION, 1000)
     assert given.enclosed is not None
     assert given.settled
     assert given.first > given.enclosed

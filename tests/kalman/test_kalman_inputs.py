@@ -288,7 +288,7 @@ def test_inputs_are_refused_where_they_would_be_ignored():
             emulate(cart, z, fmt, form)
     with pytest.raises(ValueError, match="got known inputs in the Hung"):
         emulate(cart, z, fmt, Form.HUNG)
-    with pytest.raises(ValueError, match="got fused, sums or compensated with known inputs"):
+    with pytest.raises(ValueError, match="got fused, sums, compensated or order with known inputs"):
         emulate(cart, z, fmt, fused=True)
 
 

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numba.extending import overload
+
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.scalar import (
     add,
@@ -24,6 +27,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     subtract,
     zero,
 )
+from gpbnb.arithmetic.kernels.tags import Blocked, Limited, Mixed, Pairwise
 
 
 @inner
@@ -64,9 +68,73 @@ def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
             store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
+def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """c = a b if the tag wants its sums pairwise or in blocks; returns whether it does."""
+    raise TypeError("got a call of product_in_order from Python; needed one from a function compiled by numba")
+
+
+@inner
+def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> Any:
+    # Without recursion, which numba's cache does not survive: product k completes every part that it is the last of.
+    count = 0
+    for k in range(n):
+        sums[count] = multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)))
+        count += 1
+        first, end = 0, n
+        while end - first > 1:
+            if k == end - 1:
+                count -= 1
+                sums[count - 1] = add(fmt, sums[count - 1], sums[count])
+            middle = (first + end) // 2
+            first, end = (first, middle) if k < middle else (middle, end)
+    return sums[0]
+
+
+@inner
+def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, n: int) -> Any:
+    total = zero(fmt)
+    for first in range(0, n, fmt.sums.block):
+        s = multiply(fmt, load(fmt, a, (i, first)), load(fmt, b, (first, j)))
+        for k in range(first + 1, min(first + fmt.sums.block, n)):
+            s = multiply_add(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)), s)
+        total = s if first == 0 else add(fmt, total, s)
+    return total
+
+
+@overload(product_in_order, strict=False)
+def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    kind = getattr(fmt, "instance_class", None)
+    mixed = kind is Mixed
+    limited = fmt.types[1] if mixed else fmt
+    order = limited.types[2].instance_class if getattr(limited, "instance_class", None) is Limited else None
+
+    def pairwise(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        of_sums = fmt.sums if mixed else fmt
+        sums = np.zeros(64)
+        for i in range(c.shape[0]):
+            for j in range(c.shape[1]):
+                put(fmt, c, (i, j), _pairwise(of_sums, a, b, i, j, a.shape[1], sums))
+        check(fmt, c)
+        return True
+
+    def blocked(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        of_sums = fmt.sums if mixed else fmt
+        for i in range(c.shape[0]):
+            for j in range(c.shape[1]):
+                put(fmt, c, (i, j), _blocked(of_sums, a, b, i, j, a.shape[1]))
+        check(fmt, c)
+        return True
+
+    if order is Pairwise:
+        return pairwise
+    return blocked if order is Blocked else lambda fmt, a, b, c: False
+
+
 @inner
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right, over the entries of a that are not zero; c is neither a nor b."""
+    if product_in_order(fmt, a, b, c):
+        return
     for i in range(a.shape[0]):
         fresh = True
         for k in range(a.shape[1]):
@@ -89,6 +157,8 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
 @inner
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """As :func:`product`, with the same digits, over the entries of b that are not zero."""
+    if product_in_order(fmt, a, b, c):
+        return
     for j in range(b.shape[1]):
         fresh = True
         for k in range(a.shape[1]):

@@ -32,6 +32,7 @@ from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
+    Blocked,
     Decimal,
     Double,
     DoubleDouble,
@@ -54,6 +55,13 @@ _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**
 def _tag(fmt: Any) -> Any:
     """The class of a tag, from its numba type."""
     return getattr(fmt, "instance_class", None)
+
+
+def _fuses(fmt: Any) -> bool:
+    if _tag(fmt) is not Limited:
+        return False
+    sums = fmt.types[2]
+    return _tag(sums.types[1] if _tag(sums) is Blocked else sums) is Fused
 
 
 def _only_compiled(name: str) -> TypeError:
@@ -353,7 +361,7 @@ def _one(fmt: Any) -> Any:
 
 @overload(multiply_add, strict=False, jit_options=_INLINE)
 def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    if _tag(fmt) is Limited and fmt.types[2].instance_class is Fused:
+    if _fuses(fmt):
         return lambda fmt, a, b, c: fused(fmt, a, b, c)
     if _tag(fmt) is ShortDecimal:
         return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)

@@ -14,6 +14,7 @@ from numba.extending import overload
 from gpbnb.arithmetic.kernels.binary import SAFE_TWICE
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.matrices import product_in_order
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     check,
@@ -76,6 +77,8 @@ def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 @inner
 def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right over the entries of a that are not zero; c is neither a nor b."""
+    if product_in_order(fmt, a, b, c):
+        return
     for i in range(a.shape[0]):
         fresh = True
         for k in range(a.shape[1]):
@@ -104,7 +107,7 @@ def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
     One row of c after another grows by a product; a processor computes them at once, as none waits for the last.
     """
-    if _short_product(fmt, a, b, c):
+    if _short_product(fmt, a, b, c) or product_in_order(fmt, a, b, c):
         return
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):

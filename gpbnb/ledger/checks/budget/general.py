@@ -1,4 +1,4 @@
-"""The general descriptions: hung1984, ch. I, and what hung1982, ch. I, says of goal, period and contracts."""
+"""Check the general descriptions: hung1984, ch. I, and the goal, period and contracts in hung1982, ch. I."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def revised_sum() -> bool:
 
 
 def revised_product() -> bool:
-    """Whether (20) of 1984, n + m + 1, differs from the count of roundings of a product of n over m, unlike 1982."""
+    """Whether (20) of 1984, n + m + 1, but not (20) of 1982, differs from the number of roundings in a quotient."""
     n, m = 3, 2
     count = (reduce(mul, [Roundings()] * n) / reduce(mul, [Roundings()] * m)).count
     return count == n + m - 1 and count != n + m + 1
@@ -70,7 +70,7 @@ def revised_product() -> bool:
 
 @dataclass(frozen=True)
 class Roundings:
-    """A factor that stands for all numbers: it counts the products and quotients that led to it."""
+    """A placeholder for any number that counts the products and quotients that led to it."""
 
     count: int = 0
 
@@ -81,7 +81,7 @@ class Roundings:
 
 
 def revised_chain() -> bool:
-    """Whether (31), the same in both reports, is exceeded: a product of a row and a column of two that cancels."""
+    """Whether a cancelling product of a row and a column of two exceeds (31), which is the same in both reports."""
     fmt = FloatFormat(10, 4)
     row, column = fmt.array(["1.001", "-1.002"]), fmt.array(["1.001", "1"])
     true = sum(row.to_fractions() * column.to_fractions())
@@ -102,7 +102,7 @@ def one_over_f_study(printed: Statement) -> Finding:
 
 
 def period(printed: Statement) -> tuple[int, int] | None:
-    """Whole months and days of a printed period, the last day included; None if a printed day does not exist."""
+    """Return whole months and days of a printed period with its last day; None if a printed day does not exist."""
     printed_days = ([printed.number(f"{word} {part}").value for part in ("year", "month", "day")]
                     for word in ("from", "to"))  # fmt: skip
     try:
@@ -227,7 +227,7 @@ def period_1982(printed: Statement) -> Finding:
 
 
 def span(start: date, end: date) -> tuple[int, int]:
-    """Whole months and the days beyond them, from `start` to `end`."""
+    """Return whole months and remaining days from `start` to `end`."""
     months = 12 * (end.year - start.year) + end.month - start.month - (end.day < start.day)
     later = start.year * 12 + start.month - 1 + months
     return months, (end - date(later // 12, later % 12 + 1, start.day)).days

@@ -56,13 +56,13 @@ def by_form(printed: Statement) -> Finding:
 
 
 def without_form() -> list[str]:
-    """Misalignments whose effect on the gyro's readings is neither bias, nor drift or pointing, nor scale factor."""
+    """List misalignments whose effect on the gyro's readings is not a bias, a drift, a pointing or a scale factor."""
     theta = np.array([0.0, 3e-5, 2e-5])
     phase = np.linspace(0, 6, 7)
     forms = ("phi2", "phi3", "bias_y", "bias_z", "scale")
 
     def columns(*names: str) -> np.ndarray:
-        # the drift changes from phase to phase, so that it cannot make up for a turn that stands still
+        # the drift changes from phase to phase, so it cannot compensate a constant rotation
         nominal = theta * np.linspace(1, 2, 7)[:, None]
         matrix = measurement_matrix(phase, names, nominal_theta=nominal).reshape(-1, len(names))
         return np.asarray(matrix / np.linalg.norm(matrix, axis=0))
@@ -85,7 +85,7 @@ def deterministic(printed: Statement) -> Finding:
 
 
 def compensated(part: float) -> float:
-    """Error of the spin axis after turning back through a part of a misalignment of 20 arcseconds; radians."""
+    """Return the error of the spin axis after rotating back by part of a misalignment of 20 arcseconds; radians."""
     theta, gamma = np.array([0.0, 9.0, 4.0]) * ARCSEC, np.array([0.0, 20.0, 0.0]) * ARCSEC
     read = spin_in_readout(theta, np.zeros(3), gamma, 0.3)
     back = deroll(apply(rotation(-part * gamma), read)[1:], 0.3)
@@ -108,13 +108,13 @@ def random_variables(printed: Statement) -> Finding:
 
 @cache
 def rolled_mean() -> float:
-    """The simulated mean of a constant that turns 10.3 times."""
+    """Return the simulated mean of a constant that rotates 10.3 times."""
     return float(experiment.turning_mean(10.3))
 
 
 @cache
 def averaged_process() -> tuple[float, float, float]:
-    """What a mean over 30 correlation times leaves of a random process, expected and simulated; over a tenth of one."""
+    """Return the part of a process left in means over 30 correlation times (expected, simulated) and over 0.1."""
     rng = np.random.default_rng(1982)
     means = experiment.correlated_means(_RATIO, 1.0, _TRIALS, rng)
     left = float(np.sqrt(np.mean(means**2)))
@@ -127,7 +127,7 @@ _TRIALS, _RATIO = 4000, 30.0
 @CHECKS.add("hung1982.II.random-process-reduction")
 def random_processes(printed: Statement) -> Finding:
     expected, left, slow = averaged_process()
-    # the standard error of a standard deviation, four of them; the rule of 400 points is 2.4e-4 off
+    # four standard errors of a standard deviation; the rule of 400 points is 2.4e-4 off
     agree = abs(left / expected - 1) < 4 / math.sqrt(2 * _TRIALS) + 2.4e-4
     right = agree and expected < 0.5 and derivation.averages().holds
     return compare(
@@ -150,7 +150,7 @@ def scale_factor(printed: Statement) -> Finding:
 
 
 def identifiable(amplitude: float) -> bool:
-    """Whether readings of a year determine scale factor, drift, its rate and biases; a known signal of this size."""
+    """Whether a year of readings with a known signal of this size determines scale factor, drift, rate and biases."""
     time = np.arange(200) / 200
     theta = np.zeros((200, 3))
     theta[:, 1] = amplitude * np.sin(2 * np.pi * time)
@@ -164,7 +164,7 @@ def identifiable(amplitude: float) -> bool:
 
 @cache
 def filtered_noise() -> tuple[float, float, int]:
-    """Error of a Kalman filter for a constant in white noise, over that of one reading: simulated; √(1/N); trials."""
+    """Return error of a Kalman filter for a constant in white noise / error of one reading, √(1/N), and the trials."""
     rng = np.random.default_rng(44)
     readings, trials = 400, 2000
     estimate, variance = np.zeros(trials), 1e12
@@ -190,12 +190,12 @@ def noise(printed: Statement) -> Finding:
 
 
 def total_error() -> float:
-    """The printed total of Table II-1, in milliarcseconds."""
+    """Return the printed total of Table II-1, in milliarcseconds."""
     return float(statement("hung1982.II.rss-total").number("total").value)
 
 
 def equal_case() -> tuple[int, float]:
-    """The printed number of equal sources, and the error of each in milliarcseconds."""
+    """Return the printed number of equal sources, and the error of each in milliarcseconds."""
     printed = statement("hung1982.II.44-sources")
     return int(printed.number("sources").value), float(printed.number("each").value)
 

@@ -69,7 +69,7 @@ def identity(printed: Statement) -> Finding:
 def phi_frame(printed: Statement) -> Finding:
     phi = np.array([0.0, 5.0, 0.0]) * ARCSEC
     against = {name: abs(theta_of(phi, np.array([0.0, a, 0.0]) * ARCSEC)[1]) for name, a in (("a", 0.0), ("i", 4.0))}
-    # right-handed: a positive turn of the gyro about y carries its x axis towards -z
+    # right-handed: a positive rotation of the gyro about y moves its x axis towards -z
     stands = float(rotation(phi)[2, 0])
     return compare(
         bool(abs(against[printed.says("frame")[0]] - phi[1]) < MAS and stands < 0),
@@ -93,7 +93,7 @@ def known(printed: Statement) -> Finding:
 
 
 def compensated() -> float:
-    """Largest error of the spin axis in the intermediate frame after turning back through known angles; radians."""
+    """Return the largest error, in radians, of the spin axis after rotating back by known angles."""
     theta, beta, gamma = np.array([[0, 9.0, 4.0], [30.0, 20.0, -10.0], [-25.0, 15.0, 5.0]]) * MINUTE
     phase = np.linspace(0, 6, 11)
     read = spin_in_readout(theta, beta, gamma, phase)
@@ -126,4 +126,4 @@ def use_of_model() -> Finding:
 
 
 THIRD_ORDER = 4.0
-"""Bound of the third-order coefficients of a case with two angles of one size, for drift smaller than they."""
+"""Bound of the third-order coefficients for two angles of the same size and a drift smaller than them."""

@@ -16,7 +16,7 @@ from gpbnb.ledger.finding import Finding, compare, given
 from gpbnb.ledger.statements import Statement, statement
 
 H = sp.Symbol("h")
-"""Scale of all small angles: to first order means the derivative by it at zero."""
+"""Scale of all small angles; first-order terms are derivatives by this scale at zero."""
 PHASE = sp.Rational(4, 7)
 """Roll angle ωt of the case."""
 ANGLES: Mapping[str, tuple[sp.Rational, ...]] = {
@@ -29,7 +29,7 @@ ANGLES: Mapping[str, tuple[sp.Rational, ...]] = {
 
 
 def letters(scale: sp.Expr) -> dict[str, Any]:
-    """The angles of the case by their printed names, times a scale; and the roll angle."""
+    """Return the angles of the case by their printed names, times a scale, and the roll angle."""
     names: dict[str, Any] = {"matrix": sp.Matrix, "omega": sp.Integer(1), "t": PHASE}
     for name, values in ANGLES.items():
         names |= {f"{name}_{k}": scale * value for k, value in enumerate(values, 1)}
@@ -38,11 +38,11 @@ def letters(scale: sp.Expr) -> dict[str, Any]:
 
 @cache
 def rotation_to_first_order(name: str) -> tuple[sp.Matrix, sp.Matrix]:
-    """The matrix of a set of angles without small angles, and its derivative by their scale, from exact rotations.
+    """Return the matrix of a set of angles at zero angles, and its derivative by their scale, from exact rotations.
 
     Raises
     ------
-    ArithmeticError : the six orders in which three angles can be turned differ to first order.
+    ArithmeticError : the six orders of three rotations differ to first order.
     """
     found = []
     for sequence in SEQUENCES:
@@ -89,7 +89,7 @@ def first_order(printed: Statement) -> bool:
 
 
 def rotation(name: str) -> tuple[sp.Matrix, sp.Matrix]:
-    """A factor of a chain without small angles, and its derivative by their scale."""
+    """Return a factor of a chain at zero angles, and its derivative by their scale."""
     return (derivation.turn(1, PHASE), sp.zeros(3, 3)) if name == "roll" else rotation_to_first_order(name)
 
 
@@ -103,7 +103,7 @@ def chains(printed: Statement) -> Finding:
 
 
 def readings() -> dict[str, Any]:
-    """The angles, and what telescope and gyro read of them to first order without misalignments."""
+    """Return the angles, and the readings of telescope and gyro to first order without misalignments."""
     names = letters(sp.Integer(1))
     for frame, angles in (("t", "alpha"), ("r", "theta")):
         vector = derivation.turn(1, PHASE) * rotation_to_first_order(angles)[1] * sp.Matrix([1, 0, 0])
@@ -142,7 +142,7 @@ def estimates(printed: Statement) -> Finding:
 
 @cache
 def signs_to_change() -> tuple[tuple[int, ...], ...]:
-    """Smallest sets of signs of (8) whose change makes it deroll."""
+    """Return the smallest sets of signs of (8) whose change turns it into a deroll."""
     return derivation.fewest_signs()
 
 

@@ -1,4 +1,4 @@
-"""Checks of hung1982, ch. IV: what the report says of its frames and angles before (1)."""
+"""Checks of hung1982, ch. IV: statements about frames and angles before (1)."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def intermediate_frame(printed: Statement) -> Finding:
 
 
 def frames_of_a_case() -> np.ndarray:
-    """Matrices (6, 3, 3) from the absolute to each frame, for angles that are all different and not zero."""
+    """Return the matrices (6, 3, 3) from the absolute frame to each frame, for distinct nonzero angles."""
     A, F = rotation([0.01, 0.02, 0.03]), rotation([0.0, 0.04, 0.05])
     R = roll(0.6) @ A
     T = rotation([0.07, 0.08, 0.09]) @ R
@@ -91,7 +91,7 @@ def frames_of_a_case() -> np.ndarray:
 
 
 def gyro_to_readout(phase: float) -> np.ndarray:
-    """The angles δ of a gyro that points along the roll axis, without misalignments; radians."""
+    """Return the angles δ of a gyro that points along the roll axis, without misalignments; radians."""
     return angles_of(roll(phase) @ rotation([0.0, 0.0, 0.0]))
 
 
@@ -147,7 +147,7 @@ def boresight(printed: Statement) -> Finding:
 
 
 def boresight_offset(angles: np.ndarray) -> float:
-    """Angle between the x axes of two frames that these angles separate, as boresight and roll axis; radians."""
+    """Return the angle between the x axes of two frames separated by these angles; radians."""
     return float(math.asin(min(1.0, np.hypot(*rotation(angles)[1:, 0]))))
 
 

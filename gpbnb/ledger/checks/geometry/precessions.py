@@ -44,7 +44,7 @@ def larger_effect(printed: Statement) -> Finding:
 
 
 RIGEL = math.radians(-8.2)
-"""Declination of the star, which is not in the documents."""
+"""Declination of Rigel, which is not in the documents."""
 
 
 @CHECKS.add("hung1982.I.approximately-parallel")
@@ -60,7 +60,7 @@ def approximately_parallel(printed: Statement) -> Finding:
 
 
 def angle_to_axis(declination: float) -> float:
-    """Angle between the Earth's axis and the geodetic drift for a star in the plane of the orbit; radians."""
+    """Return the angle between the Earth's axis and the geodetic drift for a star in the orbit plane; radians."""
     star = np.array([math.cos(declination), 0.0, math.sin(declination)])
     drift = np.cross([0.0, 1.0, 0.0], star)  # about the normal of the orbit
     return float(math.acos(abs(drift[2]) / np.hypot(drift[0], drift[2])))
@@ -81,7 +81,7 @@ def theories_differ(printed: Statement) -> Finding:
 
 
 def geodetic_of_brans_dicke(omega: sp.Symbol) -> sp.Expr:
-    """Geodetic drift over that of general relativity: (1 + 2γ)/3, γ the curvature of space by unit mass."""
+    """Return geodetic drift / drift by general relativity, (1 + 2γ)/3, where γ is the space curvature by unit mass."""
     gamma = (1 + omega) / (2 + omega)
     return sp.together((1 + 2 * gamma) / 3)
 
@@ -98,7 +98,7 @@ def progress_report() -> Finding:
 
 
 def deroll_errors() -> tuple[float, float]:
-    """Largest error of (8) as printed, and of (5), over a roll, for α of 15 and 8 arcseconds; radians."""
+    """Return the largest error of (8) as printed and of (5) over a roll, for α of 15 and 8 arcseconds; radians."""
     phase = np.linspace(0, 2 * np.pi, 37)
     inertial = np.array([-15.0, 8.0]) * ARCSEC
     readings = deroll(np.broadcast_to(inertial, (37, 2)), -phase)

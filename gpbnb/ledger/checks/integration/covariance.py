@@ -28,7 +28,7 @@ from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.statements import Statement
 
 CLOSE = 1e-10
-"""Relative error allowed to the recursion (18): it subtracts numbers that are 12/μ² times the result."""
+"""Relative error allowed for the recursion (18), which subtracts numbers that are 12/μ² times the result."""
 
 
 @cache
@@ -37,7 +37,7 @@ def _misprints() -> dict[str, sp.Expr]:
 
 
 def if_used(place: str) -> str:
-    """The rate to which a misprint would have led, for μ = 0.1 and T = 0.01 s."""
+    """Return the rate that a misprint would give, for μ = 0.1 and T = 0.01 s."""
     values = {MU: sp.Rational(1, 10), T: sp.Rational(1, 100)}
     found, right = (float(e.subs(values)) for e in (_misprints()[place], derivation.walk()))
     return f"if used, it would make the rate at $\\mu=0.1$, $T=0.01$ s {found:.4g} instead of {right:.4g}"
@@ -45,7 +45,7 @@ def if_used(place: str) -> str:
 
 @cache
 def errors_of_the_set() -> tuple[float, float]:
-    """Largest relative error of P_ee by (18) and (25), corrected and as printed, over some μ and n."""
+    """Return the largest relative error of P_ee by (18) and (25), corrected and as printed, over some μ and n."""
     errors = {True: 0.0, False: 0.0}
     for mu in (0.5, 2.0, 10.0):
         exact = theory.error_variance(np.arange(1, 41), mu)
@@ -154,7 +154,7 @@ def p32(printed: Statement) -> Finding:
 
 @cache
 def _in_time(case: Case, entries: tuple[sp.Rational, ...]) -> Names:
-    """Covariance matrix of (x_1, x_2) at a time, and its derivative, from the matrix exponential."""
+    """Return the covariance matrix of (x_1, x_2) at a time, and its derivative, from the matrix exponential."""
     p11, p12, p22 = entries
     phi = derivation.transition_matrix().applyfunc(lambda e: e.subs(OMEGA, case.omega))
     added = derivation.noise().applyfunc(lambda e: e.subs({OMEGA: case.omega, P: case.steady}))
@@ -170,7 +170,7 @@ def _in_time(case: Case, entries: tuple[sp.Rational, ...]) -> Names:
         "N_p": sp.Matrix([[density, 0], [0, 0]]),
         "N_P11": density,
     }
-    del names["T"]  # which would hide the transpose
+    del names["T"]  # a symmetric matrix would hide the transpose
     for i, j in product(range(2), repeat=2):
         names[f"P_{i + 1}{j + 1}"], names[f"P_dot_{i + 1}{j + 1}"] = now[i, j], slope[i, j]
     return names

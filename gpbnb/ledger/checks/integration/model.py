@@ -66,7 +66,7 @@ def abstract(printed: Statement) -> Finding:
 
 @cache
 def _growth() -> tuple[float, float, float]:
-    """Unevenness of the variance's growth for two inputs; variance for an input with a sharp edge, early and late."""
+    """Return the unevenness of variance growth for two inputs, and variances for a sharp-edged spectrum."""
     f_c, uneven = 2.0, 0.0
     for process in (theory.first_order(1.0, 1.0), theory.resonant(1.0, 3.0, 0.2)):
         variance = theory.rule_variance(process, f_c, theory.RULES["trapezoidal"], 400)
@@ -79,9 +79,9 @@ _EDGE = 0.4
 
 
 def _with_edge(edge: float, n: int) -> float:
-    """Error variance after n cycles, over σ_x² T², for an input with a flat spectrum that ends at `edge` times f_c."""
+    """Return the error variance after n cycles, over σ_x² T², for a flat spectrum that ends at `edge` times f_c."""
     f = np.pi * edge * (np.arange(20_000) + 0.5) / 20_000
-    one = np.cos(f) - np.sin(f) / f  # trapezoid less integral over a cycle
+    one = np.cos(f) - np.sin(f) / f  # trapezoid minus integral over a cycle
     return float(np.mean((one * np.sin(n * f) / np.sin(f)) ** 2))
 
 
@@ -130,7 +130,7 @@ def band_limited() -> Finding:
     omega = 3.0
     angle = np.pi / 2 * (np.arange(1000) + 0.5) / 1000
     process = theory.first_order(1.0, omega)
-    # Shares of the variance below ω tan θ: the density per dθ is even.
+    # Shares of the variance below ω tan θ; the density over θ is uniform.
     density = process.psd(omega * np.tan(angle)) * omega / np.cos(angle) ** 2 / 2000
     inside = float(np.sum(density[:500]) / np.sum(density))
     return given(f"names $x_1$; {inside:.0%} of its variance lies below $\\omega_{{bw}}$, and the rest above")
@@ -201,7 +201,7 @@ _FORCE = sp.Rational(2, 3) - sp.Rational(5, 4) * TAU
 
 @cache
 def _driven(case: Case) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
-    """The state before and after a cycle under a given input, by direct integration of (1); and the part due to it."""
+    """Return the states before and after a cycle with a given input, by integrating (1), and the input's part."""
     s = sp.Symbol("s", positive=True)
     w, start = case.omega, sp.Matrix(case.before[:2])
     force = _FORCE.subs(TAU, s)
@@ -261,7 +261,7 @@ def transition_integral(printed: Statement) -> Finding:
 
 
 def transition_in_time(case: Case) -> Any:
-    """The matrix exponential of (4) as a function of time, for the bandwidth of a case."""
+    """Return the matrix exponential of (4) as a function of time, for the bandwidth of a case."""
     return lambda time: derivation.transition_matrix().applyfunc(lambda e: e.subs({OMEGA: case.omega, T: time}))
 
 
@@ -341,7 +341,7 @@ def error(printed: Statement) -> Finding:
 
 @CHECKS.add(MAIN + "sanalysis.uncorrelated-q")
 def uncorrelated(printed: Statement) -> Finding:
-    # What x_1 at a time t before t_{n-1} has in common with x_n and with the integral, less what (5) makes of it.
+    # Covariance of x_1 at a time t before t_{n-1} with x_n and the integral, minus the part that (5) explains.
     phi, together = derivation.transition_matrix(), P * sp.exp(-OMEGA * (TIME + TAU))
     past = together.subs(TAU, T) - phi[0, 0] * together.subs(TAU, 0)
     integral = sp.integrate(together, (TAU, 0, T)) - phi[1, 0] * together.subs(TAU, 0)

@@ -1,4 +1,4 @@
-"""What savage2016 leaves undone: the transient, and a numerical example."""
+"""Checks of the work that savage2016 leaves undone: the transient, and a numerical example."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gpbnb.ledger.finding import Finding, answer
 
 @cache
 def simulated() -> experiment.Sweep:
-    """A small simulation of the random walk."""
+    """Return a small simulation of the random walk."""
     return experiment.sweep([0.01, 0.1, 1.0, 10.0], 300, 4000, np.random.default_rng(35))
 
 
 def worst(found: experiment.Sweep) -> float:
-    """Largest deviation from the exact variance, in standard errors."""
+    """Return the largest deviation from the exact variance, in standard errors."""
     return float(np.max(np.abs(found.deviations())))
 
 

@@ -103,12 +103,12 @@ _SUMMED = 1e-12
 
 @cache
 def _folded() -> float:
-    """Largest relative difference between (35) squared and the sum of the spectrum over the multiples of f_c."""
+    """Return the largest relative difference of (35) squared from the sum of the spectrum over the multiples of f_c."""
     return max(abs(_summed(mu) / float(theory.walk_factor(mu)) - 1) for mu in (1e-4, 0.1, 1.0, 30.0))
 
 
 def _summed(mu: float) -> float:
-    """(35) squared from the spectrum, over σ_x² T: values at the multiples of f_c, the far ones by an integral."""
+    """Return (35) squared over σ_x² T from the spectrum at the multiples of f_c; an integral replaces distant ones."""
     k = np.arange(1, 20_001)
     near = float(np.sum(theory.first_order(1.0, mu).psd(2 * np.pi * k)))
     return 2 * (near + float(np.arctan(mu / (2 * np.pi * (len(k) + 0.5)))) / np.pi)
@@ -164,7 +164,7 @@ def exponential(printed: Statement) -> Finding:
 @CHECKS.add(*eq("37"))
 def series(printed: Statement) -> Finding:
     links = printed.links({"mu": MU, "dots": sp.S.Zero})
-    # The second step only divides by 2 and by μ: it is exact, as the last one. The others leave out terms from μ² on.
+    # The second step only divides by 2 and μ, so it is exact, like the last one. The others omit terms from μ² on.
     first, second, third, fourth, last = (sp.cancel(sp.together(_rational(link))) for link in links)
     others = all(_order(gap) >= 2 for gap in (first, third, fourth)) and last == 0
     return compare(
@@ -178,13 +178,13 @@ def series(printed: Statement) -> Finding:
 
 
 def _rational(link: Any) -> sp.Expr:
-    """Left less right side, with the exponential replaced by its series up to μ⁶."""
+    """Return left minus right side, with the exponential replaced by its series up to μ⁶."""
     cut = sp.series(sp.exp(-MU), MU, 0, 7).removeO()
     return (link.left - link.right).subs(sp.exp(-MU), cut)
 
 
 def _order(gap: sp.Expr) -> float:
-    """Exponent of the lowest power of μ in a quotient of polynomials."""
+    """Return the lowest exponent of μ in a quotient of polynomials."""
     if gap == 0:
         return float("inf")
     numerator, denominator = (sp.Poly(part, MU) for part in sp.fraction(gap))

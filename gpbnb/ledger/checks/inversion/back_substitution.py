@@ -27,7 +27,7 @@ GENERAL = (*substitutions(4), *substitutions(5))
 
 
 def evaluable(printed: Statement) -> Statement:
-    """The statement without the relations that contain dots."""
+    """Return the statement without the relations that contain dots."""
     return corrected(printed, "; ".join(part.text for part in printed.parts if "..." not in part.text))
 
 
@@ -164,7 +164,7 @@ _LESS = {"<=": operator.le, "<": operator.lt}
 
 
 def _piecewise(diagonal: Relation | None, off: Relation, where: Relation) -> bool:
-    """Whether a formula with a range of indices gives every entry one value, the true one, and names no others."""
+    """Whether a formula with index ranges gives every entry its true value exactly once, and names no other entries."""
     for names in GENERAL:
         n = int(names["n"])
         for k, j in itertools.product(range(2 * n + 2), repeat=2):
@@ -225,7 +225,7 @@ def weights_1982(printed: Statement) -> Finding:
 
 @cache
 def _generalizes() -> tuple[int, int]:
-    """In how many runs of 3 and 4 rows, and of how many, each row keeps within its counts of roundings."""
+    """Count the runs of 3 and 4 rows in which each row stays within its counts of roundings, and all runs."""
     kept = count = 0
     for n in (3, 4):
         of_matrix, of_right = weights(n)
@@ -340,7 +340,7 @@ def computed_inverse(printed: Statement) -> Finding:
 
 @cache
 def _left_alone() -> tuple[int, int, int]:
-    """In how many samples elimination leaves the triangular factor, and the full matrix, unchanged; of how many."""
+    """Count samples in which elimination leaves the triangular factor, or the full matrix, as is, and all samples."""
     triangular = full = 0
     few = samples()[::3]
     for sample in few:

@@ -162,7 +162,7 @@ def special_case(printed: Statement) -> Finding:
 
 @cache
 def _residual_bound() -> tuple[str, bool]:
-    """Whether the residual of the example of 11.4 is easy to compute and gives the tightest bound; with a text."""
+    """Whether the residual in the example of 11.4 is easy to compute and gives the tightest bound, with a text."""
     sample, _ = of_example()
     twice = FloatFormat(10, 2 * FOUR.precision)
     a, x = (twice.array(part.to_fractions()) for part in (sample.matrix, linalg.inv(sample.matrix)))
@@ -216,7 +216,7 @@ def two_parts(printed: Statement) -> Finding:
 
 @cache
 def _largest_error() -> tuple[Fraction, Fraction]:
-    """The largest relative error of all roundings of numbers with one more digit, in four digits, and β."""
+    """Return the largest relative error of rounding five-digit numbers to four digits, and β."""
     fmt = FORMATS[0]
     numbers = (Fraction(i) for i in range(10**fmt.precision, 2 * 10**fmt.precision))
     return max(abs(fmt.round(x) / x - 1) for x in numbers), fmt.unit_roundoff

@@ -38,7 +38,7 @@ def reference_to_figure(printed: Statement) -> Finding:
 
 @cache
 def _reference_norms() -> tuple[float, ...]:
-    """Relative changes of the error norms when an inverse of 20 digits takes the place of the true one."""
+    """Return the relative changes of the error norms if an inverse of 20 digits replaces the true one."""
     reference = exact(linalg.inv(FloatFormat(10, 20).array(example.MATRIX)))
     apart = []
     for places in example.PLACES:
@@ -63,18 +63,18 @@ def actual_norms(printed: Statement) -> Finding:
 
 @cache
 def readings(column: str) -> tuple[example.Column, ...]:
-    """Every reading of a column of Table 1, "proposed" or "actual"."""
+    """Return every reading of a column of Table 1, "proposed" or "actual"."""
     return tuple(example.bound_readings() if column == "proposed" else example.error_readings())
 
 
 def _numbers(printed: Statement, column: str) -> dict[int, str]:
-    """The printed numbers of a column, by the number of places."""
+    """Return the printed numbers of a column, by the number of places."""
     found = [part for part in printed.parts if isinstance(part, Number) and part.label.startswith(column)]
     return {int(part.label.split()[1]): part.literal for part in found}
 
 
 def _reproduced(printed: Statement, column: str) -> tuple[int, int]:
-    """How many readings give all printed numbers of a column to their four digits, and of how many."""
+    """Count the readings that give all printed numbers of a column to four digits, and all readings."""
     numbers = _numbers(printed, column)
     count = sum(
         all(example.agree(one.values[example.PLACES.index(places)], literal) for places, literal in numbers.items())
@@ -90,7 +90,7 @@ def _closest(column: str) -> example.Search:
 
 @cache
 def _possible(places: tuple[int, ...]) -> tuple[int, int]:
-    """How many searches through all matrices of so many places find an error of the printed norm, and of how many."""
+    """Count the searches through all matrices of `places` places that find the printed error norm, and all searches."""
     here = [p for p in existence.all_possible() if p.places in places and p.wordlength.kind != "t = places + 2"]
     return sum(p.witness is not None for p in here), len(here)
 
@@ -169,7 +169,7 @@ def _claims() -> tuple[example.Claim, ...]:
 
 
 def _columns() -> tuple[list[str], list[str]]:
-    """The printed columns of Table 1."""
+    """Return the printed columns of Table 1."""
     printed = statement("hung1984.II.s11-4.table-1")
     return tuple(list(_numbers(printed, column).values()) for column in ("proposed", "actual"))  # type: ignore[return-value]
 

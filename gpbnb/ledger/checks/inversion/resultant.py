@@ -21,14 +21,14 @@ TWO_SYSTEMS = "two-systems-added"
 
 @cache
 def _left_out() -> tuple[float, float]:
-    """The share of (91) and (92) that is left out: norms of sizes, in the example of 11.4."""
+    """Return the share that (91) and (92) omit, as norms of sizes, in the example of 11.4."""
     sample, _ = of_example()
     whole, bare = (theory.perturbation_bounds(sample.reduction, sample.beta, transfer) for transfer in (True, False))
     parts = [column_sum_norm(w - b) / column_sum_norm(w) for w, b in zip(whole, bare, strict=True)]
     return float(parts[0]), float(parts[1])
 
 
-#: Matrices whose errors exceed what the printed procedure allows, by (96) and by the last box of its chart.
+#: Matrices whose errors exceed the bound of the printed procedure, by (96) and by the last box of its chart.
 COUNTEREXAMPLES = {
     "(96)": ([[-1, 94], [-48, 10]], FloatFormat(10, 3), False),
     "chart": ([[-95, -15, 84], [53, 62, 75], [-43, 48, 162]], FloatFormat(10, 6), True),
@@ -37,7 +37,7 @@ COUNTEREXAMPLES = {
 
 @cache
 def counterexample(form: str) -> tuple[experiment.Trial, str]:
-    """A matrix whose error exceeds the printed bound in one of its forms, and the name of the bound."""
+    """Return a matrix whose error exceeds one form of the printed bound, and the name of the bound."""
     rows, fmt, pivot = COUNTEREXAMPLES[form]
     name = str(procedure.Reading(form=form))
     return experiment.trial(fmt.array(rows), pivot, [name, str(procedure.Reading(False, form)), "corrected"]), name
@@ -45,7 +45,7 @@ def counterexample(form: str) -> tuple[experiment.Trial, str]:
 
 @cache
 def exceeded() -> str:
-    """How far the errors of the counterexamples exceed the printed bound."""
+    """Return the factors by which the errors of the counterexamples exceed the printed bound."""
     texts = []
     for form in COUNTEREXAMPLES:
         trial, name = counterexample(form)
@@ -172,7 +172,7 @@ def relative_error_norm(printed: Statement) -> Finding:
 
 @cache
 def terms_of_96() -> tuple[float, float, float]:
-    """The norms of error, computed inverse and bracket of (95), in the example of 11.4."""
+    """Return the norms of error, computed inverse and bracket of (95) in the example of 11.4."""
     sample, error = of_example()
     bracket = theory.printed_bracket(sample.reduction, sample.beta)
     return error, float(column_sum_norm(sample.reduction.solution)), float(column_sum_norm(bracket))
@@ -210,7 +210,7 @@ def letter_d(printed: Statement) -> Finding:
 
 
 def operations(n: int) -> tuple[int, int]:
-    """Number of multiplications and divisions for the inverse, and for its bound (96)."""
+    """Count the multiplications and divisions for the inverse, and for its bound (96)."""
     reduce = sum((n - k) * (1 + (n - k) + n) for k in range(1, n))
     solve = n * sum(n - k + 1 for k in range(1, n + 1))
     sums = 2 * sum((n - k) ** 2 + (n - k) * n for k in range(1, n))  # by 3 and by 2, (59) and (60)

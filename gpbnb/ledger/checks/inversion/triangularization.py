@@ -174,7 +174,7 @@ def available(printed: Statement) -> Finding:
 
 @cache
 def _compounded() -> tuple[int, int, int]:
-    """In how many runs L Â_T = A + Ã(1) + Ã(2) exactly, and in how many the errors of step 1 change step 2."""
+    """Count runs with L Â_T = A + Ã(1) + Ã(2) exactly, and runs in which the errors of step 1 change step 2."""
     adds = changes = 0
     for run, _, _ in runs(3):
         upper = run.part(run.stages[1][-1], False)
@@ -222,7 +222,7 @@ def upper_triangular(printed: Statement) -> Finding:
 
 
 def _within(relation: Relation, n: int) -> int:
-    """In how many runs the printed right side, with β for ε, allows the errors that occurred."""
+    """Count the runs in which the printed right side, with β for ε, allows the errors that occur."""
     count = 0
     for _, names, _ in runs(n):
         given_names = {**COMMON, **names}

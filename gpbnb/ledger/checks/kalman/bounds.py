@@ -1,4 +1,4 @@
-"""Three steps, four, and k: (119)-(125) and the claims about them."""
+"""Check three steps, four steps and k steps: (119)-(125) and the claims about them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def three_steps(printed: Statement) -> Finding:
 
 
 def _instances() -> list[dict[str, Any]]:
-    """Scalars for (121): the closed loops are 1 and the inputs differ in sign; the last one makes x_3 zero."""
+    """Return scalars for (121) with closed loops of 1 and inputs of different sign; the last input makes x_3 zero."""
     found = []
     for x_0, u_1, u_2, u_3 in ((2, 3, 5, 7), (2, -3, 5, -7), (-3, 1, 1, 1)):
         values = [Fraction(each) for each in (x_0, u_1, u_2, u_3)]
@@ -66,7 +66,7 @@ def norm_with_minus(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("s12.assumptions-before-122"))
 def assumptions(printed: Statement) -> Finding:
-    """Whether the least B of the printed assumptions bounds what (122) needs it for."""
+    """Whether the smallest B that meets the printed assumptions bounds the terms of (122)."""
     F, u = exact([["9/10", "9/10"], [0, 0]]), exact([1, 1])
     need = max_norm(F @ F @ u)
     names: dict[str, Any] = {"norm": lambda a: a, "F_k": column_sum_norm(F), "u_k": max_norm(u)}
@@ -84,7 +84,7 @@ def assumptions(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("eq122"))
 def three_steps_bounded(printed: Statement) -> Finding:
-    # Without inputs (119) and (122) allow the same.
+    # Without inputs, (119) and (122) allow the same error.
     return exceeded("(119)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS, name="(122)")
 
 

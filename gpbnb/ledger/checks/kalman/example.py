@@ -15,14 +15,14 @@ from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
 
 YEAR, STEP = 365 * 24 * 3600, 10  # seconds
-GOAL, SIGNAL = 1, 6606  # mas a year: the experiment's goal, and the larger of the drifts that relativity predicts
+GOAL, SIGNAL = 1, 6606  # mas a year; the experiment's goal, and the larger of the two drifts that relativity predicts
 N, M = 10, 2
 _FIRST, _SECOND = "first-coefficient-misevaluated", "second-coefficient-misevaluated"
 
 
 @cache
 def coefficients() -> tuple[int, int]:
-    """What multiplies β‖x_k‖ and βB in (125), by the report's own algebra, in the example."""
+    """Return the factors of β‖x_k‖ and βB in (125), by the report's own algebra, for the example."""
     values = {derivation.K: Fraction(YEAR, STEP), derivation.N: N, derivation.M: M}
     derived = derivation.count_start(derivation.TWICE[0]), derivation.second_coefficient(*derivation.TWICE)
     first, second = (int(each.subs(values)) for each in derived)
@@ -47,12 +47,12 @@ def steps_of_a_year(printed: Statement) -> Finding:
 
 
 def _number(printed: Statement, label: str, value: Fraction | int) -> bool:
-    """Whether the printed number is this value, in as many digits."""
+    """Whether the printed number is this value to the digits printed."""
     return prints_as(value, printed.number(label).literal)
 
 
 def _terms(printed: Statement) -> Fraction:
-    """The printed formula in numbers, with β = 1."""
+    """Return the terms of the printed formula as numbers, with β = 1."""
     value = printed.relation().links({"k": Fraction(YEAR, STEP), "n": N, "m": M, "beta": 1}, Fraction)
     return Fraction(value[0].left if value else _value(printed))
 
@@ -90,7 +90,7 @@ def second_coefficient(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("s12.example-formula-8"))
 def formula_8(printed: Statement) -> Finding:
-    """Half the distance of the decimal numbers above 1: from there on, and not below, 1 + β rounds up."""
+    """Return half the spacing of the decimal numbers above 1, the smallest β for which 1 + β rounds up."""
     precisions, same = range(1, 9), 0
     for t in precisions:
         fl = FloatFormat(10, t).round
@@ -135,7 +135,7 @@ def second_beta(printed: Statement) -> Finding:
 
 @cache
 def _digits(which: int) -> tuple[int, int, float]:
-    """Digits that the formula needs, that the printed β needs, and those of the printed β as a real number."""
+    """Return the digits that the formula requires, those that the printed β requires, and the latter unrounded."""
     place = ("example-beta-first", "example-beta-second")[which]
     beta = statement(f"hung1982.III.s12.{place}").number("beta").value
     needed = report_bounds.precision_for_coefficient(coefficients()[which])

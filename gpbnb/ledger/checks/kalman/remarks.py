@@ -31,7 +31,7 @@ from gpbnb.ledger.statements import Statement
 
 @cache
 def refined() -> tuple[int, int, float]:
-    """Small filters in four and eight digits beside exact ones: bounds tried, violations, median of bound/error."""
+    """Compare small filters in four and eight digits with exact ones: bounds, violations, median of bound / error."""
     rng = np.random.default_rng(125)
     tried, violations, factors = 0, 0, []
     for fmt, second in ((FOUR, False), (FloatFormat(10, 8), True)):
@@ -73,7 +73,7 @@ def refined() -> tuple[int, int, float]:
 
 
 def as_float(entries: NDArray[Any]) -> NDArray[np.float64]:
-    """Nearest float64 of Fractions."""
+    """Return the nearest float64 of Fractions."""
     return np.asarray(entries, dtype=object).astype(np.float64)
 
 
@@ -95,7 +95,7 @@ def several_approaches(printed: Statement) -> Finding:
 
 @cache
 def year_again() -> bool:
-    """Whether ten steps of a stored year, emulated again, give the stored errors."""
+    """Whether ten steps of a stored year give the stored errors when emulated again."""
     stored = year.load()[0]
     case = stored.case
     if case.fmt is None:
@@ -109,7 +109,7 @@ def year_again() -> bool:
 
 @cache
 def needed_precision(base: int) -> int | None:
-    """Fewest digits, of those stored, from which on the drift rates, at all checkpoints, stay within the goal."""
+    """Return the fewest stored digits from which on the drift rates meet the tolerance at all checkpoints."""
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
         comparable = found.case._replace(precision=0) == year_cases.Case(

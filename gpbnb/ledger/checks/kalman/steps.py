@@ -67,7 +67,7 @@ def rounded_gain(printed: Statement) -> Finding:
 
 @cache
 def division_errors() -> tuple[Fraction, int]:
-    """Largest relative error of 1/r in four digits, in units of β, and among how many numbers."""
+    """Return the largest relative error of 1/r in four digits, in units of β, and the count of numbers tried."""
     rng = np.random.default_rng(99)
     numbers = [Fraction(int(d), 1000) for d in rng.integers(1000, 10000, 200)]
     return max(abs(FOUR.round(1 / r) * r - 1) for r in numbers) / FOUR.unit_roundoff, len(numbers)

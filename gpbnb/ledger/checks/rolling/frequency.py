@@ -1,4 +1,4 @@
-"""Checks of section 4: a deroll frequency that is off."""
+"""Checks of section 4: a wrong deroll frequency."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gpbnb.rolling.theory import DRIFTS, PERIOD
 
 
 def half_unit(fmt: FloatFormat) -> Fraction:
-    """Half a unit of the last place of ω_r, whose first digit is the second decimal: an error in rad/s."""
+    """Return half a unit in the last place of ω_r in rad/s; its first digit is the second decimal."""
     return Fraction(1, 10) * Fraction(1, 2) / Fraction(10) ** fmt.precision
 
 

@@ -63,7 +63,7 @@ def spread(printed: Statement) -> Finding:
         return float(theory.ramp_density(1.0, 1.0, cycles) / theory.ramp_density(1.0, 1.0, 1e-9)) - 0.5
 
     half = optimize.brentq(excess, 0.01, 2.0)
-    # A signal without a spread has nothing a whole number of cycles away; a ramp has 1/(pi m)^2 of its peak.
+    # At a distance of m cycles, a constant signal has no density, and a ramp has 1/(pi m)^2 of its peak.
     beside = excess(1.0) + 0.5
     found = "nonzero" if math.isclose(beside, math.pi**-2) else "zero"
     return compare(

@@ -34,7 +34,7 @@ def no_direct_error(printed: Statement) -> Finding:
 
 @CHECKS.add(entry("s3.signal-to-noise"))
 def signal_to_noise(printed: Statement) -> Finding:
-    """Of a fitted drift, in one dimension: signal by (4), noise exactly, over 100 turns."""
+    """Return signal / noise of a drift fitted in one dimension over 100 turns; signal by (4), exact noise."""
     slope = theory.slope_weights(6000)
     phase = theory.roll_phase(np.arange(6000), PERIOD)
     angles = np.radians([0, 1, 60])
@@ -64,7 +64,7 @@ def one_degree(printed: Statement) -> Finding:
 
 
 def four_digits(angle: sp.Expr) -> sp.Rational:
-    """A cosine to four decimals, as the report has it."""
+    """Return a cosine to four decimals, as in the report."""
     return sp.Rational(round(sp.N(sp.cos(angle), 30) * 10**4), 10**4)
 
 

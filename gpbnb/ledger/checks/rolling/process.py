@@ -36,7 +36,7 @@ LOST = "the picture is missing from the scan, which keeps only its caption"
 
 
 def fixed(value: Any) -> Any:
-    """A signal as a function of time, with its value at the time of a case."""
+    """Return a signal as a function of time, with its value at the time of a case."""
     return lambda time: value
 
 
@@ -48,7 +48,7 @@ _NUMBERS = (
 
 @cache
 def signals() -> tuple[Names, ...]:
-    """Two instants with different signals, noises and angles, and what the model makes of them."""
+    """Return two instants with different signals, noises and angles, and the model's results for them."""
     found = []
     for numbers in _NUMBERS:
         sx, sy, n1, n2, rate, time, theta = (sp.Rational(v) for v in numbers)
@@ -85,12 +85,12 @@ def signals() -> tuple[Names, ...]:
 
 
 def complex_pair(x: sp.Expr, y: sp.Expr, angle: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Real and imaginary part of (x + iy) e^{i angle}."""
+    """Return real and imaginary part of (x + iy) e^{i angle}."""
     return x * sp.cos(angle) - y * sp.sin(angle), x * sp.sin(angle) + y * sp.cos(angle)
 
 
 def low_frequency(signal: sp.Expr, offset: sp.Expr) -> sp.Expr:
-    """What a filter keeps of a signal rolled and derolled with a phase offset: the mean over the roll phase."""
+    """Return the mean over the roll phase, which a filter keeps of a signal rolled and derolled with a phase offset."""
     angle = sp.Symbol("angle", real=True)
     product = sp.expand(sp.cos(angle) * sp.cos(angle + offset), trig=True)
     return sp.integrate(product, (angle, 0, 2 * sp.pi)) / (2 * sp.pi) * signal
@@ -164,7 +164,7 @@ def equivalent(printed: Statement) -> Finding:
     found = stages()
     turn = np.exp(1j * theory.roll_phase(np.arange(1200), PERIOD))
     error = [float(np.max(abs(found["rolled"] * factor - found["signal"]))) for factor in (turn, 1 / turn)]
-    # The rolled signal has its spectrum at the roll frequency: rolling modulates, and derolling undoes it.
+    # Rolling moves the spectrum of the signal to the roll frequency, and derolling moves it back.
     peak = abs(np.fft.fftfreq(1200)[np.argmax(abs(np.fft.fft(found["rolled"])))] * 1200)
     moved = "modulation" if 18 <= peak <= 22 else "demodulation"
     undone = "demodulation" if error[0] < 1e-12 * np.max(abs(found["signal"])) < error[1] else "modulation"
@@ -249,7 +249,7 @@ def eq7(printed: Statement) -> Finding:
 
 @cache
 def recursion() -> tuple[experiment.Rotation, bool]:
-    """A product of rounded rotations, and whether each rotation is that before times a fixed one."""
+    """Return a product of rounded rotations, and whether each rotation is the previous one times a fixed one."""
     n, step = sp.symbols("n delta", real=True)
     one_more = derivation.deroll(step) * derivation.deroll(n * step) - derivation.deroll((n + 1) * step)
     found = experiment.recursion(TEN, PERIOD, (60, 3600))

@@ -20,7 +20,7 @@ COUNTS = {"four": 4, "four hundred": 400}
 
 @cache
 def beyond_the_law() -> tuple[float, float]:
-    """Share of sums of 1000 terms that exceed a law meant to fail in 1 %: of varied terms, and of equal terms."""
+    """Return the shares of sums of 1000 varied or equal terms that exceed a law meant to fail for 1 %."""
     varied, constant = (
         experiment.growth(FloatFormat(2, 11), kind, (1000,), 30, np.random.default_rng(1)).beyond_probabilistic()[0]
         for kind in ("like signs", "constant")
@@ -84,7 +84,7 @@ def rounding_or_chopping(printed: Statement) -> Finding:
 
 
 def scatter(n: int) -> float:
-    """Standard deviation of the sample standard deviation of n normal deviates, over the true one."""
+    """Return the relative standard deviation of the sample standard deviation of n normal numbers."""
     mean = math.sqrt(2 / (n - 1)) * math.exp(math.lgamma(n / 2) - math.lgamma((n - 1) / 2))
     return math.sqrt(1 - mean**2)
 

@@ -19,12 +19,12 @@ from gpbnb.ledger.statements import Statement
 
 
 def norm(matrix: Matrix) -> Fraction:
-    """The norm (22), the largest column sum; TypeError for anything but a matrix."""
+    """Return norm (22), the largest column sum; TypeError for anything but a matrix."""
     return column_sum_norm(_matrix(matrix).entries)
 
 
 def vector_norm(vector: Matrix) -> Fraction:
-    """The norm (21), the largest entry; TypeError for anything but a vector."""
+    """Return norm (21), the largest entry; TypeError for anything but a vector."""
     return max_norm(_matrix(vector).entries)
 
 
@@ -65,7 +65,7 @@ def matrix_norm_defined_1982() -> Finding:
 
 @cache
 def norm_instances(shape: tuple[int, ...]) -> tuple[dict[str, Any], ...]:
-    """Random arrays; besides, a multiple of the first array as the second, and zero as the first."""
+    """Return pairs of random arrays, a pair of an array and its multiple, and a pair that starts with zero."""
     rng = np.random.default_rng(7)
     size = int(np.prod(shape))
 
@@ -125,7 +125,7 @@ def sum_error_defined() -> Finding:
 
 @cache
 def rounded_sums() -> tuple[dict[str, Any], ...]:
-    """Sums of matrices in four digits: random ones, differences of nearly equal numbers, and ties."""
+    """Return sums of matrices in four digits: random ones, differences of nearly equal numbers, and ties."""
     rng = np.random.default_rng(24)
 
     def random(rows: int, columns: int, power: int) -> Any:

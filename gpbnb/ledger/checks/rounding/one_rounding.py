@@ -146,7 +146,7 @@ def _example_names() -> dict[str, Any]:
 
 
 def _rounded_to_print(relation: Relation, names: Names, beta: str) -> bool:
-    """Whether a chain of numbers is right, where a long quotient is printed with five digits, and bounded by β."""
+    """Whether a chain of numbers is right and bounded by β; a long quotient is printed with five digits."""
     five = FloatFormat(10, 5)
     for link in relation.links(names, number=lambda q: q):
         if link.symbol == "==":
@@ -267,7 +267,7 @@ OPERATIONS: dict[str, Callable[[Any, Any], Any]] = {
 
 @cache
 def operations() -> tuple[dict[str, Any], ...]:
-    """Single operations in four digits with their rounded results; some of them are ties just above a power of ten."""
+    """Return single operations in four digits with their rounded results; some are ties just above a power of ten."""
     rng = np.random.default_rng(16)
     x = [Fraction(int(k), 1000) for k in rng.integers(1000, 9999, 40) * rng.choice([-1, 1], 40)]
     y = [Fraction(int(k), 1000) * Fraction(10) ** int(e) for k, e in rng.integers([1000, -2], [9999, 3], (40, 2))]
@@ -288,7 +288,7 @@ def operations() -> tuple[dict[str, Any], ...]:
 
 @cache
 def all_pairs() -> tuple[int, Fraction]:
-    """Operations on all pairs of two-digit decimal numbers, and the largest relative error over β."""
+    """Return the number of operations on all pairs of two-digit decimal numbers, and the largest relative error / β."""
     fmt = FloatFormat(10, 2)
     x = fmt.array([sign * m for m in range(10, 100) for sign in (1, -1)])
     y = fmt.array([m * Fraction(10) ** e for m in range(10, 100) for e in (0, -1)])

@@ -37,7 +37,7 @@ def derived() -> bool:
 
 
 def rounded_dot(a: Sequence[Fraction], b: Sequence[Fraction], epsilon: Sequence[Fraction]) -> Fraction:
-    """An inner product in the order of section 9.1, with the errors numbered as there."""
+    """Return an inner product in the order of section 9.1, with errors numbered as in that section."""
     errors = iter(epsilon)
     computed = a[0] * b[0] * (1 + next(errors))
     for p, q in zip(a[1:], b[1:], strict=True):
@@ -57,7 +57,7 @@ def _dot_names(a: list[Fraction], b: list[Fraction], epsilon: list[Fraction]) ->
 
 @cache
 def dots(sizes: tuple[int, ...]) -> tuple[dict[str, Any], ...]:
-    """Inner products with random errors, and products of one sign whose errors are all β."""
+    """Return inner products with random errors, and with products of one sign whose errors are all β."""
     rng = np.random.default_rng(26)
     instances = []
     for n in sizes:
@@ -98,14 +98,14 @@ def dot_error(printed: Statement) -> Finding:
 
 @cache
 def dot_weights(n: int) -> list[int]:
-    """Roundings of each product of an inner product, counted in its derived first-order error."""
+    """Count the roundings of each product in an inner product, from its derived first-order error."""
     error, products, eps = derivation.dot_error(n)
     return [derivation.roundings_of(error, product, eps) for product in products]
 
 
 @cache
 def worst_twelve() -> float:
-    """The largest error of 12 products in three bits, over bound (26)."""
+    """Return the largest error / bound (26) for an inner product of 12 terms in three bits."""
     return experiment.worst_sum(FloatFormat(2, 3), 12, range(-5, 4), products=True).ratio("(26)")
 
 
@@ -145,13 +145,13 @@ def relative_dot() -> Finding:
 
 
 def rounded_product(a: Any, b: Any, errors: Any) -> Any:
-    """A matrix product whose entries are inner products; ``errors(count)`` gives the errors of one of them."""
+    """Return a matrix product whose entries are inner products; ``errors(count)`` gives the errors of an entry."""
     n = a.shape[1]
     return exact([[rounded_dot(list(row), list(column), errors(2 * n - 1)) for column in b.T] for row in a])
 
 
 def _dominated(shape: tuple[int, int]) -> Any:
-    """A matrix whose first entry dwarfs the others: the bounds of products are attained."""
+    """Return a matrix whose first entry is far larger than the others, so that products attain their bounds."""
     matrix = np.full(shape, Fraction(1, 10**4), dtype=object)
     matrix[0, 0] = Fraction(1)
     return matrix
@@ -214,7 +214,7 @@ def entry_bounds(printed: Statement) -> Finding:
 def matmul_bound(printed: Statement) -> Finding:
     instances = []
     for names in matrix_products():
-        # The second form names β through b and t: (8) with one digit more than forty.
+        # The second form expresses β by b and t, as (8) with forty-one digits.
         instances.append({**names, "b": Fraction(10), "t": Fraction(41), "beta": Fraction(1, 2) / 10**40})
         instances[-1]["C_tilde"] = Fraction(1, 2) * names["C_tilde"]
     found = judge(relations(printed), instances, first_order=True)
@@ -273,7 +273,7 @@ def _chain_names(factors: list[Any], errors: Any) -> dict[str, Any]:
 
 @cache
 def chains() -> tuple[dict[str, Any], ...]:
-    """Chains of three matrices with random errors, a product that cancels, and chains that attain (32)."""
+    """Return chains of three matrices with random errors, a product that cancels, and chains that attain (32)."""
     rng = np.random.default_rng(32)
     shapes = ((2, 3), (3, 4), (4, 2))
     instances = [
@@ -286,7 +286,7 @@ def chains() -> tuple[dict[str, Any], ...]:
 
 
 def cancelling_product() -> experiment.Trial:
-    """The smallest counterexample to (30): a row and a column whose product cancels; 4 digits."""
+    """Return the smallest counterexample to (30), a row and a column in 4 digits whose product cancels."""
     return experiment.chain_trial([FOUR.array([["1.001", "-1.002"]]), FOUR.array([["1.001"], ["1"]])])
 
 
@@ -374,7 +374,7 @@ def _example_names(factors: list[Any], d: Any, errors: Any, size: int) -> dict[s
 
 @cache
 def example_instances() -> tuple[dict[str, Any], ...]:
-    """R = ABC + D with square matrices: random ones, and one whose product AB cancels."""
+    """Return instances of R = ABC + D with square matrices: random ones, and one whose product AB cancels."""
     rng = np.random.default_rng(9)
     instances = []
     for n in (2, 3):

@@ -59,7 +59,7 @@ def infinite_digits(printed: Statement) -> Finding:
 
 
 def _digits(printed: Statement, names: Names) -> bool:
-    """Whether u has the printed number of digits, t, and no fewer in general."""
+    """Whether u has the printed number of digits, t, and generally no fewer."""
     count = {"$t$": names["t"], "$t+1$": names["t"] + 1}[printed.says("digits")]
     return bool((names["u"] * names["b"] ** names["t"]).denominator == 1 and count == names["t"])
 
@@ -161,7 +161,7 @@ def same_sign(printed: Statement) -> Finding:
 
 
 def _case_is_printed(number: Relation, rest: tuple[Relation, ...]) -> tuple[bool, bool, Fraction]:
-    """Whether the split of an example (3) is the printed one, whether the rest is right, and the number."""
+    """Whether the split of an example (3) is the printed one, and whether the rest and the number are right."""
     x = Fraction(number.links({}, number=lambda q: q)[0].right)
     names = number_names(x)
     (condition,) = rest[0].links(names, number=lambda q: q)

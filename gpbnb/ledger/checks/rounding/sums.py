@@ -25,7 +25,7 @@ def defined() -> Finding:
 
 
 def _sum_names(x: list[Fraction], epsilon: list[Fraction]) -> dict[str, Any]:
-    """A sum and its computed value, where the k-th addition has the relative error ``epsilon[k]``."""
+    """Return a sum and its computed value, where the k-th addition has the relative error ``epsilon[k]``."""
     computed = x[0]
     for term, e in zip(x[1:], epsilon, strict=True):
         computed = (computed + term) * (1 + e)
@@ -38,7 +38,7 @@ def _sum_names(x: list[Fraction], epsilon: list[Fraction]) -> dict[str, Any]:
 
 @cache
 def sums(n: int | None = None) -> tuple[dict[str, Any], ...]:
-    """Sums of n terms, or of 3, 4 and 6: random ones, and sums that attain the bounds (18)."""
+    """Return sums of n terms, or of 3, 4 and 6 terms: random ones, and sums that attain the bounds (18)."""
     rng = np.random.default_rng(18)
     instances = []
     for count in (n,) if n else (3, 4, 6):
@@ -70,7 +70,7 @@ def derived() -> bool:
 
 @cache
 def _coarse_is_wider() -> bool:
-    """Whether the last member of (18), with the largest term for each, is never smaller than the one before it."""
+    """Whether the last member of (18), which uses the largest term for all, is never smaller than the one before."""
     return all(
         theory.printed_sum_bound_coarse(trial.inputs[0], trial.fmt.unit_roundoff) >= trial.bounds["1984 (18)"]
         for trial in experiment.survey("sum")
@@ -79,7 +79,7 @@ def _coarse_is_wider() -> bool:
 
 @cache
 def _tie() -> float:
-    """Error over (18) of a sum of 100 terms in four digits whose additions are all ties."""
+    """Return error / (18) of a sum of 100 terms in four digits whose additions are all ties."""
     return experiment.tie_sum(FOUR, 100).ratio("1984 (18)")
 
 
@@ -98,7 +98,7 @@ def sum_bound_1984(printed: Statement) -> Finding:
 
 @cache
 def _like_signs() -> tuple[int, int]:
-    """Violations of (18) of 1982 by sums of terms of one sign, and how many sums."""
+    """Count the violations of (18) of 1982 by sums of terms of one sign, and the sums."""
     like = [
         experiment.sum_trial(experiment.random_numbers(np.random.default_rng(seed), fmt, (5,), "like signs"))
         for fmt in experiment.SURVEYED
@@ -126,7 +126,7 @@ def sum_bound_1982(printed: Statement) -> Finding:
 def _quotient_names(
     x: list[Fraction], y: list[Fraction], epsilon: list[Fraction], eta: list[Fraction]
 ) -> dict[str, Any]:
-    """A product over a product, computed from left to right, with the error of each operation."""
+    """Return a product divided by a product, computed from left to right, with the error of each operation."""
     true = computed = x[0]
     for factor, e in zip(x[1:], epsilon, strict=True):
         true, computed = true * factor, computed * factor * (1 + e)
@@ -141,7 +141,7 @@ def _quotient_names(
 
 @cache
 def quotients(sizes: tuple[tuple[int, int], ...]) -> tuple[dict[str, Any], ...]:
-    """Quotients of n factors and m divisors, with random errors and with errors that are all β."""
+    """Return quotients of n factors and m divisors, with random errors and with errors that are all β."""
     rng = np.random.default_rng(20)
     instances = []
     for n, m in sizes:
@@ -166,7 +166,7 @@ def quotient_example(printed: Statement) -> Finding:
 
 @cache
 def worst_twenty() -> experiment.Trial:
-    """Twenty factors of two digits whose product has the largest relative error."""
+    """Return the twenty factors of two digits whose product has the largest relative error."""
     return experiment.worst_product(FloatFormat(10, 2), 20)
 
 
