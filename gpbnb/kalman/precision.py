@@ -27,7 +27,7 @@ from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 MOST_SIMULATED = 10**8
@@ -211,7 +211,7 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
     if measured.ndim != 2 or measured.shape[1] != model.m or not len(measured) or steps not in (None, len(measured)):
         count = f"{steps} steps" if steps else "steps, at least one"
         column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
-        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else str(z)
+        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else "a single number"
         raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
@@ -247,7 +247,7 @@ def _error_over_tolerance(
         if run.indefinite is not None:
             lost = f"a computed variance was not positive at step {run.indefinite}"
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
-    ratio = float((np.abs(errors[:, asked]) / tolerances[asked]).max())
+    ratio = largest_ratio(np.abs(errors[:, asked]), tolerances[asked])
     return ratio, "the bound says nothing" if math.isinf(ratio) else ""
 
 
@@ -277,4 +277,4 @@ def _guaranteed(
     if not found.for_ever:
         return math.inf, found.why
     errors = found.bound if basis == "guarantee" else 3 * probable_error(found)
-    return float((errors[asked] / tolerances[asked]).max()), ""
+    return largest_ratio(errors[asked], tolerances[asked]), ""
