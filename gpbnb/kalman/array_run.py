@@ -55,7 +55,8 @@ class ArrayRun:
     ) -> None:
         if model.has_inputs and form in _HUNG:
             raise ValueError(
-                f'got known inputs in the {form} form, which is not defined with them; needed another, as "innovation"'
+                f"got known inputs in the {form} form, which is not defined with them; needed another "
+                'form, such as "innovation"'
             )
         if not isinstance(fmt.backend, Compiled):
             raise ValueError(

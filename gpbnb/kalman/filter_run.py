@@ -73,7 +73,7 @@ class Run:
         self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
         if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
             raise ValueError(
-                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed steps of 1 or more, each above the last"
+                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
             )
         if fmt is not None and not isinstance(fmt.backend, Compiled):
             raise ValueError(
@@ -261,7 +261,7 @@ def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
     ValueError : no steps, or none per decade.
     """
     if steps < 1 or per_decade < 1:
-        raise ValueError(f"got {steps} steps, {per_decade} a decade; needed both at least 1")
+        raise ValueError(f"got {steps} steps, {per_decade} per decade; needed both at least 1")
     grid = np.rint(10 ** (np.arange(0, int(math.log10(steps) * per_decade) + 1) / per_decade))
     return tuple(sorted({int(k) for k in grid if k <= steps} | {steps}))
 
