@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from gpbnb.wordlength.models import read_model
     from gpbnb.wordlength.records import survey_records
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 # fmt: off
 NAMED_FORMATS = (
     "BINARY16", "BINARY32", "BINARY64", "BINARY128", "BFLOAT16", "TF32", "FP8_E4M3", "FP8_E5M2",

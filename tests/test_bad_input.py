@@ -188,6 +188,25 @@ def test_budgets(text):
     accepted(budget.parse, "name,kind,form,error_mas\n" + text)
 
 
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"z": "1e999999"}, "got a single number; needed one for each of the 3 steps"),
+        ({"z": np.full((3, 1), np.inf)}, "got inf for measurement 0 of step 1"),
+    ],
+)
+def test_measurements_that_are_none(given, message):
+    with pytest.raises(ValueError, match=message):
+        required_precision(**{"model": MODEL, "steps": 3, "tolerance": 0.1, "z": Z} | given)
+
+
+@pytest.mark.parametrize("model", [MODEL, LinearSystem([["0.3"]], [["0.1"]])])
+def test_a_tolerance_that_no_precision_meets_gives_no_warning(model):
+    found = required_precision(model, 3, 5e-324, z=Z)
+    assert found.fmt is None
+    assert found.tried[-1][1] > 1
+
+
 def test_too_many_steps_are_refused_before_they_are_simulated():
     with pytest.raises(ValueError, match="got 1,000,000,000,000 steps to simulate; needed at most"):
         required_precision(MODEL, 10**12, 0.1)

@@ -82,7 +82,8 @@ def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
     c = len(checkpoints.steps)
     if checkpoints.steps != true.steps[:c]:
         raise ValueError(
-            f"got checkpoint steps {checkpoints.steps} and, of the reference, {true.steps}; needed the same"
+            f"got checkpoint steps {checkpoints.steps} for the runs and {true.steps} for the "
+            "reference; needed equal steps"
         )
     x, K, P = (
         (each - other[:c]).astype(np.float64)

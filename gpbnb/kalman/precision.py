@@ -27,7 +27,7 @@ from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 MOST_SIMULATED = 10**8
@@ -108,8 +108,9 @@ def required_precision(
             )
     if z is None and steps > MOST_SIMULATED:
         raise ValueError(
-            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: they take hours; try fewer, and see "
-            "how the answer grows: gpbnb.wordlength.study.required_precision_by_steps"
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; "
+            "try fewer, and see how the answer grows with "
+            "gpbnb.wordlength.study.required_precision_by_steps"
         )
     if z is None:
         z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
@@ -179,7 +180,7 @@ def survey(
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
-        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
+        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
     formats = _formats(base, precisions, rounding)
     checkpoint_steps = log_spaced(len(measured), 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
@@ -211,8 +212,8 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
     if measured.ndim != 2 or measured.shape[1] != model.m or not len(measured) or steps not in (None, len(measured)):
         count = f"{steps} steps" if steps else "steps, at least one"
         column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
-        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else str(z)
-        raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
+        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else "a single number"
+        raise ValueError(f"got {length}; needed one measurement for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
         raise ValueError(
@@ -247,7 +248,7 @@ def _error_over_tolerance(
         if run.indefinite is not None:
             lost = f"a computed variance was not positive at step {run.indefinite}"
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
-    ratio = float((np.abs(errors[:, asked]) / tolerances[asked]).max())
+    ratio = largest_ratio(np.abs(errors[:, asked]), tolerances[asked])
     return ratio, "the bound says nothing" if math.isinf(ratio) else ""
 
 
@@ -277,4 +278,4 @@ def _guaranteed(
     if not found.for_ever:
         return math.inf, found.why
     errors = found.bound if basis == "guarantee" else 3 * probable_error(found)
-    return float((errors[asked] / tolerances[asked]).max()), ""
+    return largest_ratio(errors[asked], tolerances[asked]), ""

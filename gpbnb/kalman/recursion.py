@@ -15,7 +15,7 @@ from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.missing import real_numbers
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio
 
 Recursion = Callable[..., Any]
 """A function ``run(fmt, z)``, or ``run(fmt)`` without z, that returns the outputs of all steps in the format."""
@@ -97,10 +97,10 @@ def _question(
     true = np.asarray(long.to_fractions(), dtype=object)
     tolerances = checked_tolerance(tolerance, true.shape[1], "outputs", base, basis)
     asked = np.isfinite(tolerances)
-    off = _largest(np.asarray(short.to_fractions(), dtype=object) - true)[asked] / tolerances[asked]
-    if not off.max() <= SETTLED:
+    off = largest_ratio(_largest(np.asarray(short.to_fractions(), dtype=object) - true)[asked], tolerances[asked])
+    if not off <= SETTLED:
         raise ValueError(
-            f"got a function whose reference in {REFERENCE_DIGITS[base][0]} digits is {off.max():.2g} of the tolerance "
+            f"got a function whose reference in {REFERENCE_DIGITS[base][0]} digits is {off:.2g} of the tolerance "
             f"from that in {REFERENCE_DIGITS[base][1]}; needed one that settles: do comparisons decide between results "
             "far apart?"
         )
@@ -110,7 +110,7 @@ def _question(
             found = np.asarray(_outputs(run, fmt, inputs, len(true)).to_fractions(), dtype=object)
         except (ZeroDivisionError, OverflowError, NegativeRootError, np.linalg.LinAlgError) as fault:
             return math.inf, f"the function stops: {fault}"
-        return float((_largest(found - true)[asked] / tolerances[asked]).max()), ""
+        return largest_ratio(_largest(found - true)[asked], tolerances[asked]), ""
 
     return error
 

@@ -111,3 +111,9 @@ def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: s
     if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     return np.broadcast_to(tolerances, (count,))
+
+
+def largest_ratio(errors: NDArray[np.float64], tolerances: NDArray[np.float64]) -> float:
+    """The largest error over its tolerance; infinite beyond the range of float64."""
+    with np.errstate(over="ignore"):
+        return float((errors / tolerances).max())

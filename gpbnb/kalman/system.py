@@ -29,7 +29,7 @@ from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import advance
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import rounding_named, whole_number
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,7 @@ def required_system_precision(
             errors = _observed(system, u, fmt, true) if true is not None else _bounded(system, fmt, largest, basis)
         except (ValueError, OverflowError) as fault:
             return math.inf, str(fault)
-        ratio = float((errors / tolerances).max())
+        ratio = largest_ratio(errors, tolerances)
         return (ratio, "") if ratio < math.inf else (math.inf, "an output is not finite")
 
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
