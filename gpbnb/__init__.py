@@ -8,7 +8,9 @@ The public interface::
     linalg                     dot, matmul, lu, solve, inv with every operation rounded
     LinearModel                a linear dynamic model for a Kalman filter
     LinearSystem               a linear filter, controller or observer with known inputs
-    required_precision         the smallest precision that keeps a filter within a tolerance
+    required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
+    survey_records             many measurement records in many formats at once
+    read_model                 a model from a TOML file, SciPy, python-control or FilterPy
 
 Each chapter of the book has a sub-package: rounding, inversion, kalman, rolling, integration, budget, geometry and
 wordlength. ``gpbnb.ledger`` judges every statement printed in the three documents.
@@ -22,27 +24,41 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.array import FloatArray
     from gpbnb.arithmetic.fixed import FixedFormat
     from gpbnb.arithmetic.formats import FloatFormat, Rounding
+    from gpbnb.arithmetic.named import (
+        BFLOAT16,
+        BINARY16,
+        BINARY32,
+        BINARY64,
+        BINARY128,
+        DECIMAL32,
+        DECIMAL64,
+        DECIMAL128,
+        FP8_E4M3,
+        FP8_E5M2,
+        IBM_704,
+        IBM_HEX32,
+        IBM_HEX64,
+        TF32,
+    )
     from gpbnb.kalman.model import LinearModel
     from gpbnb.kalman.precision import required_precision
     from gpbnb.kalman.system import LinearSystem
+    from gpbnb.wordlength.models import read_model
+    from gpbnb.wordlength.records import survey_records
 
-__version__ = "0.1.0"
-__all__ = [
-    "FixedFormat",
-    "FloatArray",
-    "FloatFormat",
-    "LinearModel",
-    "LinearSystem",
-    "Rounding",
-    "linalg",
-    "required_precision",
-]
-
+__version__ = "0.2.0"
 # fmt: off
 NAMED_FORMATS = (
     "BINARY16", "BINARY32", "BINARY64", "BINARY128", "BFLOAT16", "TF32", "FP8_E4M3", "FP8_E5M2",
     "DECIMAL32", "DECIMAL64", "DECIMAL128", "IBM_HEX32", "IBM_HEX64", "IBM_704",
 )
+
+__all__ = [
+    "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP8_E4M3",
+    "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32", "FixedFormat", "FloatArray",
+    "FloatFormat", "LinearModel", "LinearSystem", "Rounding", "linalg", "read_model", "required_precision",
+    "survey_records",
+]
 # fmt: on
 
 _HOME = {
@@ -52,7 +68,9 @@ _HOME = {
     "LinearModel": "gpbnb.kalman.model",
     "LinearSystem": "gpbnb.kalman.system",
     "Rounding": "gpbnb.arithmetic.formats",
+    "read_model": "gpbnb.wordlength.models",
     "required_precision": "gpbnb.kalman.precision",
+    "survey_records": "gpbnb.wordlength.records",
 }
 
 
@@ -68,4 +86,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*__all__, *NAMED_FORMATS})
+    return sorted(__all__)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from decimal import Decimal
 from fractions import Fraction
 
@@ -19,8 +20,12 @@ from gpbnb.kalman.simulation import Simulation
 from gpbnb.rounding import theory
 from gpbnb.sweeps import plain_integer, plain_number
 from gpbnb.wordlength.models import read_model
+from gpbnb.wordlength.records import survey_records
 
-MANY = settings(derandomize=True, deadline=None, database=None, max_examples=400)
+# GPBNB_EXAMPLES=20000 tries more.
+EXAMPLES = int(os.environ.get("GPBNB_EXAMPLES", "400"))
+MANY = settings(derandomize=True, deadline=None, database=None, max_examples=EXAMPLES)
+SLOW = settings(MANY, max_examples=EXAMPLES // 4)
 DOCUMENTED = (ValueError, TypeError, OverflowError, ZeroDivisionError)
 
 numbers = st.one_of(
@@ -42,9 +47,12 @@ matrices = st.one_of(
         [np.zeros((0, 0)), np.zeros((2, 3)), np.zeros((1, 1, 1, 1)), np.full((2, 2), np.nan), np.eye(2, dtype=complex)]
     ),
 )
+TRIED = {"accepted": 0, "refused": 0}
 GOOD = {"Phi": [["0.5"]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]}
 MODEL = LinearModel(**GOOD)
 Z = np.ones((3, 1))
+
+functions = st.sampled_from([lambda k: [[1]], lambda k: k, lambda k: None, lambda k: np.eye(k), lambda: 1, int, len])
 
 
 def accepted(call, *arguments, **keywords):
@@ -59,14 +67,66 @@ def refusal(call):
     try:
         call()
     except DOCUMENTED as error:
+        TRIED["refused"] += 1
         return str(error)
+    TRIED["accepted"] += 1
     return None
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _count():
+    """With GPBNB_EXAMPLES, show how many calls were tried."""
+    yield
+    if "GPBNB_EXAMPLES" in os.environ:
+        print(f"\n{sum(TRIED.values()):,} calls, {TRIED['refused']:,} refused")
 
 
 @MANY
 @given(st.sampled_from(list(GOOD)), matrices)
 def test_models(letter, value):
     accepted(LinearModel, **(GOOD | {letter: value}))
+
+
+@MANY
+@given(st.sampled_from(["B", "u", "b", "d", "steps", "Phi", "repair"]), st.one_of(matrices, functions))
+def test_models_with_inputs(letter, value):
+    """A model with inputs is refused, or its inputs have the shapes of the states and measurements."""
+    asked = GOOD | {"B": [[1]], "u": [[1], [2]], "b": [1], "d": [1]} | {letter: value}
+    found = []
+    if accepted(lambda: found.append(LinearModel(**asked))):
+        (model,) = found
+        assert model.steps is None or (type(model.steps) is not bool and model.steps >= 1)
+        for k in range(model.steps or 2):
+            assert [part.shape for part in model.known(k)] == [(1,), (1,)]
+
+
+@SLOW
+@given(st.sampled_from(["records", "tolerance", "formats", "form", "basis", "steps", "chunk", "model"]), matrices)
+def test_surveys_of_records(name, value):
+    asked = {"model": MODEL, "records": [Z], "tolerance": 0.1, "formats": [FloatFormat(2, 8)]} | {name: value}
+    found = []
+    if accepted(lambda: found.append(survey_records(**asked))):
+        assert found[0].ratios.size
+        assert not np.isnan(found[0].ratios).any()
+
+
+@SLOW
+@given(matrices, st.sampled_from(["value", "z", "tolerance", "steps"]))
+def test_functions_as_models(value, place):
+    """Whatever a function returns or gets: no silent result."""
+    asked = {"steps": 3, "tolerance": 0.1, "z": Z} | ({} if place == "value" else {place: value})
+    run = (lambda fmt, *z: value) if place == "value" else (lambda fmt, *z: z[0] * 1 if z else fmt.array([1, 2, 3]))
+    found = []
+    if accepted(lambda: found.append(required_precision(run, **asked))):
+        assert place != "value"
+        assert found[0].tried
+
+
+@MANY
+@given(st.one_of(matrices, st.sampled_from(["Phi", "", "ud", "Cholesky"])))
+def test_inputs_read_from_a_mapping(value):
+    accepted(read_model, GOOD | {"B": [[1]]}, value)
+    accepted(form_named, value)
 
 
 @MANY
@@ -126,6 +186,25 @@ def test_small_readers_and_bounds(number, values):
 def test_budgets(text):
     accepted(budget.parse, text)
     accepted(budget.parse, "name,kind,form,error_mas\n" + text)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"z": "1e999999"}, "got a single number; needed one for each of the 3 steps"),
+        ({"z": np.full((3, 1), np.inf)}, "got inf for measurement 0 of step 1"),
+    ],
+)
+def test_measurements_that_are_none(given, message):
+    with pytest.raises(ValueError, match=message):
+        required_precision(**{"model": MODEL, "steps": 3, "tolerance": 0.1, "z": Z} | given)
+
+
+@pytest.mark.parametrize("model", [MODEL, LinearSystem([["0.3"]], [["0.1"]])])
+def test_a_tolerance_that_no_precision_meets_gives_no_warning(model):
+    found = required_precision(model, 3, 5e-324, z=Z)
+    assert found.fmt is None
+    assert found.tried[-1][1] > 1
 
 
 def test_too_many_steps_are_refused_before_they_are_simulated():

@@ -148,7 +148,7 @@ async function typesetShown() {
 
 // Once all formulas that are shown have been typeset.
 window.formulasTypeset = new Promise((resolve) => {
-  window.addEventListener("load", async () => {
+  document.addEventListener("DOMContentLoaded", async () => {
     if (window.MathJax?.startup) {
       await MathJax.startup.promise;
       for (const formula of document.querySelectorAll("article .math")) waiting.add(formula);

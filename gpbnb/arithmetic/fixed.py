@@ -23,7 +23,7 @@ from gpbnb.arithmetic.kernels.limited_backends import (
     mixed_tag,
     run_tag,
 )
-from gpbnb.arithmetic.kernels.rules import Limits, Rounding, Rules
+from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rational import exact
 
@@ -62,7 +62,7 @@ class FixedFormat:
     --------
     >>> q15 = FixedFormat(integer_bits=0, fraction_bits=15)
     >>> (q15.array("0.1") * q15.array("0.5")).to_fractions()
-    Fraction(819, 16384)
+    Fraction(1639, 32768)
     """
 
     integer_bits: int
@@ -131,21 +131,25 @@ class FixedFormat:
         """The slow backend that can store every number of this format."""
         return limited_exact(self._rules)
 
-    def run_tag(self, fused: bool = False, sums: Accumulator | None = None) -> Tag:
+    def run_tag(
+        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
+    ) -> Tag:
         """Return the arithmetic for one compiled loop; random roundings start with the first number of the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
         sums : the format that keeps sums of products until they are stored; by default this one.
+        order, block : of the additions in sums of products, as of :func:`gpbnb.linalg.matmul`.
 
         Raises
         ------
-        ValueError : the format has no compiled loops, or none with fused multiply-add or with sums in `sums`.
+        ValueError : the format has no compiled loops, or none with fused multiply-add, with sums in `sums`, or in this
+            order; an unknown order.
         """
         if sums is not None:
-            return mixed_tag(self.run_tag(), sums.run_tag(fused))
-        return run_tag(self.backend, self._rules, fused)
+            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
+        return run_tag(self.backend, self._rules, fused, order, block)
 
     def round(self, value: Any) -> Fraction:
         """Round one number into the format; see :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""
@@ -172,7 +176,7 @@ def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overf
         raise ValueError(f"bits: got {bits}; needed at least 2, one of them the sign")
     largest = max(abs(exact(values)).ravel(), default=Fraction(0))
     if not largest:
-        raise ValueError("got values that are all zero; needed one that is not; leave the variable out")
+        raise ValueError("got values that are all zero; needed at least one nonzero value; omit the variable")
     integer_bits = math.frexp(float(largest))[1]  # largest < 2**integer_bits, apart from the last rounding
     while True:
         fmt = FixedFormat(integer_bits, bits - 1 - integer_bits, rounding, overflow)

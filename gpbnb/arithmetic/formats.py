@@ -26,7 +26,7 @@ from gpbnb.arithmetic.kernels.limited_backends import (
     mixed_tag,
     run_tag,
 )
-from gpbnb.arithmetic.kernels.rules import Limits, Rounding, Rules
+from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules
 from gpbnb.arithmetic.kernels.tags import Tag
 
 __all__ = ["FloatFormat", "Rounding", "prints_as"]
@@ -167,21 +167,27 @@ class FloatFormat:
             return limited_kernel(self._rules)
         return kernel(self.base, self.precision, self.rounding is Rounding.NEAREST)
 
-    def run_tag(self, fused: bool = False, sums: Accumulator | None = None) -> Tag:
+    def run_tag(
+        self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
+    ) -> Tag:
         """Return the arithmetic for one compiled loop; random roundings start with the first number of the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
         sums : the format that keeps sums of products until they are stored; by default this one.
+        order, block : of the additions in sums of products, as of :func:`gpbnb.linalg.matmul`.
 
         Raises
         ------
-        ValueError : the format has no compiled loops, or none with fused multiply-add or with sums in `sums`.
+        ValueError : the format has no compiled loops, or none with fused multiply-add, with sums in `sums`, or in this
+            order; an unknown order.
         """
         if sums is not None:
-            return mixed_tag(self.run_tag(), sums.run_tag(fused))
-        return run_tag(self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused)
+            return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
+        return run_tag(
+            self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused, order, block
+        )
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""

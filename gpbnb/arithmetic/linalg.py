@@ -8,19 +8,19 @@ Operands are FloatArrays of one format, and so are results. If their backend has
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.kernels.limited_backends import check_order
+from gpbnb.arithmetic.kernels.rules import Order
 
 if TYPE_CHECKING:
     from gpbnb.arithmetic.fixed import FixedFormat
     from gpbnb.arithmetic.formats import FloatFormat
-
-Order = Literal["left", "pairwise", "blocked"]
 
 
 class LU(NamedTuple):
@@ -101,12 +101,7 @@ def matmul(
     """
     _check(a, "a")
     _check(b, "b")
-    if order not in ("left", "pairwise", "blocked"):
-        raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
-    if block < 1:
-        raise ValueError(f"block: got {block}; needed at least 1")
-    if fused and order == "pairwise":
-        raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
+    check_order(order, fused, block)
     if sums is not None:
         a.operand(b)
         if sums.base != a.format.base or sums.precision < a.format.precision:

@@ -30,7 +30,9 @@ def step(derivation: Derivation, begins: str) -> Step:
     """
     found = [each for each in derivation.steps if each.name.startswith(begins)]
     if len(found) != 1:
-        raise ValueError(f"got {len(found)} steps that begin with {begins!r}; needed one; name more of it")
+        raise ValueError(
+            f"got {len(found)} steps that begin with {begins!r}; needed exactly one; give more of its beginning"
+        )
     return found[0]
 
 
@@ -155,9 +157,9 @@ def kalman_bound() -> Definitions:
 
 @cache
 def across() -> sp.Expr:
-    """Return the cross drift that a least-squares fit finds for a drift of 1, as a function of the final phase error.
+    r"""Return the cross drift that a least-squares fit finds for a drift of 1, as a function of the final phase error.
 
-    This is the step of the chapter, with :math:`\\sin\\Delta t` in place of its first order :math:`\\Delta t`.
+    This is the step of the chapter, with :math:`\sin\Delta t` in place of its first order :math:`\Delta t`.
     """
     fit = step(rolling.fits(), "off-tuned").left
     (k,) = (each for each in fit.function.free_symbols if each.name == "k")

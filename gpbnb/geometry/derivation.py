@@ -29,6 +29,7 @@ class RollStep(Step):
     """A step that shows cosine and sine of the roll phase as C and S, as the report does."""
 
     def latex(self) -> str:
+        """Typeset the step, with C and S for cosine and sine of the roll phase."""
         text = super().latex()
         for name, letter in (("cos", "C"), ("sin", "S")):
             text = re.sub(rf"\\{name}(\^\{{2\}})?\{{\\left\(\\psi \\right\)\}}", rf"{letter}\1 ", text)

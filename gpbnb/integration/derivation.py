@@ -1,6 +1,6 @@
-"""Derive the algebra of savage2016 again from (1) and (2), and the consequence that each misprint would have.
+r"""Derive the algebra of savage2016 again from (1) and (2), and the consequence that each misprint would have.
 
-Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\\infty} = \\sigma_x^2`.
+Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\infty} = \sigma_x^2`.
 """
 
 from __future__ import annotations
@@ -314,7 +314,7 @@ def transient() -> Derivation:
 
 
 def expansion(terms: int) -> list[sp.Expr]:
-    """Return coefficients of the walk from μ⁻¹ on, by power series of e^{-μ}, with `terms` of them from μ¹ on."""
+    """Return coefficients of μ⁻¹, 1, μ, … in the walk, with `terms` of them from μ on, by power series of e^{-μ}."""
     order = terms + 3
     numerator = [sp.Rational((-1) ** k, sp.factorial(k)) + int(k == 0) for k in range(order)]
     denominator = [-sp.Rational((-1) ** (k + 1), sp.factorial(k + 1)) for k in range(order)]

@@ -1,7 +1,8 @@
 """Derive the algebra of hung1984, ch. II, sections 10-11, again: for 3 × 3 as printed, and for every n.
 
 Matrices are symbols that do not commute, so a step holds for every n. Where entries matter, a step concerns the entry
-(i, j) of any matrix, and sums over the stages of elimination follow by induction."""
+(i, j) of any matrix, and sums over the stages of elimination follow by induction.
+"""
 
 from __future__ import annotations
 

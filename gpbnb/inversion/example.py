@@ -135,6 +135,7 @@ METHODS: dict[str, Callable[[Matrix, Rounder], Matrix]] = {
 
 
 def each_rounded(a: Matrix, fl: Rounder) -> Matrix:
+    """Round each entry of a matrix."""
     out = np.empty_like(a)
     for index in np.ndindex(a.shape):
         entry: Any = a[index]

@@ -50,9 +50,9 @@ MAY_BE_ABSENT = BETTER[1:]
 
 @dataclass(frozen=True)
 class Trial(BoundedError):
-    """One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
+    r"""One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
 
-    `bounds` omits bounds that do not exist for this inverse. `condition` is :math:`\\|A\\|\\|A^{-1}\\|`.
+    `bounds` omits bounds that do not exist for this inverse. `condition` is :math:`\|A\|\|A^{-1}\|`.
     """
 
     family: str

@@ -1,1 +1,1 @@
-"""A Kalman filter with every operation rounded: what (98)-(125) of hung1984, ch. II, promise, and what happens."""
+"""A Kalman filter with every operation rounded, compared with the bounds (98)-(125) of hung1984, ch. II."""

@@ -12,32 +12,32 @@ from gpbnb.kalman import report_bounds, year, year_cases
 
 
 def decimal_digits(fmt: FloatFormat) -> float:
-    """The t for which β = 0.5 × 10^(1-t), (8) of hung1984, ch. II, is the unit roundoff of a format."""
+    """Return the t for which the unit roundoff of a format is β = 0.5 × 10^(1-t), (8) of hung1984, ch. II."""
     return 1 - math.log10(2 * float(fmt.unit_roundoff))
 
 
 def largest(run: year.Year) -> float:
-    """Largest error of the drift angles (mas) and their rates (mas/yr) at any checkpoint of a year.
+    """Return the largest error of the drift angles (mas) and their rates (mas/yr) at any checkpoint of a year.
 
-    The end alone would not do: a run may be near the truth there by luck.
+    The error at the end alone is not enough, because a run may be near the truth there by chance.
     """
     return float(max(np.abs(run.drift).max(), np.abs(run.rate).max()))
 
 
 class Answers(NamedTuple):
-    """Decimal digits that a year asks for, by the two terms of (125) and by emulation."""
+    """Decimal digits that a year requires, by the two terms of (125) and by emulation."""
 
-    #: in mas and mas/yr, for the observed errors.
+    #: In mas and mas/yr, for the observed errors.
     tolerance: float
-    #: the emulated years of the usual model.
+    #: The emulated years of the usual model.
     runs: tuple[year.Year, ...]
-    #: of the closing example.
+    #: The printed digits of the closing example.
     printed: tuple[int, int]
-    #: what its formula gives.
+    #: The digits that its formula gives.
     formula: tuple[int, int]
-    #: the formula with all its faults corrected.
+    #: The digits by the formula with all its faults corrected.
     corrected: tuple[int, int]
-    #: the fewest with which an emulated year stayed within the tolerance, of the formats that were run.
+    #: The fewest digits with which an emulated year stayed within the tolerance.
     observed: dict[Rounding, float]
 
 
@@ -58,7 +58,8 @@ def find_answers(tolerance: float = 1.0) -> Answers:
         enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, tolerance)) is not None]
         if not enough:
             raise ValueError(
-                f"got a tolerance of {tolerance}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
+                f"got a tolerance of {tolerance}; needed one that at least one run of a year meets: "
+                f"the smallest error is {_best(runs):.2g}"
             )
         observed[rounding] = min(enough)
     corrected = report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.ALL_CORRECTED)

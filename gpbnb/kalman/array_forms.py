@@ -8,17 +8,17 @@ from gpbnb.kalman.forms import Form
 
 
 class ArrayForm(StrEnum):
-    r"""Further orders in which one step is computed; in exact arithmetic they agree with those of :class:`Form`.
+    r"""Further orders in which one step is computed; in exact arithmetic they agree with those of ``Form``.
 
     ============  =======================================================================================
     form          gain, covariance, estimate
     ============  =======================================================================================
-    SYMMETRIZED   as ``Form.INNOVATION``; then each pair of entries of the covariance becomes its mean,
+    SYMMETRIZED   as ``Form.INNOVATION``; then each pair of entries of the covariance is replaced by its mean,
                   :math:`(P_{ij} + P_{ji})/2`
     COMPENSATED   as ``Form.INNOVATION``, with Kahan's compensated summation of the estimate
     POTTER        a square root :math:`P = SS^T`: modified Gram-Schmidt on :math:`(\Phi S, Q^{1/2})`, then
                   Potter's update by one measurement after the other
-    CARLSON       the same, with Carlson's update, which keeps S upper triangular: a Cholesky factor
+    CARLSON       the same with Carlson's update, which keeps S upper triangular, as a Cholesky factor
     ============  =======================================================================================
 
     Square roots decorrelate the measurements by the factors :math:`R = UDU^T`, as the UD form does. A step takes

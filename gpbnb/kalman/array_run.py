@@ -1,8 +1,8 @@
 """A filter run with array operations: every form, known inputs and offsets, with or without its contraction bound.
 
-It takes what the compiled loops of :mod:`gpbnb.kalman.filter_run` do not: the forms of
-:class:`~gpbnb.kalman.array_forms.ArrayForm`, and models with known inputs. Without inputs, a form that both have gives
-the same digits.
+It supports what the compiled loops of :mod:`gpbnb.kalman.filter_run` do not: the forms of
+:class:`~gpbnb.kalman.array_forms.ArrayForm`, and models with known inputs. Without inputs, a form that both support
+gives the same digits.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.kalman import array_steps
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
+from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import Contraction, contraction_start
 from gpbnb.kalman.filter_run import Checkpoints, Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import advance_bound
 from gpbnb.kalman.model import LinearModel
 
 _HUNG = (Form.HUNG, Form.HUNG_SECOND_GAIN)
@@ -35,9 +35,9 @@ class ArrayRun:
 
     Parameters
     ----------
-    model, fmt, checkpoint_steps : as of :class:`~gpbnb.kalman.filter_run.Run`.
-    form : any; Hung's forms only without known inputs, which the report does not have.
-    bounded : whether to take the contraction bound of the estimate, too.
+    model, fmt, checkpoint_steps : as for :class:`~gpbnb.kalman.filter_run.Run`.
+    form : any form; Hung's forms only without known inputs, which the report does not have.
+    bounded : whether to compute the contraction bound of the estimate, too.
 
     Raises
     ------
@@ -55,7 +55,8 @@ class ArrayRun:
     ) -> None:
         if model.has_inputs and form in _HUNG:
             raise ValueError(
-                f'got known inputs in the {form} form, which is not defined with them; needed another, as "innovation"'
+                f"got known inputs in the {form} form, which is not defined with them; needed another "
+                'form, such as "innovation"'
             )
         if not isinstance(fmt.backend, Compiled):
             raise ValueError(
@@ -79,13 +80,13 @@ class ArrayRun:
 
     @property
     def bounds(self) -> tuple[NDArray[np.float64]]:
-        """Bounds of the errors of the state at the checkpoint steps, (c, n); infinite where there is none."""
+        """Bounds of the errors of the state at the checkpoint steps, (c, n); infinite if there is none."""
         if self._bound is None:
             raise ValueError("got a run without its bound; needed bounded=True")
         return (self._bound.state,)
 
     def take(self, z: Any) -> None:
-        """Go on by as many steps as there are measurements, (steps, m); a run that has stopped stays where it is."""
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
         if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         self.model.check_steps(self.steps + len(z))
@@ -110,7 +111,7 @@ class ArrayRun:
                 self._bound.take(measured)
 
     def checkpoints(self) -> Checkpoints:
-        """Estimate, gain and covariance at the checkpoint steps that were reached."""
+        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
         n, m = self.model.n, self.model.m
         x, K, P = np.empty((len(self._saved), n), object), np.empty((len(self._saved), n, m), object), []
         for at, (step, state, gain, covariance) in enumerate(self._saved):
@@ -120,7 +121,7 @@ class ArrayRun:
         return Checkpoints(steps, x, K, np.array(P, dtype=object).reshape(-1, n, n))
 
     def covariance(self, P: FloatArray) -> NDArray[Any]:
-        """The exact covariance that a covariance, its factors or its root stand for; Fractions."""
+        """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
         given: NDArray[Any] = P.to_fractions()
         if self.form in _ROOTS:
             return np.asarray(given @ given.T)
@@ -130,7 +131,7 @@ class ArrayRun:
         return given
 
     def known_state(self, k: int) -> NDArray[Any] | None:
-        """What step k + 1 adds to the states, exactly, with inputs as the format stores them; None without inputs."""
+        """Return the exact input to the states in step k + 1, as the format stores it; None without inputs."""
         known = [self._at("B", k).to_fractions() @ self._at("u", k).to_fractions()] if self._given["B"] else []
         if self._given["b"]:
             known.append(self._at("b", k).to_fractions())
@@ -139,7 +140,7 @@ class ArrayRun:
     # -- one step ---------------------------------------------------------------------------------------
 
     def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        """Take step k + 1; returns the gain, or one column a decorrelated measurement, and whether all is definite."""
+        """Take step k + 1; return the gain, or columns for decorrelated measurements, and whether all is definite."""
         if self._given["d"]:
             z = z - self._at("d", k)
         return self._factored_step(k, z) if self.form in _FACTORED else self._covariance_step(k, z)
@@ -219,7 +220,7 @@ class ArrayRun:
         return members[k % len(members)]
 
     def _factor(self) -> None:
-        """Factors of P0, Q and R, as the compiled UD form computes them."""
+        """Compute factors of P0, Q and R as the compiled UD form does."""
         start = Run(self.model.without_inputs(), self.fmt, Form.UD, ())
         first, Q, R = (self._unpacked(each) for each in (start.P, start.UQ, start.UR))
         self._given["UR"] = list(R)
@@ -236,7 +237,7 @@ class ArrayRun:
         return FloatArray.from_components(backend, backend.unpack(packed), self.fmt)
 
     def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
-        """The gain for all measurements together, from those of one decorrelated measurement after the other."""
+        """Return the gain for all measurements together, from those of the decorrelated measurements one by one."""
         if not isinstance(gain, list):
             return np.asarray(gain.to_fractions(), dtype=object)
         UR = self._at("UR", k).to_fractions()
@@ -255,9 +256,9 @@ class ArrayRun:
 
 
 class _StateBound:
-    """The contraction bound of an array run, step after step; :mod:`gpbnb.kalman.contraction`.
+    """The contraction bound of an array run, step by step; see :mod:`gpbnb.kalman.contraction`.
 
-    A known input c of a step is moved out of the step: the exact filter takes it from x to :math:`E(x, z - Hc) + c`,
+    A known input c can be moved out of a step: the exact filter goes from x to :math:`E(x, z - Hc) + c`,
     with the step E of the filter without inputs. So the residual of a step is that of a filter without inputs, whose
     estimate is less by c and which measures z - d - Hc. Both differences are exact, then rounded to double-double,
     2**-106 of them: less than the errors of the evaluation that the bound includes.
@@ -294,7 +295,7 @@ class _StateBound:
         try:
             x, P = self._wide_state(known), self._wide_covariance()
             self.bound = advance_bound(
-                int(Form.INNOVATION),
+                Form.INNOVATION,
                 self.exact,
                 self.plain,
                 double_doubles(z.reshape(1, -1, 1)),
@@ -309,11 +310,11 @@ class _StateBound:
                 (self.state, *self._rest),
             )
             self.x, self.P = x if known is None else self._wide_state(None), P
-        except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
+        except (OverflowError, ZeroDivisionError):  # beyond double-double, so there is no bound from here on
             self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
 
     def _wide_state(self, known: NDArray[Any] | None) -> NDArray[np.float64]:
-        """The estimate, less a known input, as double-double, (n, 1, 2)."""
+        """Return the estimate minus a known input as double-double, (n, 1, 2)."""
         if known is None:
             return _double_doubles(self.run.x.reshape(-1, 1))
         return double_doubles((self.run.x.to_fractions() - known).reshape(-1, 1))

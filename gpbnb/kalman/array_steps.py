@@ -1,6 +1,6 @@
-"""The arithmetic of one step, written with arrays of a format: covariances, their factors and their square roots.
+"""The arithmetic of one step with arrays of a format, for covariances, their factors and their square roots.
 
-Where the compiled loops of :mod:`gpbnb.kalman.kernels.step` have the same form, operations are done in the same order,
+Where the compiled loops of ``gpbnb.kalman.kernels.step`` have the same form, operations are done in the same order,
 so that every digit is the same.
 """
 
@@ -14,7 +14,7 @@ from gpbnb.arithmetic.array import FloatArray
 
 
 def inverse(a: FloatArray) -> tuple[FloatArray, bool]:
-    """The inverse by elimination without exchange of rows, and whether all pivots are positive.
+    """Return the inverse, by elimination without pivoting, and whether all pivots are positive.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def inverse(a: FloatArray) -> tuple[FloatArray, bool]:
 
 
 def predict_ud(Phi: FloatArray, U: FloatArray, UQ: FloatArray) -> tuple[FloatArray, bool]:
-    """Thornton's modified weighted Gram-Schmidt; factors are upper triangles with the variances on the diagonal."""
+    """Predict UD factors by Thornton's modified weighted Gram-Schmidt; the diagonals hold the variances."""
     n = len(U)
     W = np.concatenate([Phi @ _unit(U), _unit(UQ)], axis=1)
     D = np.concatenate([np.diagonal(U), np.diagonal(UQ)])
@@ -59,11 +59,11 @@ def predict_ud(Phi: FloatArray, U: FloatArray, UQ: FloatArray) -> tuple[FloatArr
 def observe_ud(
     h: FloatArray, z: FloatArray, r: FloatArray, x: FloatArray, U: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-    """Bierman's update by one measurement z of h'x with variance r.
+    """Update UD factors by Bierman's method, for one measurement z of h'x with variance r.
 
     Returns
     -------
-    x, U, gain : after it.
+    x, U, gain : values after the update.
     definite : whether variances stay positive.
 
     Raises
@@ -99,7 +99,7 @@ def observe_ud(
 
 
 def predict_root(Phi: FloatArray, S: FloatArray, SQ: FloatArray) -> tuple[FloatArray, bool]:
-    """Modified Gram-Schmidt on the rows of (Phi S, SQ): the upper triangular root of the predicted covariance."""
+    """Return the upper triangular root of the predicted covariance, by modified Gram-Schmidt on (Phi S, SQ)."""
     n = len(S)
     W = np.concatenate([Phi @ S, SQ], axis=1)
     found, definite = _entries(S * 0), True
@@ -119,7 +119,7 @@ def predict_root(Phi: FloatArray, S: FloatArray, SQ: FloatArray) -> tuple[FloatA
 def observe_potter(
     h: FloatArray, z: FloatArray, r: FloatArray, x: FloatArray, S: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-    r"""Potter's update of a square root by one measurement; see :func:`observe_ud`.
+    r"""Update a square root by Potter's method, for one measurement; see :func:`observe_ud`.
 
     .. math:: f = S^Th, \quad a = f^Tf + r, \quad K = Sf/a, \quad S^+ = S - \frac{(Sf) f^T}{a + \sqrt{ra}}
     """
@@ -134,7 +134,7 @@ def observe_potter(
 def observe_carlson(
     h: FloatArray, z: FloatArray, r: FloatArray, x: FloatArray, S: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-    r"""Carlson's update of an upper triangular root by one measurement; see :func:`observe_ud`.
+    r"""Update an upper triangular root by Carlson's method, for one measurement; see :func:`observe_ud`.
 
     With :math:`f = S^Th` and :math:`a_j = a_{j-1} + f_j^2`, :math:`a_0 = r`, column j becomes
     :math:`\sqrt{a_{j-1}/a_j}\,S_j - f_j\,k_{j-1}/\sqrt{a_{j-1}a_j}`, and :math:`k_j = k_{j-1} + f_jS_j`; K is
@@ -157,7 +157,7 @@ def observe_carlson(
 
 
 def decorrelated(UR: FloatArray, a: FloatArray) -> FloatArray:
-    """The inverse of the unit upper triangle of R = U D U' times a, by back substitution; rows of a."""
+    """Return the inverse of the unit upper triangle of R = U D U' times a, by back substitution."""
     m = len(UR)
     rows = [a[i] for i in range(m)]
     for i in range(m - 1, -1, -1):
@@ -168,12 +168,12 @@ def decorrelated(UR: FloatArray, a: FloatArray) -> FloatArray:
 
 
 def root_of_factors(U: FloatArray) -> FloatArray:
-    r""":math:`U\sqrt{D}` of the factors of U D U'."""
+    r"""Return :math:`U\sqrt{D}` for the factors of U D U'."""
     return _unit(U) * np.sqrt(np.diagonal(U))
 
 
 def _unit(U: FloatArray) -> Any:
-    """The upper triangle with ones on its diagonal."""
+    """Return the upper triangle with ones on its diagonal."""
     return np.where(np.eye(len(U), dtype=bool), 1, U)
 
 

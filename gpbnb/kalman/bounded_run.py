@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import Decimal
+from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import advance_bound, widen
-from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED, advance
+from gpbnb.kalman.kernels.bounded import widen
+from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED
 from gpbnb.kalman.model import LinearModel
 
 _BLOCK = 256  # steps whose results are kept for the bound
@@ -26,7 +27,7 @@ _BLOCK = 256  # steps whose results are kept for the bound
 
 @dataclass(frozen=True, eq=False)
 class BoundedHistory:
-    """A history, and the contraction bound of each entry of its errors, infinite where there is none.
+    """A history, and the contraction bound for each entry of its errors, infinite if there is none.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ class BoundedHistory:
 class BoundedRun(Run):
     """A run together with its contraction bound, :mod:`gpbnb.kalman.contraction`; see ``Run``.
 
-    Of the reference itself, in double-double, the bound says how far it may be from what is exact.
+    For the reference itself, in double-double, the bound limits the distance from the exact filter.
     """
 
     def __init__(
@@ -66,7 +67,7 @@ class BoundedRun(Run):
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
         zero_n, size = np.zeros(n), np.zeros((n, n))
-        if self.form is Form.UD:  # the first factors may be off
+        if self.form is Form.UD:  # the first factors may have errors
             size = np.abs((self._covariance() - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
         self.bound = contraction_start(given["P0"], zero_n, size)
 
@@ -85,7 +86,12 @@ class BoundedRun(Run):
             return
         self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
-        values = (packed if self.fmt is None else double_doubles(self.exactly(packed)))[:, :, np.newaxis]
+        if self.fmt is None:
+            values = packed[:, :, np.newaxis]
+        elif packed.ndim == 2:
+            values = np.stack([packed, np.zeros_like(packed)], axis=-1)[:, :, np.newaxis]
+        else:
+            values = double_doubles(self.exactly(packed))[:, :, np.newaxis]
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         for begin in range(0, len(packed), _BLOCK):
             self._take_block(packed[begin : begin + _BLOCK], values[begin : begin + _BLOCK])
@@ -93,7 +99,7 @@ class BoundedRun(Run):
                 return
 
     def _take_block(self, z: NDArray[Any], exact_z: NDArray[Any]) -> None:
-        """Take some steps, keep all that they give, and take the bound over them."""
+        """Take some steps, keep all their results, and extend the bound over them."""
         first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
         x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
         x[0], P[0] = self.x, self.P
@@ -101,9 +107,7 @@ class BoundedRun(Run):
         notes[NEXT_CHECKPOINT] = 0
         failure: ArithmeticError | None = None
         try:
-            advance(
-                self.tag, int(self.form), self.matrices, z, first, self.x, self.P, every, x[1:], K[1:], P[1:], notes
-            )
+            self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
         except (OverflowError, ZeroDivisionError) as error:
             notes[STOPPED], failure = notes[DONE] + 1, error
         done = int(notes[DONE]) - first
@@ -116,26 +120,16 @@ class BoundedRun(Run):
             self.reason = self.stopped_by(failure) if failure else pivot
         if not done:
             return
-        computed = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        x, P, K, UR = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        steps = self.bound, self.checkpoint_steps, at, self.bounds
         try:
-            self.bound = advance_bound(
-                int(self.form),
-                self._exact,
-                self._plain,
-                exact_z[:done],
-                first,
-                *computed,
-                self.bound,
-                self.checkpoint_steps,
-                at,
-                self.bounds,
-            )
+            self.bound = advance_bound(self.form, self._exact, self._plain, exact_z[:done], first, x, P, K, UR, *steps)
         except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
             self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
 
 
 def _widened(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """What the compiled loops of any format gave, (k, n, m) or (k, n, m, 2), as double-double."""
+    """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double."""
     if packed.ndim == 3:
         return np.stack([packed, np.zeros_like(packed)], axis=-1)
     if packed.dtype == np.float64:
@@ -152,7 +146,7 @@ def emulate_with_bound(
     form: Form = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
 ) -> BoundedHistory:
-    """Run the filter rounded, in double-double, and with its contraction bound; arguments as of ``emulate``."""
+    """Run the filter rounded, in double-double, and with its contraction bound; for the arguments, see ``emulate``."""
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     run = BoundedRun(model, fmt, form, chosen)

@@ -1,10 +1,11 @@
-r"""Check a covariance exactly, and repair what float64 did to it.
+r"""Check a covariance exactly, and repair the effects of float64 roundings.
 
-A covariance computed in float64, such as :math:`GG^T\sigma^2`, a Van Loan discretization or an inverse, misses symmetry
-or semidefiniteness by a few roundings. The repair takes the mean of the matrix and its transpose. If that is still not
-semidefinite, it adds :math:`\delta M_{ii}` to each variance, δ the least power of two that suffices. In the 2-norm of
-the matrix scaled to ones on its diagonal, no semidefinite matrix is nearer than the least eigenvalue is below zero
-(Halmos 1972), and δ is less than twice that, or :data:`LEAST_SHIFT`.
+A covariance computed in float64, such as :math:`GG^T\sigma^2`, a Van Loan discretization or an inverse, is often not
+exactly symmetric or semidefinite, because of a few roundings. The repair takes the mean of the matrix and its
+transpose. If that is still not semidefinite, it adds :math:`\delta M_{ii}` to each variance, where δ is the smallest
+sufficient power of two. Scale the matrix to ones on its diagonal. In the 2-norm, the distance to the nearest
+semidefinite matrix is the size of its least negative eigenvalue (Halmos 1972), and δ is less than twice this distance,
+or equals :data:`LEAST_SHIFT`.
 
 Both changes are relative to the variances. A change of units by powers of two therefore changes neither.
 """
@@ -22,17 +23,17 @@ REPAIR_TOLERANCE = 2.0**-26
 """The largest repair, relative to the variances. It is half the digits of float64."""
 
 LEAST_SHIFT = 2.0**-58
-"""Where the search for the least δ begins."""
+"""Smallest δ, with which the search begins."""
 
 
 class Repair(NamedTuple):
-    r"""What was changed in a covariance.
+    r"""Changes made to a covariance.
 
     Parameters
     ----------
-    letter : of the covariance; `member` is its place in a cycle, from 0.
+    letter : letter of the covariance; `member` is its index in a cycle, from 0.
     asymmetry : largest :math:`|M_{ij} - M_{ji}|/\sqrt{M_{ii}M_{jj}}` that the mean removed.
-    shift : δ, the share that was added to each variance.
+    shift : δ, the relative increase of each variance.
     """
 
     letter: str
@@ -50,7 +51,7 @@ class Repair(NamedTuple):
 
 
 def in_floats(values: Any) -> bool:
-    """Whether a matrix was given in floats, whose roundings a repair may undo."""
+    """Whether a matrix was given in floats, whose rounding errors a repair may undo."""
     if hasattr(values, "to_fractions"):
         return False
     dtype = getattr(values, "dtype", None)
@@ -64,16 +65,16 @@ def in_floats(values: Any) -> bool:
 
 
 def repaired(letter: str, member: int, matrix: NDArray[Any], strictly: bool) -> tuple[NDArray[Any], Repair | None]:
-    """The covariance as it is if it needs no repair, or repaired, with the change.
+    """Return the covariance, repaired if necessary, and the change.
 
     Parameters
     ----------
     matrix : (n, n), exact.
-    strictly : whether it must be definite; its variances are then not raised.
+    strictly : whether it must be positive definite; its variances are then not raised.
 
     Raises
     ------
-    ValueError : it needs a larger change than :data:`REPAIR_TOLERANCE`, or has a fault that is no rounding.
+    ValueError : it needs a larger change than :data:`REPAIR_TOLERANCE`, or has a fault not due to rounding.
     """
     symmetric, asymmetry = matrix, 0.0
     if np.any(matrix != matrix.T):
@@ -103,7 +104,7 @@ def _asymmetry(matrix: NDArray[Any]) -> float:
 
 
 def _least_shift(matrix: NDArray[Any]) -> float:
-    """The least power of two whose share of each variance makes the matrix semidefinite, or infinity."""
+    """Return the smallest power of two by which to raise the variances for semidefiniteness, or infinity."""
     if any(d < 0 or (d == 0 and np.any(row != 0)) for d, row in zip(matrix.diagonal(), matrix, strict=True)):
         return math.inf
     shift = LEAST_SHIFT
@@ -129,7 +130,7 @@ def _semidefinite(matrix: NDArray[Any]) -> bool:
 
 
 def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Exact L and d of a symmetric matrix L diag(d) L', L lower with ones on its diagonal.
+    """Return exact L and d of a symmetric matrix L diag(d) L'; L is lower triangular with a unit diagonal.
 
     Raises
     ------
@@ -149,11 +150,11 @@ def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None:
-    """Refuse a matrix that is not exactly symmetric and semidefinite; with `strictly`, definite.
+    """Reject a matrix that is not exactly symmetric and semidefinite or, with `strictly`, definite.
 
     Raises
     ------
-    ValueError : it is not; the message has the entry or the eigenvalue, and the cure.
+    ValueError : the matrix fails the test; the message names the entry or the eigenvalue, and the cure.
     """
     if np.any(matrix != matrix.T):
         i, j = np.argwhere(matrix != matrix.T)[0]

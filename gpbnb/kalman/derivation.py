@@ -1,7 +1,7 @@
-r"""The algebra of hung1984, ch. II, section 12, derived again, and that of the bound that takes its place.
+r"""Derive the algebra of hung1984, ch. II, section 12, again, and the algebra of the bound that replaces it.
 
-Matrices of the report stand as plain symbols where each formula is linear in them, as its error algebra is: one ε for
-all of a matrix. Where the order of factors matters, symbols do not commute.
+Matrices of the report are plain symbols if each formula is linear in them. The report's error algebra is linear,
+because it uses one ε for a whole matrix. If the order of factors matters, symbols do not commute.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from gpbnb.display.derivation import Derivation, Step, first_order, over, togeth
 N, M, K = sp.symbols("n m k", integer=True, positive=True)
 NTH, J = sp.symbols("i j", integer=True, positive=True)
 BETA, EPS = sp.Symbol("beta", positive=True), sp.Symbol("epsilon")
-C, D, G = sp.symbols("c d g", positive=True)  # roundings of a closed loop, of an input; growth of both a step
+C, D, G = sp.symbols("c d g", positive=True)  # roundings of a closed loop and of an input; growth of both per step
 
 
 def _error(rounded: sp.Expr) -> sp.Expr:
-    """Coefficient of ε in a rounded quantity."""
+    """Return the coefficient of ε in a rounded quantity."""
     return sp.expand(first_order(rounded, (EPS,)) / EPS)
 
 
@@ -28,44 +28,44 @@ KZ, KREST, PHI, FK, X, U = sp.symbols(r"K_k {P_{kp}H^TR^{-1}} \Phi F_k x u_k")
 
 
 def prediction_error() -> sp.Expr:
-    """Error of the rounded (100) over ε: two products of n, then the sum."""
+    """Derive the error of the rounded (100) over ε, from two products of length n and the sum."""
     product = PP - Q
     return _error((product * (1 + 2 * N * EPS) + Q) * (1 + EPS))
 
 
 def covariance_error() -> sp.Expr:
-    """Error of the rounded (101) over ε, K being exact, and :math:`KHP_{kp} = P_{kp} - P_k`."""
+    """Derive the error of the rounded (101) over ε, with exact K and :math:`KHP_{kp} = P_{kp} - P_k`."""
     update = _error((PP - KHP * (1 + M * EPS)) * (1 + EPS) * (1 + N * EPS)).subs(KHP, PP - P)
-    carried = prediction_error().subs({PP: P, Q: CQ}, simultaneous=True)  # what (I - KH) makes of it
+    carried = prediction_error().subs({PP: P, Q: CQ}, simultaneous=True)  # multiplied by (I - KH)
     return sp.expand(update + carried)
 
 
 def gain_error() -> sp.Expr:
-    r"""Error of the rounded :math:`P_kH^TR^{-1}` over ε, R diagonal; without the part of Q."""
+    r"""Derive the error of the rounded :math:`P_kH^TR^{-1}` over ε, for diagonal R and without the part of Q."""
     covariance = covariance_error().subs({P: KZ, PP: KREST, CQ: 0}, simultaneous=True)
     return sp.expand(covariance + KZ * _error((1 + EPS) * (1 + (N + M) * EPS)))
 
 
 def transition_error() -> sp.Expr:
-    r"""Error of the rounded (109) over ε, with :math:`KH\Phi = \Phi - F_k` and the printed (108)."""
+    r"""Derive the error of the rounded (109) over ε, with :math:`KH\Phi = \Phi - F_k` and the printed (108)."""
     gain = gain_error().coeff(KZ)
     loop = PHI - (PHI - FK) * (1 + gain * EPS) * (1 + M * EPS)
     return _error(loop * (1 + EPS) * (1 + N * EPS))
 
 
 def input_error() -> sp.Expr:
-    """Error of the rounded (110) over ε, with the printed (108)."""
+    """Derive the error of the rounded (110) over ε, with the printed (108)."""
     return _error(U * (1 + gain_error().coeff(KZ) * EPS) * (1 + M * EPS))
 
 
 def state_error() -> sp.Expr:
-    """Error of the rounded (111) over ε, the part of Φ left out: F takes the first, u the second coefficient."""
+    """Derive the error of the rounded (111) over ε without the part of Φ; the coefficients belong to F and to u."""
     loop = FK * X * (1 + transition_error().coeff(FK) * EPS)
     return _error((loop * (1 + N * EPS) + U * (1 + input_error().coeff(U) * EPS)) * (1 + EPS))
 
 
 def report() -> Derivation:
-    """(102)-(114) by the report's own algebra, with what it leaves out on the way."""
+    """Derive (102)-(114) by the report's own algebra, and show the terms that it omits."""
     return Derivation(
         (
             Step("(102), (103): $\\tilde P_{kp}/\\epsilon$", prediction_error(), (2 * N + 1) * PP - 2 * N * Q),
@@ -98,7 +98,7 @@ def report() -> Derivation:
 
 
 def propagated() -> Derivation:
-    r"""(118), (123) for every k, by induction: :math:`x_k = \Psi_k x_0 + \sum_i \Psi_{k,i}u_i`, factors in order."""
+    r"""Derive (118), (123) by induction over k: :math:`x_k = \Psi_k x_0 + \sum_i \Psi_{k,i}u_i`, factors in order."""
     F, psi, x0, s, u = sp.symbols("F_{k+1} Psi_k x_0 s_k u_{k+1}", commutative=False)
     return Derivation(
         (
@@ -113,17 +113,17 @@ def propagated() -> Derivation:
 
 
 def count_start(c: sp.Expr = C, g: sp.Expr = sp.S.Zero) -> sp.Expr:
-    """a_0, the roundings of x_0 on its way through k steps with c + (j - 1)g each."""
+    """Return a_0, the number of roundings of x_0 in k steps with c + (j - 1)g roundings in step j."""
     return sp.expand(sp.Sum(c + (J - 1) * g, (J, 1, K)).doit())
 
 
 def count_input(c: sp.Expr = C, d: sp.Expr = D, g: sp.Expr = sp.S.Zero) -> sp.Expr:
-    """a_i, the roundings of u_i on its way."""
+    """Return a_i, the number of roundings of u_i up to step k."""
     return sp.expand(sp.Sum(c + (J - 1) * g, (J, NTH + 1, K)).doit() + d + (NTH - 1) * g)
 
 
 def second_coefficient(c: sp.Expr = C, d: sp.Expr = D, g: sp.Expr = sp.S.Zero, sign: int = -1) -> sp.Expr:
-    """What multiplies βB: the sum of a_0 - a_i, or with sign 1 of a_0 + a_i."""
+    """Return the factor of βB: the sum of a_0 - a_i or, with sign 1, of a_0 + a_i."""
     return sp.expand(sp.summation(sp.expand(count_start(c, g) + sign * count_input(c, d, g)), (NTH, 1, K)))
 
 
@@ -133,13 +133,13 @@ GROWTH = 3 * N + M + 2
 
 
 def printed_coefficients() -> tuple[sp.Expr, sp.Expr]:
-    """What multiplies β‖x_k‖ and βB in (125)."""
+    """Return the factors of β‖x_k‖ and βB in (125)."""
     loop = 7 * N + 3 * M + 6
     return K * loop, K * (3 * N + 1) + K * (K - 1) / 2 * loop
 
 
 def general() -> Derivation:
-    """(119)-(125) for every k, by summation and not by pattern."""
+    """Derive (119)-(125) for every k, by summation instead of a pattern."""
     c, d = TWICE
     start, inputs = count_start(c), count_input(c, d)
     first, second = printed_coefficients()
@@ -169,10 +169,10 @@ def general() -> Derivation:
 
 
 def corrected() -> Derivation:
-    r"""The coefficients of (125) with its faults corrected one after another.
+    r"""Derive the coefficients of (125) with its faults corrected one after another.
 
-    Each term :math:`T_i` of (118) has an error of its own, at most :math:`a_i\beta`; then
-    :math:`T_0 = x_k - \sum T_i` gives :math:`a_0\|x_k\| + \sum(a_0 + a_i)\|T_i\|`, with plus.
+    Each term :math:`T_i` of (118) has its own error of at most :math:`a_i\beta`. With
+    :math:`T_0 = x_k - \sum T_i`, the sum is :math:`a_0\|x_k\| + \sum(a_0 + a_i)\|T_i\|`, with a plus sign.
     """
     c, d = ONCE
     one, own, x, t = sp.symbols("e_0 e_i x_k T_i")
@@ -212,11 +212,11 @@ def corrected() -> Derivation:
 
 
 def scalar_conditions() -> Derivation:
-    r"""One state, one measurement, all but the arithmetic of (101) exact: what (105) allows, and what may be.
+    r"""Compare (105) with the possible error for one state and one measurement if only (101) is rounded.
 
-    With :math:`\kappa = KH`, :math:`P_{kp} = P_k/(1-\kappa)`; each rounding has its own sign. The error may be
-    :math:`\beta P_k(2 + 3\kappa)/(1-\kappa)` and the step from (104) to (105) leaves :math:`3\beta P_k` of it. The
-    general gain of the first form keeps its relative error below (108): no difference is formed.
+    With :math:`\kappa = KH`, :math:`P_{kp} = P_k/(1-\kappa)`; each rounding has its own sign. The error can be
+    :math:`\beta P_k(2 + 3\kappa)/(1-\kappa)`, but the step from (104) to (105) allows only :math:`3\beta P_k`. The
+    relative error of a gain in the first form stays below (108), because no difference is formed.
     """
     kappa = sp.Symbol("kappa", nonnegative=True)
     n = m = 1
@@ -249,9 +249,9 @@ def scalar_conditions() -> Derivation:
 
 
 def smallest() -> Derivation:
-    r"""One state, one measurement, every number 1 but z = 0 and a small R that 1 + R rounds away.
+    r"""Derive the errors of the scalar filter with z = Q = 0 and an R so small that 1 + R rounds to 1; the rest is 1.
 
-    Rounded, :math:`S = 1`, :math:`K = 1`, :math:`P = 0`. The exact values are below.
+    The rounded values are :math:`S = 1`, :math:`K = 1`, :math:`P = 0`. The exact values are below.
     """
     r = sp.Symbol("R", positive=True)
     p, gain = 1 - 1 / (1 + r), 1 / (1 + r)
@@ -275,11 +275,11 @@ def smallest() -> Derivation:
 
 
 def contraction() -> Derivation:
-    r"""The exact identities behind the contraction bound, for every n and m; symbols do not commute.
+    r"""Derive the exact identities behind the contraction bound, for every n and m; symbols do not commute.
 
-    Of two covariances A and B before the measurement, K and L are the gains, :math:`KS = AH^T` and
+    For two covariances A and B before the measurement, K and L are the gains, :math:`KS = AH^T` and
     :math:`S = HAH^T + R`, :math:`LT = BH^T` and :math:`T = HBH^T + R`; :math:`H' = H^T`, :math:`L' = L^T`, B and R are
-    symmetric, A need not be.
+    symmetric, but A need not be.
     """
     a, b, h, ht, r, k, o, lt = sp.symbols("A B H H' R K L L'", commutative=False)
     phi, e, nu = sp.symbols(r"\Phi e \hat{\nu}", commutative=False)
@@ -294,7 +294,7 @@ def contraction() -> Derivation:
             Step("and $HB-TL'$ where $H(B-BH'L')-RL'$ is", h * b - unevaluated(h * b * ht + r) * lt, zero_l),
             Step(
                 "two updates, subtracted; the last two terms are zero",
-                after_a - after_b,  # sympy sets an unevaluated difference without its brackets
+                after_a - after_b,  # SymPy typesets an unevaluated difference without its parentheses
                 together(
                     unevaluated(one - k * h) * unevaluated(a - b) * unevaluated(one - ht * lt), zero_k * lt, -k * zero_l
                 ),
@@ -323,7 +323,7 @@ def contraction() -> Derivation:
 
 
 def recursion() -> Derivation:
-    r"""The scalar recursion of the contraction bound: the norm of the exact closed loop, and a steady state."""
+    r"""Derive the scalar recursion of the contraction bound: the norm of the exact closed loop, and a steady state."""
     alpha, t, size = sp.symbols("alpha t q", positive=True)
     return Derivation(
         (

@@ -1,4 +1,4 @@
-"""Errors of a filter whose every operation is rounded, against the same filter in double-double."""
+"""Errors of a filter with every operation rounded, relative to the same filter in double-double."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -21,16 +22,16 @@ from gpbnb.kalman.named import form_named
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Errors of a rounded run, against the reference, after some steps.
+    """Errors of a rounded run relative to the reference, after some steps.
 
     Parameters
     ----------
-    steps : (c,), those that were reached.
+    steps : (c,), the steps that were reached.
     state : (c, n), estimate minus reference, in the units of the states.
     gain, covariance : (c, n, m) and (c, n, n), likewise.
-    reference : of the same steps.
+    reference : the reference at the same steps.
     indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
-    stopped : the step that a division by zero, or a number beyond the backend's range, ended, if any.
+    stopped : the step at which a division by zero or a number beyond the backend's range ended the run, if any.
     """
 
     model: LinearModel
@@ -46,22 +47,22 @@ class History:
 
     @property
     def state_norm(self) -> NDArray[np.float64]:
-        """Largest entry of the error of the estimate, (c,); the norm (21)."""
+        """Largest entry of the error of the estimate, (c,), in norm (21)."""
         return np.abs(self.state).max(axis=1)
 
     @property
     def gain_norm(self) -> NDArray[np.float64]:
-        """Largest column sum of the error of the gain over that of the gain, (c,); the norm (22)."""
+        """Relative error of the gain, (c,), by largest column sums, norm (22)."""
         return relative(self.gain, self.reference.K)
 
     @property
     def covariance_norm(self) -> NDArray[np.float64]:
-        """Largest column sum of the error of the covariance over that of the covariance, (c,); the norm (22)."""
+        """Relative error of the covariance, (c,), by largest column sums, norm (22)."""
         return relative(self.covariance, self.reference.P)
 
     @property
     def least_eigenvalue(self) -> NDArray[np.float64]:
-        """Least eigenvalue of the computed covariance, symmetric part, scaled to ones on the true diagonal, (c,)."""
+        """Least eigenvalue of the symmetric part of the computed covariance, (c,), in units of the true variances."""
         true = self.reference.P[: len(self.steps)].astype(np.float64)
         computed = true + self.covariance
         scale = np.sqrt(np.diagonal(true, axis1=1, axis2=2))
@@ -70,7 +71,7 @@ class History:
 
 
 def relative(error: NDArray[np.float64], true: NDArray[Any]) -> NDArray[np.float64]:
-    """Norms (22), largest column sums, of errors over those of what is true, (c,)."""
+    """Return norms (22) of errors over norms of the true matrices, (c,)."""
     size = np.abs(true[: len(error)].astype(np.float64)).sum(axis=1).max(axis=1)
     return np.asarray(np.abs(error).sum(axis=1).max(axis=1) / size)
 
@@ -81,7 +82,8 @@ def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
     c = len(checkpoints.steps)
     if checkpoints.steps != true.steps[:c]:
         raise ValueError(
-            f"got checkpoint steps {checkpoints.steps} and, of the reference, {true.steps}; needed the same"
+            f"got checkpoint steps {checkpoints.steps} for the runs and {true.steps} for the "
+            "reference; needed equal steps"
         )
     x, K, P = (
         (each - other[:c]).astype(np.float64)
@@ -101,24 +103,26 @@ def emulate(
     fused: bool = False,
     sums: FloatFormat | FixedFormat | None = None,
     compensated: bool = False,
+    order: Order = "left",
+    block: int = 32,
 ) -> History:
     """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
 
     Parameters
     ----------
-    model : n states, m measurements.
+    model : a model with n states and m measurements.
     z : (steps, m), measurements.
     fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13; or fixed point.
-    form : or its name, such as "UD".
-    checkpoint_steps : steps at which to compare; by default four a decade.
-    true : a reference to compare with. By default it gets model and measurements as the format stores them, so that
-        errors are those of the arithmetic alone; a reference of the model as given adds those of storing it.
+    form : a form or its name, such as "UD".
+    checkpoint_steps : steps at which to compare; by default four per decade.
+    true : a reference to compare with. By default it gets model and measurements as the format stores them, so
+        errors come only from the arithmetic. With a reference for the model as given, they include those of storing it.
     fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
-    sums, compensated : as of :class:`~gpbnb.kalman.filter_run.Run`.
+    sums, compensated, order, block : as for :class:`~gpbnb.kalman.filter_run.Run`.
 
     Raises
     ------
-    ValueError : `fused`, `sums` or `compensated` with known inputs, or with a form without compiled loops.
+    ValueError : one of these options with known inputs, or with a form without compiled loops.
     """
     form = form_named(form)
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
@@ -127,14 +131,14 @@ def emulate(
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
     run: Run | ArrayRun
     if model.has_inputs or isinstance(form, ArrayForm):
-        if fused or sums is not None or compensated:
+        if fused or sums is not None or compensated or order != "left":
             raise ValueError(
-                "got fused, sums or compensated with known inputs or a form without compiled loops; needed none of "
-                'them; for compensated summation write form="compensated"'
+                "got fused, sums, compensated or order with known inputs or a form without compiled loops; needed none "
+                'of them; for compensated summation write form="compensated"'
             )
         run = ArrayRun(model, fmt, form, chosen)
     else:
-        run = Run(model, fmt, form, chosen, fused, sums, compensated)
+        run = Run(model, fmt, form, chosen, fused, sums, compensated, order, block)
     run.take(measured)
     if true is None:
         true = reference(model.rounded(fmt), measured.to_fractions(), chosen)

@@ -1,7 +1,7 @@
-"""Many filters at once: models x formats x forms x seeds, on any executor; ``python -m gpbnb.kalman.ensembles``.
+"""Run many filters, models x formats x forms x seeds, on any executor: ``python -m gpbnb.kalman.ensembles``.
 
-Each trial is given by a few numbers, so that it may run anywhere, and gives the same there. What the command found is
-kept beside this file, in ``ensembles.csv``, and how, in ``ensembles.json``.
+A few numbers define each trial, so it can run anywhere with the same result. The results are stored next to this file
+in ``ensembles.csv``, and their provenance in ``ensembles.json``.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year import machine
 from gpbnb.sweeps import Column
 
-#: The kinds of random models, see :func:`random_model`.
+#: The kinds of random models; see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
 
-#: Few digits and many, in three bases, with both roundings.
+#: Formats with few and with many digits, in three bases, with both roundings.
 FORMATS = tuple(
     FloatFormat(base, precision, rounding)
     for base, precision in ((2, 11), (2, 24), (2, 53), (10, 4), (10, 8), (16, 6))
     for rounding in Rounding.documented()
 )
 
-#: How often the command repeats each, 34 x 5 x 12 x 5 = 10,200 trials.
+#: Number of repetitions of each combination, 34 x 5 x 12 x 5 = 10,200 trials.
 REPEATS = 34
 
 _HERE = Path(__file__).parent
@@ -67,10 +67,10 @@ class Outcome:
 
     Parameters
     ----------
-    state, gain, covariance : over the contraction bound; 0 where that is infinite.
-    last : of the state after the last step, over the contraction bound; 0 where that is infinite.
+    state, gain, covariance : error / contraction bound; 0 if the bound is infinite.
+    last : error / contraction bound of the state after the last step; 0 if the bound is infinite.
     bounded : share of the steps at which the contraction bound of the state is finite.
-    printed_covariance, printed_gain, printed_state : over (105), (108) and (125) of hung1984, ch. II.
+    printed_covariance, printed_gain, printed_state : error / (105), (108) and (125) of hung1984, ch. II.
     indefinite : whether a variance or pivot was not positive at some step.
     """
 
@@ -87,14 +87,14 @@ class Outcome:
 
 
 def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, float]:
-    """A random model with 1 to 4 states and 1 or 2 measurements, and the size of its measurements.
+    """Draw a random model with 1 to 4 states and 1 or 2 measurements, and the size of its measurements.
 
     Parameters
     ----------
-    kind : "stable", poles anywhere within the unit circle; "oscillating", near it; "drifting", chains of integrators,
-        whose closed loop alone is stable; "one sign", all numbers positive, as are the measurements, so that chopping
-        errs one way for ever; "far scales", stable, with units of the states up to eight powers of ten apart and a
-        precise first measurement, so that covariances cancel.
+    kind : "stable" has poles anywhere within the unit circle, "oscillating" near the circle; "drifting" has chains of
+        integrators, of which only the closed loop is stable; "one sign" has positive numbers and measurements, so that
+        chopping errors always have the same sign; "far scales" is stable, with units of the states up to eight powers
+        of ten apart and a precise first measurement, so that covariances cancel.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, floa
 
 
 def _short(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Six digits, the same on every machine."""
+    """Round to six digits, which are the same on every machine."""
     return np.array([float(f"{value:.6g}") for value in values.flat]).reshape(values.shape)
 
 
@@ -156,7 +156,7 @@ def trial(task: Task) -> Outcome:
 
 
 def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
-    """Largest error over (105) and (108), of all entries and steps, and over (125), of all steps."""
+    """Return the largest error / bound for (105) and (108) over all entries and steps, and for (125) over all steps."""
     history, beta = found.history, float(task.fmt.unit_roundoff)
     c = len(history.steps)
     if not c:
@@ -172,7 +172,7 @@ def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, flo
 def _printed_state(
     found: BoundedHistory, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(125) as printed, after each step, with the least B of (122)."""
+    """Evaluate (125) as printed after each step, with the least B of (122)."""
     model, beta = found.history.model, float(task.fmt.unit_roundoff)
     given = model.to_float()
     bounds, F, u = np.empty(len(x)), 0.0, 0.0
@@ -181,7 +181,7 @@ def _printed_state(
         before = phi @ (x[k - 1] if k else given["x0"])
         loop = phi - K[k] @ (h @ phi)
         F = max(F, float(column_sum(loop)))
-        # u = K z = x - F x of the step before, (111)
+        # u = K z = x minus F times x of the previous step, (111)
         u = max(u, float(np.abs(x[k] - before + K[k] @ (h @ before)).max()))
         first, second = report_bounds.coefficients(k + 1, model.n, model.m)
         bounds[k] = beta * (first * np.abs(x[k]).max() + second * u * max(1.0, F**k))
@@ -189,7 +189,7 @@ def _printed_state(
 
 
 def _largest(ratios: NDArray[np.float64]) -> float:
-    """Of ratios in which 0/0 is no violation."""
+    """Return the largest of some ratios, where 0/0 is not a violation."""
     return float(np.nan_to_num(ratios, nan=0.0, posinf=np.inf).max(initial=0.0))
 
 
@@ -197,7 +197,7 @@ def _largest(ratios: NDArray[np.float64]) -> float:
 
 
 def tasks(repeats: int, steps: int = 32, first_seed: int = 0) -> tuple[Task, ...]:
-    """Every kind, format and form, `repeats` times."""
+    """List every kind, format and form, `repeats` times."""
     return tuple(
         Task(kind, fmt, form, seed, steps)
         for seed in range(first_seed, first_seed + repeats)
@@ -210,18 +210,18 @@ def tasks(repeats: int, steps: int = 32, first_seed: int = 0) -> tuple[Task, ...
 def sweep(
     todo: Sequence[Task], executor: Executor | None = None, batch: int = 25, attempts: int = 10, progress: bool = False
 ) -> tuple[Outcome, ...]:
-    """Do all trials on an executor; the results are in the order of the tasks, and do not depend on it.
+    """Run all trials on an executor; the results are in the order of the tasks and do not depend on the executor.
 
     Parameters
     ----------
-    executor : any; by default processes of this machine, or this one for a single batch. Of Dask,
-        ``Client.get_executor()``.
-    batch : how many trials are sent at once.
-    attempts : how often a batch is sent anew when its worker dies.
+    executor : any executor, such as Dask's ``Client.get_executor()``; by default processes of this machine, or this
+        process for a single batch.
+    batch : number of trials sent at once.
+    attempts : number of times that a batch is sent again if its worker dies.
 
     Raises
     ------
-    RuntimeError : workers died under a batch more often than `attempts`.
+    RuntimeError : workers died more than `attempts` times while running a batch.
     """
     if batch < 1 or attempts < 1:
         raise ValueError(f"got batch = {batch}, attempts = {attempts}; needed both at least 1")
@@ -230,7 +230,7 @@ def sweep(
         if executor is None and len(batches) <= 1:
             return tuple(outcome for each in batches for outcome in _some(each))
         if executor is None:
-            # A forked process may inherit locks that threads of this one hold.
+            # A forked process may inherit locks held by threads of this one.
             with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
                 return _gather(batches, pool, attempts, bar)
         return _gather(batches, executor, attempts, bar)
@@ -252,8 +252,9 @@ def _gather(batches: Sequence[tuple[Task, ...]], executor: Executor, attempts: i
                     raise
                 if tries[number] >= attempts:
                     raise RuntimeError(
-                        f"got {attempts} workers that died under one batch of {len(batches[number])} trials; needed "
-                        "one that lives; give workers more memory, or send smaller batches"
+                        f"got {attempts} workers that died under one batch of {len(batches[number])} "
+                        "trials; needed workers that survive; give them more memory, or send smaller "
+                        "batches"
                     ) from error
                 tries[number] += 1
                 pending[executor.submit(_some, batches[number])] = number
@@ -261,9 +262,9 @@ def _gather(batches: Sequence[tuple[Task, ...]], executor: Executor, attempts: i
 
 
 def _is_of_the_worker(error: BaseException) -> bool:
-    """Whether a batch failed because of where it ran: Dask has its own exceptions, which are not imported for this."""
+    """Whether a batch failed because of its worker; Dask's own exceptions are recognized without importing Dask."""
     if isinstance(error, BrokenExecutor):
-        return False  # the executor takes nothing more
+        return False  # the executor accepts no more work
     return isinstance(error, CancelledError) or type(error).__module__.partition(".")[0] in ("distributed", "dask")
 
 
@@ -277,9 +278,9 @@ def _some(batch: Sequence[Task]) -> tuple[Outcome, ...]:
 class Summary(NamedTuple):
     """Trials of one kind and form, and the largest error over each bound.
 
-    Violations count trials with an error above the bound at any step; an infinite bound is not violated, and
-    `steps_bounded` the mean share of steps at which the contraction bound is finite. `typical` is the geometric mean of
-    error over contraction bound of the state after the last step, of the `compared` trials in which neither is zero.
+    Violations count trials with an error above the bound at any step; an infinite bound is not violated.
+    `steps_bounded` is the mean share of steps at which the contraction bound is finite. `typical` is the geometric mean
+    of error / contraction bound for the state after the last step, over the `compared` trials in which neither is zero.
     """
 
     kind: str
@@ -326,7 +327,7 @@ def _alone(outcome: Outcome) -> Summary:
 
 
 def merged(parts: Sequence[Summary]) -> tuple[Summary, ...]:
-    """A line for each kind and form, in the order of their appearance."""
+    """Return one summary for each kind and form, in order of appearance."""
     groups: dict[tuple[str, str], list[Summary]] = {}
     for part in parts:
         groups.setdefault((part.kind, part.form), []).append(part)
@@ -349,12 +350,12 @@ _COUNTED = (
 
 
 def summaries(outcomes: Sequence[Outcome]) -> tuple[Summary, ...]:
-    """A line for each kind and form, in the order of their appearance."""
+    """Return one summary for each kind and form, in order of appearance."""
     return merged([_alone(outcome) for outcome in outcomes])
 
 
 def lines(seed: int, outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
-    """Lines of ``ensembles.csv`` for the trials of one seed: six significant digits."""
+    """Return the rows of ``ensembles.csv`` for the trials of one seed, with six significant digits."""
     return [
         (str(seed), *(f"{each:.6g}" if isinstance(each, float) else str(each) for each in summary))
         for summary in summaries([outcome for outcome in outcomes if outcome.task.seed == seed])
@@ -377,21 +378,22 @@ COLUMNS = (Column("seed", "integer", 0), *(_column(*each) for each in get_type_h
 
 @cache
 def load(directory: Path = _HERE) -> tuple[Summary, ...]:
-    """The sweep that the package brings, of all seeds together."""
+    """Load the sweep that ships with the package, for all seeds together."""
     body = sweeps.read(directory / "ensembles.csv", COLUMNS, COMMAND).rows
     types = get_type_hints(Summary).values()
     return merged([Summary(*(kind(cell) for kind, cell in zip(types, line[1:], strict=True))) for line in body])
 
 
 def provenance(directory: Path = _HERE) -> dict[str, Any]:
-    """How the sweep was made."""
+    """Return the provenance of the sweep."""
     return sweeps.read_record(directory / "ensembles.json", COMMAND)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Random filters by thousands.")
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
-    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="where the two files go")
+    """Run the command; returns its exit status."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Survey thousands of random filters.")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="number of trials for each kind, format and form")
+    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="folder for the two files")
     given = parser.parse_args(arguments)
     todo, start = tasks(given.repeats), time.perf_counter()
     outcomes = sweep(todo, progress=True)

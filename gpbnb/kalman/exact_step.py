@@ -33,7 +33,8 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
 
     Parameters
     ----------
-    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model. x (n,), P (n, n) : before the step. z (m,) : measurement.
+    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model. x (n,), P (n, n) : values before the step.
+    z (m,) : measurement.
 
     Raises
     ------

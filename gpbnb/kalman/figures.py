@@ -45,12 +45,12 @@ _MARKERS = {Form.HUNG: "o", Form.HUNG_SECOND_GAIN: "P", Form.INNOVATION: "^", Fo
 
 
 def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None = None) -> list[Artist]:
-    """Error of one quantity against the step, a curve a run.
+    """Draw the error of one quantity against the step, one curve for each run.
 
     Parameters
     ----------
-    quantity : "drift" or "rate", of both the largest; "gain" or "covariance", norms.
-    tolerance : drawn as a line, in the unit of the quantity.
+    quantity : "drift" or "rate", the larger of two errors; "gain" or "covariance", norms.
+    tolerance : tolerance to draw as a line, in the unit of the quantity.
 
     Raises
     ------
@@ -64,7 +64,9 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
         if values.ndim > 1:
             values = values.max(axis=1)
         if run.case.fmt is None:
-            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+            raise ValueError(
+                "got the reference among the runs; needed only rounded runs, because the reference has no error"
+            )
         seen = values > 0
         artists += ax.plot(
             run.steps[seen], values[seen], marker=_MARKERS[run.case.form], color=colour, lw=0.8, label=_name(run)
@@ -77,7 +79,7 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
 
 
 def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Axes) -> list[Artist]:
-    """Draw bounds against the step: name, steps and values of each. The last one holds, the others do not."""
+    """Draw bounds against the step, given as name, steps and values; the last bound holds and the others fail."""
     artists: list[Artist] = []
     for number, (name, steps, values) in enumerate(curves):
         last = number == len(curves) - 1
@@ -87,7 +89,7 @@ def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Ax
 
 
 def level(name: str, value: float, ax: Axes) -> Artist:
-    """Draw a printed bound, which the errors exceed, that is the same at each step."""
+    """Draw a printed bound that is the same at each step and that the errors exceed."""
     return ax.axhline(value, color=REFUTED, label=name)
 
 
@@ -105,15 +107,15 @@ def year_end(
     faults: Mapping[str, Mapping[str, bool]],
     answers: Sequence[tuple[str, Sequence[float]]],
 ) -> list[Artist]:
-    """Largest error of drift or rate in a year against the digits, beside (125) and the answers to how many.
+    """Draw the largest error of drift or rate in a year against the digits, with (125) and the answers.
 
     Parameters
     ----------
-    tolerance : in mas and mas/yr.
-    faults : name, and the faults of (125) that are corrected, as for
+    tolerance : tolerance in mas and mas/yr.
+    faults : names, and the corrected faults of (125), as for
         :func:`gpbnb.kalman.report_bounds.gravity_probe_b_bound`.
-    answers : name and numbers of digits. Those of the report are open markers where the error is as large as the drift
-        of a year, which is what they grant; the last is drawn upright, through the tolerance.
+    answers : names and numbers of digits. The report's answers are open markers at the error that they allow, which is
+        as large as the drift of a year; the last answer is a vertical bar through the tolerance.
     """
     artists: list[Artist] = []
     for form, rounding in [(form, rounding) for rounding in Rounding.documented() for form in Form]:
@@ -134,13 +136,13 @@ def year_end(
             list(places), [tolerance] * len(places), "|", color=BLACK, ms=26, mew=2, ls="none", label=name
         )
     ax.set_yscale("log")
-    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), markerscale=0.6)
     label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
     return artists
 
 
 def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
-    """The answers to how many digits a year needs, beside what every emulated year came to; see :func:`year_end`."""
+    """Draw the answers for the digits of a year, and the error of every emulated year; see :func:`year_end`."""
     lines: dict[str, Mapping[str, bool]] = {
         "(125), printed formula": {},
         "(125), all faults corrected": report_bounds.ALL_CORRECTED,
@@ -165,13 +167,7 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
         artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
     for word, faults, style, place, away in (
         ("(125) as printed", {}, "-", 0, (2, -38)),
-        (
-            "(125) with its faults corrected",
-            report_bounds.ALL_CORRECTED,
-            "--",
-            12,
-            (6, 6),
-        ),
+        ("(125) with its faults corrected", report_bounds.ALL_CORRECTED, "--", 12, (6, 6)),
     ):
         (line,) = bound_by_digits(ax, faults, ls=style)
         x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]
@@ -198,14 +194,14 @@ def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
 
 
 def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[Line2D]:
-    """Bound (125) at the end of a year against the decimal digits, in mas."""
+    """Draw bound (125) at the end of a year against the decimal digits, in mas."""
     betas = [Fraction(0.5 * 10.0 ** (1 - digits)) for digits in _DIGITS.tolist()]
     heights = [report_bounds.gravity_probe_b_bound(beta, report_bounds.EXAMPLE[0], **faults) for beta in betas]
     return ax.plot(_DIGITS, heights, color=REFUTED, **style)
 
 
 def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
-    """Bound (125) in one format after some steps, in mas, for :func:`lines`."""
+    """Return bound (125) in one format after some steps, in mas, for :func:`lines`."""
     return [report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), **faults) for k in steps]
 
 
@@ -216,7 +212,7 @@ def _beside(
 
 
 def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[Artist]:
-    """Error of one state (points) and its contraction bound (line) against the step."""
+    """Draw the error of one state (points) and its contraction bound (line) against the step."""
     steps, error = found.history.steps, np.abs(found.history.state[:, state])
     seen = error > 0
     artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
@@ -228,7 +224,7 @@ def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[
 
 
 def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
-    """Share of random filters that violate each bound, a group of bars a form."""
+    """Draw the share of random filters that violate each bound, with a group of bars for each form."""
     bounds = (("(105)", "violations_105"), ("(108)", "violations_108"), ("(125)", "violations_125"))
     forms = list(dict.fromkeys(summary.form for summary in summaries))
     artists: list[Artist] = []
@@ -238,7 +234,7 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
             group = [summary for summary in summaries if summary.form == form]
             shares.append(100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group))
         artists += ax.bar(np.arange(len(forms)) + 0.27 * (number - 1), shares, 0.25, color=colour, label=name).patches
-    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]) for form in forms])
+    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]).replace(", ", ",\n") for form in forms])
     ax.set_ylim(0, 118)
     legend(ax, ncols=3, loc="upper right")
     label(ax, "form of the filter", "filters that violate the bound (%)")
@@ -246,12 +242,12 @@ def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
 
 
 def shares(found: Sequence[Share], ax: Axes, tolerance: float = 1.0) -> list[Artist]:
-    """Largest error of each record (points) against the bits or digits, a column for each format, and their medians."""
+    """Draw the largest error of each record (points) against bits or digits, a column for each format, with medians."""
     artists: list[Artist] = []
     for states, colour in zip(dict.fromkeys(each.states for each in found), (OBSERVED, *OBSERVED_OTHERS), strict=False):
         group = [each for each in found if each.states == states]
         for each in group:
-            # Spread by rank, so that every record is seen.
+            # Spread points by rank, so that every record is visible.
             places = each.fmt.precision + 0.6 * (np.arange(each.records) + 0.5) / each.records - 0.3
             artists += ax.plot(places, np.sort(each.errors), ".", color=colour, ms=3)
         points = [(each.fmt.precision, each.quantile(0.5)) for each in group]

@@ -1,4 +1,4 @@
-"""A filter run that can stop and go on: every operation rounded, or in double-double as the reference."""
+"""A resumable filter run with every operation rounded, or in double-double as the reference."""
 
 from __future__ import annotations
 
@@ -15,10 +15,21 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, QUANTITIES, STOPPED, advance, prepare
+from gpbnb.kalman.kernels.step import (
+    DONE,
+    INDEFINITE,
+    NEXT_CHECKPOINT,
+    QUANTITIES,
+    STOPPED,
+    advance,
+    advance_ud,
+    factor_each,
+    invert_each,
+)
 from gpbnb.kalman.model import LinearModel
 
 
@@ -28,17 +39,20 @@ class Run:
     Parameters
     ----------
     model : n states, m measurements.
-    fmt : the format in which all of it is stored and computed; None for double-double.
-    form : how a step is computed.
-    checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in rising order.
+    fmt : the format in which everything is stored and computed; None for double-double.
+    form : form in which a step is computed.
+    checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in ascending order.
     fused : whether products are added by fused multiply-add; base 2 or 16.
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
-    compensated : whether the estimate is updated by Kahan's compensated summation, which carries what a step rounds
-        away over to the next; only for the innovation form and Joseph's.
+    compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
+        a step over to the next; only for the innovation form and Joseph's.
+    order, block : order of the additions in matrix products, as for :func:`gpbnb.linalg.matmul`. Orders other than
+        "left" need base 2 or 16, and a form other than UD, which has few matrix products.
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation in another form.
+    ValueError : a format without compiled loops; checkpoint steps that do not ascend; compensation or another order of
+        additions in a form that does not have it.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -51,13 +65,15 @@ class Run:
         fused: bool = False,
         sums: FloatFormat | FixedFormat | None = None,
         compensated: bool = False,
+        order: Order = "left",
+        block: int = 32,
     ) -> None:
         model.refuse_inputs("a run in compiled loops")
         self.model, self.fmt, self.form = model, fmt, Form(form)
         self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
         if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
             raise ValueError(
-                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed steps of 1 or more, each above the last"
+                f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
             )
         if fmt is not None and not isinstance(fmt.backend, Compiled):
             raise ValueError(
@@ -65,8 +81,10 @@ class Run:
             )
         if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
-        #: In which arithmetic the compiled loops work.
-        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums)
+        if order != "left" and form == Form.UD:
+            raise ValueError(f"got {order} sums in the UD form; needed another form")
+        #: The arithmetic of the compiled loops.
+        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
         Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
@@ -78,7 +96,7 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         try:
-            definite = prepare(self.tag, int(form), Q, R, self.P, RI, self.UQ, self.UR)
+            definite = self._prepare(Q, R, RI)
         except ZeroDivisionError:
             definite = False
         if not definite:
@@ -89,13 +107,23 @@ class Run:
         increment = self.as_packed(model.Phi - np.eye(n, dtype=int) if compensated else np.zeros((0, n, n)))
         self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
         rest = (identity, increment, np.zeros_like(self.x), self._place)
-        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, *rest)
-        #: Why the run stopped, if it has.
+        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, *rest)
+        #: Why the run stopped, if it did.
         self.reason = ""
+
+    def _prepare(self, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
+        """Compute what the form needs beside the model; whether the covariances are definite in this arithmetic."""
+        if self.form is Form.HUNG_SECOND_GAIN:
+            return bool(invert_each(self.tag, R, RI))
+        if self.form is Form.UD:
+            given, self.P = self.P, np.empty_like(self.P)
+            pairs = (Q, self.UQ), (R, self.UR), (given[np.newaxis], self.P[np.newaxis])
+            return all(factor_each(self.tag, *pair) for pair in pairs)
+        return True
 
     @property
     def steps(self) -> int:
-        """How many steps are done."""
+        """Number of steps done."""
         return int(self.notes[DONE])
 
     @property
@@ -105,11 +133,11 @@ class Run:
 
     @property
     def stopped(self) -> int | None:
-        """The step that a division by zero, or a number beyond the range of the backend, ended."""
+        """The step at which a division by zero, or a number beyond the range of the backend, ended the run."""
         return int(self.notes[STOPPED]) or None
 
     def take(self, z: Any) -> None:
-        """Go on by as many steps as there are measurements, (steps, m); a run that has stopped stays where it is."""
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
         if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
             raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
         if self.stopped:
@@ -117,9 +145,8 @@ class Run:
         self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
-            advance(self.tag, int(self.form), self.matrices, packed, self.steps, self.x, self.P, *outputs)
+            self.advance(packed, (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
         except (OverflowError, ZeroDivisionError) as error:
             self.notes[STOPPED] = self.steps + 1
             self.reason = self.stopped_by(error)
@@ -127,13 +154,33 @@ class Run:
             if self.stopped:
                 self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
 
+    def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
+        """Take one step per packed measurement, (steps, m, columns of x).
+
+        Parameters
+        ----------
+        kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
+        notes : the status of the run, which is brought up to date.
+
+        Raises
+        ------
+        OverflowError, ZeroDivisionError : one more step than are noted as done came to that.
+        """
+        if self.form is Form.UD:
+            Phi, _, H, HT, *_ = self.matrices
+            factors = Phi, H, HT, self.UQ, self.UR, self._place
+            advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
+        else:
+            repeated = kept[1][:0], kept[3][:0], self.UR[:0]
+            advance(self.tag, int(self.form), self.matrices, z, self.steps, self.x, self.P, repeated, kept, notes)
+
     def stopped_by(self, error: ArithmeticError) -> str:
-        """Name what ended the last step: "overflow in the gain at step 812"."""
+        """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
     def as_packed(self, values: Any) -> NDArray[Any]:
-        """Numbers, each rounded into the format, as the compiled loops take them."""
+        """Round numbers into the format, and return them as the compiled loops expect them."""
         if self.fmt is None:
             entries = np.asarray(values)
             if entries.dtype == np.float64:
@@ -149,7 +196,7 @@ class Run:
         return array.backend.pack(array.components)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
-        """Exact Fractions of what the compiled loops gave."""
+        """Convert results of the compiled loops to exact Fractions."""
         if self.fmt is None:
             high, low = (part.astype(object) for part in (packed[..., 0], packed[..., 1]))
             return np.asarray(np.frompyfunc(lambda h, s: Fraction(h) + Fraction(s), 2, 1)(high, low), dtype=object)
@@ -159,7 +206,7 @@ class Run:
         )
 
     def checkpoints(self) -> Checkpoints:
-        """Estimate, gain and covariance at the checkpoint steps that were reached."""
+        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
         count = int(self.notes[NEXT_CHECKPOINT])
         x, K, P = (self.exactly(each[:count]) for each in (self.X, self.G, self.C))
         if self.form is Form.UD:
@@ -167,7 +214,7 @@ class Run:
         return Checkpoints(tuple(int(step) for step in self.checkpoint_steps[:count]), x[..., 0], K, P)
 
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Gains and covariances that the factors, and the gains of one measurement after the other, stand for."""
+        """Return gains and covariances from factors and from the gains of one measurement after the other."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
         H, UR, n = self.exactly(self.matrices[2]), self.exactly(self.UR), self.model.n
         unit = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
@@ -207,14 +254,14 @@ class Checkpoints:
 
 
 def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
-    """Steps from 1 to the last, at equal ratios.
+    """Return steps from 1 to the last, at equal ratios.
 
     Raises
     ------
-    ValueError : no steps, or none a decade.
+    ValueError : no steps, or none per decade.
     """
     if steps < 1 or per_decade < 1:
-        raise ValueError(f"got {steps} steps, {per_decade} a decade; needed both at least 1")
+        raise ValueError(f"got {steps} steps, {per_decade} per decade; needed both at least 1")
     grid = np.rint(10 ** (np.arange(0, int(math.log10(steps) * per_decade) + 1) / per_decade))
     return tuple(sorted({int(k) for k in grid if k <= steps} | {steps}))
 
@@ -230,7 +277,7 @@ def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form:
 
     Raises
     ------
-    ArithmeticError : a division by zero or a number beyond 2**1000, even so: the model is degenerate.
+    ArithmeticError : a division by zero or a number beyond 2**1000; the model is degenerate.
     """
     run = Run(model.without_inputs(), None, form, checkpoint_steps)
     if model.has_inputs:

@@ -14,11 +14,11 @@ class Form(IntEnum):
     form              gain, covariance, estimate
     ================  ===================================================================================
     HUNG              the first form of (99); :math:`(I - KH)P_p`; (111) with (109) and (110)
-    HUNG_SECOND_GAIN  the same, but the estimate takes :math:`P H^T R^{-1}`, the second form of (99), with
+    HUNG_SECOND_GAIN  the same, but the estimate uses :math:`P H^T R^{-1}`, the second form of (99), with
                       the new P
     INNOVATION        the first form of (99); :math:`(I - KH)P_p`; (98), by the innovation
     JOSEPH            as INNOVATION, but :math:`(I - KH)P_p(I - KH)^T + KRK^T`
-    UD                Thornton's and Bierman's recursions of the factors of :math:`P = UDU^T`
+    UD                Thornton's and Bierman's recursions for the factors of :math:`P = UDU^T`
     ================  ===================================================================================
 
     References

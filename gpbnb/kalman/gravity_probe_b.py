@@ -40,22 +40,22 @@ TRUTH = (30.0, -20.0, 6606.0, 39.0, 0.0, 0.0, 60.0, -80.0, 0.0, 4.0)
 
 
 def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearModel:
-    r"""A filter for one gyroscope of Gravity Probe B, n = 10, m = 2, a step each 10 s.
+    r"""A filter for one gyroscope of Gravity Probe B, with n = 10, m = 2 and a step every 10 s.
 
-    To first order in the angles, (1) and (2) of hung1982, ch. IV, give what the gyro's readout and the telescope show
+    To first order in the angles, (1) and (2) of hung1982, ch. IV, give the readings of gyro and telescope
     along the z axis of the rolling spacecraft,
 
     .. math:: z_r = \beta_2 + \gamma_2 + (\varphi_2 + \alpha_2)\cos\omega t + (\varphi_3 + \alpha_3)\sin\omega t,
         \qquad z_t = \beta_2 + \alpha_2\cos\omega t + \alpha_3\sin\omega t,
 
     with :math:`\varphi = \theta - \alpha`, (7). To z_r the model adds a bias and, for the readout's scale factor, the
-    known aberration of starlight by the orbit, 5.2 arcseconds in 97.5 minutes, which calibrated it in flight. What the
-    reports do not print, all noise and time constants, is our choice. Directions are tabulated to six decimals.
+    known aberration of starlight by the orbit, 5.2 arcseconds in 97.5 minutes, which calibrated it in flight. The
+    reports do not give noise and time constants, which are our choice. Directions are tabulated to six decimals.
 
     Parameters
     ----------
     roll : period in seconds, "600" (as in the reports) or "77.5" (as flown); or another multiple of half a second.
-    process_noise : whether drift, misalignments and scale perform a random walk; without it, gains fall for ever.
+    process_noise : whether drift, misalignments and scale perform a random walk; without it, gains decrease forever.
 
     References
     ----------
@@ -64,7 +64,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     half_seconds = Fraction(roll) * 2
     if half_seconds.denominator != 1 or half_seconds <= 20:
         raise ValueError(f"got roll = {roll!r}; needed a period in seconds above 10, a multiple of 0.5, as in '77.5'")
-    # In half seconds, a step is 20 and an orbit 11700.
+    # A step is 20 half seconds, an orbit 11700.
     turn, orbit = int(half_seconds), 11_700
     cycle = math.lcm(turn // math.gcd(turn, 20), orbit // 20)
     times = [20 * (k + 1) for k in range(cycle)]
@@ -90,7 +90,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
 
 
 def gravity_probe_b_year(model: LinearModel) -> Simulation:
-    """Measurements in whole milliarcseconds, for a :func:`gpbnb.kalman.gravity_probe_b.gravity_probe_b`."""
+    """Return simulated measurements in whole milliarcseconds for the model of :func:`gravity_probe_b`."""
     return Simulation(model, TRUTH, seed=SEED, resolution=1.0)
 
 
@@ -103,7 +103,7 @@ def _diagonal(entries: str) -> NDArray[Any]:
 
 
 def _cosine(part: int, whole: int) -> Fraction:
-    # The last digits of a machine's cosine are its own: six decimals are the same on all.
+    # The last digits of a cosine depend on the machine; six decimals do not.
     return Fraction(round(1_000_000 * math.cos(2 * math.pi * (part % whole) / whole)), 1_000_000)
 
 

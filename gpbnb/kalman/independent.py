@@ -1,4 +1,4 @@
-"""Random filters counted by model: formats and forms of one model are not independent trials."""
+"""Count random filters by model, because formats and forms of one model are not independent trials."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ModelShare(NamedTuple):
 
 
 def stored_shares(bound: str, form: Form) -> ModelShare:
-    """Count the stored sweep by model: each has its own seed and kind, and twelve formats.
+    """Count the stored sweep by model; each model has its own seed and kind, and twelve formats.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def first_steps(fmt: FloatFormat, models: int, kinds: Sequence[str] = ensembles.
     Parameters
     ----------
     fmt : one format, so that each model counts once.
-    models : of each kind, with seeds that the stored sweep does not use.
+    models : number of models of each kind, with seeds that the stored sweep does not use.
     """
     found = []
     for kind in kinds:

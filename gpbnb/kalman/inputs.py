@@ -1,4 +1,4 @@
-"""Known inputs and offsets: simulated measurements of a model that has them."""
+"""Simulate measurements of a model with known inputs and offsets."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gpbnb.kalman.simulation import Simulation, fine_resolution
 
 
 def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
-    """Measurements of a truth that begins at the first estimate and gets the known inputs; (steps, m).
+    """Simulate measurements (steps, m) of a truth that starts at the first estimate and gets the known inputs.
 
     They are rounded to :func:`gpbnb.kalman.simulation.fine_resolution`. The response to inputs and offsets is added to
     measurements that are simulated without them.
@@ -32,7 +32,7 @@ def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDA
 
 
 def _times(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[Any]:
-    """Sums from left to right, the same on every machine."""
+    """Multiply with sums from left to right, which are the same on every machine."""
     total = np.zeros(len(a))
     for column, value in zip(a.T, x, strict=True):
         total = total + column * value

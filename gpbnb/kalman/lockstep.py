@@ -1,4 +1,4 @@
-"""Years of many records in many formats, in lockstep: measurements and reference are computed once for all formats."""
+"""Run years of many records in many formats in lockstep, with measurements and reference computed only once."""
 
 from __future__ import annotations
 
@@ -23,41 +23,41 @@ from gpbnb.kalman.simulation import BLOCK
 REFERENCE = FloatFormat(2, 53)
 
 DECIMALS = 4
-"""Measurement matrices of base 10 have entries of so many decimals."""
+"""Number of decimals in the entries of measurement matrices in base 10."""
 
 ANGLES = 4
-"""How many of the first states are compared, two drift angles, two rates."""
+"""Number of first states that are compared, two drift angles and two rates."""
 
 
 class Source(Protocol):
-    """Where the measurements of many records come from."""
+    """Source of the measurements of many records."""
 
     @property
     def start(self) -> tuple[float, ...]:
-        """The truth at step 0."""
+        """Return the truth at step 0."""
 
     def model(self, base: int) -> LinearModel:
-        """The filter's model, as stored in a base."""
+        """Return the filter's model as stored in a base."""
 
     def matrices(self, block: int, base: int) -> NDArray[np.float64] | None:
-        """Measurement matrices of a block, (4096, m, n), in base 10 with four decimals; None if the model has them."""
+        """Return measurement matrices (4096, m, n), in base 10 with four decimals, or None if the model has them."""
 
     def measurements(
         self, record: int, block: int, truth: NDArray[np.float64], H: NDArray[np.float64] | None, steps: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Measurements of a block, (steps, m), and the truth after them; H is that of base 2."""
+        """Return measurements of a block, (steps, m), and the truth after them; H is that of base 2."""
 
 
 class Lockstep:
-    """Filters in several formats beside one reference, for the same records.
+    """Filters in several formats and one reference, for the same records.
 
     Parameters
     ----------
     name : identifies the saved state.
-    source : of model and measurements.
-    formats : all of one base.
+    source : source of model and measurements.
+    formats : formats, all of one base.
     records : numbers of the records.
-    steps : of the whole run.
+    steps : number of steps in the whole run.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class Lockstep:
                 self.block = int(saved["block"])
 
     def result(self) -> dict[str, Any]:
-        """Largest errors of the year and errors at its end, by format, state and record."""
+        """Return the largest errors of the year and errors at its end, by format, state and record."""
         return {
             "largest": self.largest.tolist(),
             "end": self.end.tolist(),

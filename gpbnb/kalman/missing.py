@@ -1,4 +1,4 @@
-"""Measurements that are missing in some steps."""
+"""Handle measurements that are missing in some steps."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gpbnb.kalman.model import LinearModel
 
 
 def real_numbers(values: Any) -> NDArray[Any]:
-    """Measurements as an array of real numbers: floats and whole numbers as they are, others as exact Fractions.
+    """Return measurements as an array: floats and whole numbers unchanged, other numbers as exact Fractions.
 
     Raises
     ------
-    ValueError, TypeError : an entry is no real number, or rows have different lengths.
+    ValueError, TypeError : an entry is not a real number, or rows have different lengths.
     """
     try:
         given = np.asarray(values)
@@ -35,18 +35,18 @@ def real_numbers(values: Any) -> NDArray[Any]:
 
 
 def without_missing(model: LinearModel, z: Any) -> tuple[LinearModel, Any]:
-    """A model of each step's measurements, and the measurements with zeros where one is missing.
+    """Return a model for the measurements of each step, and the measurements with zeros in place of missing ones.
 
-    A missing measurement has a row of zeros in H, and its noise is correlated with no other. Its column of the gain is
-    then exactly zero in every form and format, so that estimate and covariance are those of a step without it.
+    A missing measurement gets a row of zeros in H, and its noise is uncorrelated with the others. Its column of the
+    gain is then exactly zero in every form and format, so estimate and covariance are those of a step without it.
 
     Parameters
     ----------
-    z : (steps, m), with NaN for what is missing; or a masked array.
+    z : (steps, m), with NaN for missing measurements, or a masked array.
 
     Returns
     -------
-    model, z : as they came if nothing is missing.
+    model, z : unchanged if nothing is missing.
     """
     given = np.ma.getdata(z) if isinstance(z, np.ma.MaskedArray) else real_numbers(z)
     missing = np.array(np.ma.getmaskarray(z)) if isinstance(z, np.ma.MaskedArray) else np.zeros(given.shape, dtype=bool)

@@ -1,7 +1,7 @@
 r"""A model of Gravity Probe B as it flew: aberration, occultation, roll-phase offset and 1/f noise.
 
-The gyro reads, along one axis of the rolling spacecraft, the direction of its spin axis relative to the apparent
-direction of the star; the telescope reads the pointing. To first order,
+Along one axis of the rolling spacecraft, the gyro reads the direction of its spin axis relative to the apparent
+direction of the star, and the telescope reads the pointing. To first order,
 
 .. math:: z_r &= (1 + k)\,\bigl[(s_2 + \varphi_2 + \alpha_2)\cos(\omega t + \delta)
         + (s_3 + \varphi_3 + \alpha_3)\sin(\omega t + \delta)\bigr] + b + \beta + \sum_j f_j, \\
@@ -9,8 +9,8 @@ direction of the star; the telescope reads the pointing. To first order,
 
 where :math:`s` is known: the aberration of starlight due to the motions of the spacecraft and of the Earth, and the
 predicted drift. It calibrates the scale factor error k and the roll-phase offset δ. The known part of :math:`z_r` is
-subtracted before the filter, which takes :math:`\partial z_r/\partial k` and :math:`\partial z_r/\partial\delta` at
-:math:`s`. While the Earth hides the star, both rows of H are zero: nothing is measured, and no digit changes.
+subtracted before the filter, which evaluates :math:`\partial z_r/\partial k` and :math:`\partial z_r/\partial\delta` at
+:math:`s`. While the Earth hides the star, both rows of H are zero, so nothing is measured and no digit changes.
 
 Every number is in :data:`PARAMETERS`, with its source or the word "ours".
 """
@@ -53,7 +53,7 @@ YEAR_SECONDS = 365 * 86400
 
 
 class Parameter(NamedTuple):
-    """A number of the model, and where it comes from."""
+    """A number of the model, and its source."""
 
     name: str
     value: float
@@ -116,13 +116,13 @@ class Mission:
 
     Parameters
     ----------
-    flown : a step every 2 s and a roll in 77.5 s as flown; otherwise 10 s and 600 s as in the report.
+    flown : whether a step takes 2 s and a roll 77.5 s, as flown; otherwise 10 s and 600 s as in the report.
     deviations : whether the filter estimates deviations from the predicted drift, or the drift itself.
     occultation : whether the Earth hides the star for a part of each orbit.
     annual : whether the aberration due to the Earth's motion is part of the known signal.
     flicker : whether there is 1/f noise, and three states for it.
     roll_phase : whether the roll-phase offset is estimated; otherwise it is known.
-    quiet : divides both standard deviations of the readout noise.
+    quiet : divisor of both standard deviations of the readout noise.
     """
 
     flown: bool = False
@@ -156,7 +156,7 @@ class Mission:
         return 2 * math.pi * (half_seconds % roll) / roll, 2 * math.pi * (half_seconds % orbit) / orbit
 
     def visible(self, orbit: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether the star is in sight at an orbital phase; the star lies in the plane of the orbit, at phase zero."""
+        """Whether the star is visible at an orbital phase; the star lies in the plane of the orbit, at phase zero."""
         if not self.occultation:
             return np.ones(len(orbit), dtype=bool)
         radius = _VALUE["radius of the Earth"]
@@ -164,10 +164,10 @@ class Mission:
         return np.asarray(np.abs(orbit - math.pi) >= half)
 
     def known_signal(self, steps: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Known direction of the gyro relative to the apparent star, (k, 2), in arcsec: north and east.
+        """Return the known direction of the gyro relative to the apparent star, (k, 2), north and east, in arcsec.
 
-        Aberration moves the star along the velocity: that of the orbit lies in its plane, which contains the pole and
-        the star; the Earth's is taken on a circle in the ecliptic.
+        Aberration shifts the star along the velocity. The orbital velocity lies in the plane of the orbit, which
+        contains the pole and the star. The Earth is assumed to move on a circle in the ecliptic.
         """
         _, orbit = self.phases(steps)
         years = self.interval * steps / YEAR_SECONDS
@@ -181,7 +181,7 @@ class Mission:
     # -- the filter's model -----------------------------------------------------------------------------
 
     def model(self, base: int) -> LinearModel:
-        """The model without its measurement matrices, which :meth:`matrices` gives block by block.
+        """Return the model without its measurement matrices, which :meth:`matrices` returns block by block.
 
         Numbers are stored in 14 bits or 4 decimal digits, so that all formats of a base use the same model.
         """
@@ -205,7 +205,7 @@ class Mission:
             *(walks[4],) * 2,
             *(flicker * (1 - each_memory**2) for each_memory in memory),
         ]
-        # The mean of 10 hours of a rolling signal has twice the variance of that of a constant.
+        # The mean of a rolling signal over 10 hours has twice the variance of the mean of a constant.
         white = _VALUE["white readout noise, mean of 10 hours"] ** 2 / 2 * 36_000 / self.interval / self.quiet**2
         telescope = _VALUE["telescope noise in 10 s"] ** 2 * 10 / self.interval
         first = [
@@ -225,10 +225,10 @@ class Mission:
         )
 
     def matrices(self, block: int, base: int) -> NDArray[np.float64]:
-        """Measurement matrices of a block of steps, (4096, 2, 13).
+        """Return measurement matrices of a block of steps, (4096, 2, 13).
 
-        Entries are multiples of 2⁻¹² or 10⁻⁴: up to 17 bits or 6 digits, the same on every machine and for every
-        format of the base that has as many.
+        Entries are multiples of 2⁻¹² or 10⁻⁴, with up to 17 bits or 6 digits. They are the same on every machine and
+        for every format of the base with at least as many digits.
         """
         steps = np.arange(block * BLOCK, (block + 1) * BLOCK, dtype=np.int64) + 1
         turn, orbit = self.phases(steps)
@@ -247,7 +247,7 @@ class Mission:
 
     @property
     def start(self) -> tuple[float, ...]:
-        """True initial state, which the filter is to find."""
+        """Return the true initial state, which the filter must find."""
         rates = [_VALUE[f"{name}, true less predicted"] for name in ("geodetic drift", "frame dragging")]
         if not self.deviations:
             rates[0] += _VALUE["geodetic drift, predicted"]
@@ -269,13 +269,13 @@ class Mission:
     def measurements(
         self, record: int, block: int, truth: NDArray[np.float64], H: NDArray[np.float64] | None, steps: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Measurements of a block, (steps, 2), in whole mas, and the truth after them.
+        """Return measurements of a block, (steps, 2), in whole mas, and the truth after them.
 
         Parameters
         ----------
-        record : chooses the noise, ``default_rng([2004, record, block])``.
-        truth : (13,), at the beginning of the block.
-        H : that of :meth:`matrices` in base 2.
+        record : number that selects the noise, ``default_rng([2004, record, block])``.
+        truth : (13,), the truth at the beginning of the block.
+        H : the result of :meth:`matrices` in base 2.
         """
         if H is None:
             raise ValueError("got no measurement matrices; needed those of matrices(block, 2)")
@@ -290,7 +290,7 @@ class Mission:
 
 
 def _earth_velocity(years: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Components, north and east of IM Pegasi, of the Earth's velocity over its mean, (k, 2); a circle."""
+    """Return the Earth's velocity on a circle, (k, 2), north and east as seen at IM Pegasi, over its mean."""
     ra, dec, tilt = (
         math.radians(_VALUE[name])
         for name in ("right ascension of IM Pegasi", "declination of IM Pegasi", "obliquity of the ecliptic")
@@ -304,7 +304,7 @@ def _earth_velocity(years: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _short(values: NDArray[np.float64], base: int) -> NDArray[Any]:
-    """The nearest numbers of 14 bits or 4 decimal digits, exactly; from 9 digits, the same on every machine."""
+    """Return the nearest numbers of 14 bits or 4 decimal digits, via 9 digits that are the same on every machine."""
     digits = 4 if base == 10 else 14
     result = np.empty(values.shape, dtype=object)
     for index in np.ndindex(values.shape):

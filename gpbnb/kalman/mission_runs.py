@@ -1,4 +1,4 @@
-"""The year of :mod:`gpbnb.kalman.mission` in several formats, and how each modelling choice moves its errors.
+"""Run the year of :mod:`gpbnb.kalman.mission` in several formats, with one modelling choice changed at a time.
 
 ``python -m gpbnb.kalman.mission_runs`` computes the sweep and continues where it was interrupted.
 """
@@ -39,7 +39,7 @@ SETTINGS = {
 
 RECORDS = 30
 SHOWN = 300
-"""Records of the candidate formats. If 299 records all pass, they show a probability of 99 %."""
+"""Number of records for the candidate formats. If 299 records all pass, they show a probability of 99 %."""
 SEED = 2004
 _HERE = Path(__file__).parent
 
@@ -59,17 +59,17 @@ class Cell:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The first columns of this cell's first row."""
+        """Return the first columns of this cell's first row."""
         return (*self.heads()[0], str(self.first))
 
     def heads(self) -> list[tuple[str, ...]]:
-        """The first columns of the rows of each format."""
+        """Return the first columns of the rows of each format."""
         head = self.setting, self.states, str(self.base), self.rounding, self.form
         return [(*head, str(precision)) for precision in self.precisions]
 
     @property
     def mission(self) -> Mission:
-        """The model of this cell."""
+        """Return the model of this cell."""
         return replace(SETTINGS[self.setting], deviations=self.states == "deviation")
 
 
@@ -116,7 +116,7 @@ def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """Compute the row of one format and record alone."""
+    """Compute only the row of one format and record."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
     one = replace(cell, precisions=(precision,), first=record, count=1)
     return rows(one, compute(one))
@@ -131,12 +131,12 @@ class RollPhase(NamedTuple):
 
 
 def roll_phase_after(blocks: int, record: int = 0) -> RollPhase:
-    """Run the mission model in float64 with deviation states, and read what it knows about the roll phase.
+    """Run the mission model in float64 with deviation states, and return its knowledge of the roll phase.
 
     Parameters
     ----------
-    blocks : of 4096 steps.
-    record : of the measurements.
+    blocks : number of blocks of 4096 steps.
+    record : number of the record.
     """
     mission = Mission(deviations=True)
     run = Records(mission.model(2), REFERENCE, Form.INNOVATION, 1)
@@ -172,6 +172,7 @@ SWEEP: Sweep[Cell] = Sweep(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     return run_command(SWEEP, "A year of the mission model.", Path(".cache/mission"), arguments)
 
 

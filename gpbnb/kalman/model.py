@@ -1,4 +1,4 @@
-"""What a Kalman filter is given: a linear model, checked once."""
+"""The linear model of a Kalman filter, checked once."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class LinearModel:
     .. math:: x_k = \Phi_{k-1} x_{k-1} + B_{k-1} u_{k-1} + b_{k-1} + w_{k-1}, \qquad z_k = H_k x_k + d_k + v_k, \qquad
         w_k \sim N(0, Q_k),\ v_k \sim N(0, R_k)
 
-    Each matrix and offset may be one for all steps, or a cycle of them with a leading axis: step k = 1, 2, … takes
-    the member (k - 1) mod p, of each cycle with its own p. It may also be a function of k, which is called for
-    k = 1 … `steps`. Entries are held exactly, as Fractions; numbers, strings and Decimals are read exactly too.
+    Each matrix and offset may be the same for all steps, or a cycle with a leading axis. Step k = 1, 2, … then uses
+    member (k - 1) mod p; each cycle has its own p. It may also be a function of k, which is called for
+    k = 1 … `steps`. Entries are stored exactly, as Fractions; numbers, strings and Decimals are read exactly.
 
     Without u, b and d this is the model of the report. With them, a filter predicts
     :math:`((\Phi\hat x) + (Bu)) + b` and takes the innovation :math:`(z - d) - H\hat x`, in this order.
@@ -37,19 +37,19 @@ class LinearModel:
     R : (m, m) or (p, m, m), covariance of the measurement noise, positive definite.
     x0 : (n,), the first estimate.
     P0 : (n, n), its covariance, positive semidefinite.
-    name : what tables and figures call it.
-    repair : whether to undo roundings in Q, R and P0, as :mod:`gpbnb.kalman.covariance` states. By default only in
-        those that are given in floats; covariances of strings, whole numbers and Fractions are taken at their word.
+    name : name in tables and figures.
+    repair : whether to repair rounding errors in Q, R and P0, as described in :mod:`gpbnb.kalman.covariance`. By
+        default, only covariances given in floats are repaired, not those of strings, whole numbers or Fractions.
     B : (n, p) or (c, n, p), input matrix.
     u : (steps, p), known inputs, row k - 1 for step k; or (p,), the same in every step.
     b : (n,) or (c, n), known offset of the states.
     d : (m,) or (c, m), known offset of the measurements.
-    steps : how many steps the model describes; needed if something is a function. By default as many as `u` has rows,
-        or any number. A longer run is refused.
+    steps : number of steps that the model describes; required if an argument is a function. By default the number of
+        rows of `u`, or any number. A longer run is rejected.
 
     Attributes
     ----------
-    repairs : what was changed; empty if nothing was.
+    repairs : the changes made; empty if there are none.
 
     Raises
     ------
@@ -99,11 +99,12 @@ class LinearModel:
             entries.flags.writeable = False
             object.__setattr__(self, letter, entries)
         if self.x0.ndim != 1 or not self.x0.size:
-            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number a state")
+            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number per state")
         n = self.x0.size
         if self.H.ndim != 3 or 0 in self.H.shape or self.H.shape[2] != n:
             raise ValueError(
-                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), a row a measurement and a column a state of x0"
+                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), one row per measurement and "
+                "one column per state of x0"
             )
         m = self.H.shape[1]
         for letter, size in (("Phi", n), ("Q", n), ("R", m)):
@@ -128,7 +129,7 @@ class LinearModel:
         object.__setattr__(self, "repairs", tuple(repairs))
 
     def _evaluate_functions(self) -> None:
-        """Replace functions of the step by what they give for each step."""
+        """Replace functions of the step by their values for each step."""
         if self.steps is not None and (
             isinstance(self.steps, bool) or not isinstance(self.steps, (int, np.integer)) or self.steps < 1
         ):
@@ -145,7 +146,7 @@ class LinearModel:
                 object.__setattr__(self, letter, np.array(members) if in_floats(members) else exact(members))
 
     def _read_inputs(self) -> None:
-        """Known inputs and offsets as exact cycles."""
+        """Read known inputs and offsets as exact cycles."""
         n, m = self.n, self.m
         if (self.B is None) != (self.u is None):
             raise ValueError(
@@ -177,7 +178,8 @@ class LinearModel:
             object.__setattr__(self, letter, entries)
         if self.B is not None and self.B.shape[2] != self.u.shape[-1]:
             raise ValueError(
-                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers a step; needed as many"
+                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers per "
+                "step; needed equal numbers"
             )
 
     @property
@@ -186,11 +188,11 @@ class LinearModel:
         return any(getattr(self, letter) is not None for letter in _INPUTS)
 
     def without_inputs(self) -> LinearModel:
-        """The same model without known inputs and offsets."""
+        """Return the same model without known inputs and offsets."""
         return replace(self, B=None, u=None, b=None, d=None, repair=False) if self.has_inputs else self
 
     def known(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
-        """What step k + 1 adds to the states, :math:`Bu + b`, and to the measurements, d; exact, (n,) and (m,)."""
+        """Return the exact input of step k + 1, :math:`Bu + b`, (n,), and the measurement offset d, (m,)."""
         state, measurement = (np.array([Fraction(0)] * size, dtype=object) for size in (self.n, self.m))
         if self.B is not None:
             state = state + self.B[k % len(self.B)] @ (self.u if self.u.ndim == 1 else self.u[k])
@@ -199,11 +201,11 @@ class LinearModel:
         return state, measurement if self.d is None else self.d[k % len(self.d)]
 
     def refuse_inputs(self, what: str) -> None:
-        """Refuse a model with known inputs or offsets where they would be ignored.
+        """Reject a model with known inputs or offsets where they would be ignored.
 
         Raises
         ------
-        ValueError : there are some.
+        ValueError : the model has inputs or offsets.
         """
         if self.has_inputs:
             raise ValueError(
@@ -212,7 +214,7 @@ class LinearModel:
             )
 
     def check_steps(self, count: int) -> None:
-        """Refuse a run that is longer than the model describes.
+        """Reject a run that is longer than the model describes.
 
         Raises
         ------
@@ -223,32 +225,32 @@ class LinearModel:
 
     @property
     def n(self) -> int:
-        """How many states there are."""
+        """Number of states."""
         return int(self.x0.size)
 
     @property
     def m(self) -> int:
-        """How many measurements a step brings."""
+        """Number of measurements in each step."""
         return int(self.H.shape[1])
 
     @property
     def cycle(self) -> int:
-        """After how many steps all four matrices begin again."""
+        """Number of steps after which all four matrices repeat."""
         return math.lcm(*(len(each) for each in (self.Phi, self.H, self.Q, self.R)))
 
     def rounded(self, fmt: FloatFormat) -> LinearModel:
-        """The model as a computer of this format stores it: each entry rounded.
+        """Return the model as a computer with this format stores it, with each entry rounded.
 
         Raises
         ------
-        ValueError : so few digits make a covariance indefinite.
+        ValueError : rounding to so few digits makes a covariance indefinite.
         """
         given = [letter for letter in (*_LETTERS, *_INPUTS) if getattr(self, letter) is not None]
         stored = {letter: fmt.array(getattr(self, letter)).to_fractions() for letter in given}
         return LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
-        """The nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter."""
+        """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter."""
         return {letter: getattr(self, letter).astype(np.float64) for letter in _LETTERS}
 
 
@@ -257,7 +259,7 @@ _INPUTS = ("B", "u", "b", "d")
 
 
 def _repaired_cycle(letter: str, matrices: NDArray[Any], strictly: bool, repairs: list[Repair]) -> NDArray[Any]:
-    """The covariances of a cycle, or the only one, each repaired where it needs to be; `repairs` gets the changes."""
+    """Repair the covariances of a cycle, or the only one, where necessary; append the changes to `repairs`."""
     result = []
     for member, matrix in enumerate(matrices.reshape(-1, *matrices.shape[-2:])):
         sound, changed = repaired(letter, member, matrix, strictly)

@@ -1,4 +1,4 @@
-"""Arguments as users write them: forms and roundings by name, whole numbers."""
+"""Read arguments as users write them: forms and roundings by name, and whole numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpbnb.kalman.forms import Form
 
 
 def form_named(form: AnyForm | str) -> AnyForm:
-    """A form, or the form of this name; capitals, blanks and hyphens do not count.
+    """Return a form, or the form with this name; case, blanks and hyphens are ignored.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def form_named(form: AnyForm | str) -> AnyForm:
 
 
 def rounding_named(rounding: Rounding | str) -> Rounding:
-    """A rounding, or the rounding of this name.
+    """Return a rounding, or the rounding with this name.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def rounding_named(rounding: Rounding | str) -> Rounding:
 
 
 def whole_number(name: str, value: Any, least: int = 1) -> int:
-    """A whole number that is not below `least`; True and False are no numbers.
+    """Return a whole number that is not below `least`; True and False are not numbers.
 
     Raises
     ------

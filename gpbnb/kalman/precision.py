@@ -1,4 +1,4 @@
-"""The number of digits that your own filter needs."""
+"""Find the number of digits that your own filter needs."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 MOST_SIMULATED = 10**8
-"""Largest number of steps that are simulated. A small model takes about a second for a million of them."""
+"""Largest number of steps to simulate. A small model takes about a second for a million steps."""
 
 
 def required_precision(
@@ -49,10 +49,10 @@ def required_precision(
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a tolerance.
 
-    The search is a bisection. It checks what it assumes: the answer, the next two precisions, and those of binary32 and
-    binary64 above it (:data:`gpbnb.arithmetic.search.CHECKED`) were run and meet the tolerance; the next lower one, if
-    any, was run and does not qualify. If a higher precision misses the tolerance, every precision up to the largest is
-    run, the answer lies above the highest that misses it, and the other forms are tried.
+    The search is a bisection, and checks its own assumption: the answer, the next two precisions, and those of binary32
+    and binary64 above it (:data:`gpbnb.arithmetic.search.CHECKED`) were run and meet the tolerance; the next lower one,
+    if any, was run and does not qualify. If a higher precision misses the tolerance, every precision up to the largest
+    is run, the answer lies above the highest that misses it, and the other forms are tried.
 
     Parameters
     ----------
@@ -62,20 +62,20 @@ def required_precision(
     tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
         accuracy does not matter an infinite tolerance. For a linear system, of each output.
     base : 2, 10 or 16.
-    rounding, form : or their names, such as "nearest" and "UD"; see :class:`gpbnb.kalman.forms.Form` and
+    rounding, form : values or their names, such as "nearest" and "UD"; see :class:`gpbnb.kalman.forms.Form` and
         :class:`gpbnb.kalman.array_forms.ArrayForm`.
     basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
-        the model are among those of the arithmetic; the answer is for these measurements. "bound" takes the
-        contraction bound of :mod:`gpbnb.kalman.contraction`, which certainly holds for the arithmetic of this run and
-        asks for more digits. "guarantee" bounds the error for every measurement sequence within limits, and for ever
+        the model are among those of the arithmetic; the answer is for these measurements. "bound" uses the
+        contraction bound of :mod:`gpbnb.kalman.contraction`, which is proved for the arithmetic of this run and
+        requires more digits. "guarantee" bounds the error for every measurement sequence within limits, and forever
         (``guarantee``); "probable" takes three standard deviations of the error that independent
         roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
-    z : (steps, m), measurements, NaN or masked where one is missing; by default simulated by the model, from its first
+    z : (steps, m), measurements, NaN or masked if missing; by default simulated with the model, from its first
         estimate, and rounded to :func:`gpbnb.kalman.simulation.fine_resolution`.
-    seed : of the simulation.
-    progress : show a bar, a tick a precision.
+    seed : seed of the simulation.
+    progress : show a progress bar that counts precisions.
 
     Raises
     ------
@@ -108,8 +108,9 @@ def required_precision(
             )
     if z is None and steps > MOST_SIMULATED:
         raise ValueError(
-            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: they take hours; try fewer, and see "
-            "how the answer grows: gpbnb.wordlength.study.required_precision_by_steps"
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; "
+            "try fewer, and see how the answer grows with "
+            "gpbnb.wordlength.study.required_precision_by_steps"
         )
     if z is None:
         z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
@@ -143,7 +144,7 @@ def _better_form(
     tick: Callable[[], Any],
     bounds: bool,
 ) -> str:
-    """Advice: the form that meets the tolerance with the fewest digits; empty if none does."""
+    """Name the form that meets the tolerance with the fewest digits, as advice; empty if there is none."""
     others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not form]
     answers = [(other, Search(errors_of(other), base, rounding, checks, tick, bounds).fmt) for other in others]
     met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
@@ -160,15 +161,15 @@ def survey(
     form: AnyForm | str = Form.INNOVATION,
     basis: Basis = "emulation",
 ) -> tuple[tuple[int, float], ...]:
-    """Run a filter in each of some precisions; arguments as of :func:`required_precision`.
+    """Run a filter in each of some precisions; for the arguments, see :func:`required_precision`.
 
     Returns
     -------
-    tried : precision, and largest error or bound over tolerance, as in :class:`gpbnb.kalman.requirement.Requirement`.
+    tried : precision, and largest error or bound / tolerance, as in :class:`gpbnb.kalman.requirement.Requirement`.
 
     Raises
     ------
-    ValueError : as :func:`required_precision`; a precision without compiled loops.
+    ValueError : for a reason given in :func:`required_precision`; a precision without compiled loops.
     """
     form, rounding = form_named(form), rounding_named(rounding)
     if not isinstance(model, LinearModel) and callable(model):
@@ -179,7 +180,7 @@ def survey(
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
-        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
+        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
     formats = _formats(base, precisions, rounding)
     checkpoint_steps = log_spaced(len(measured), 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
@@ -199,20 +200,20 @@ def _formats(base: int, precisions: Sequence[int], rounding: Rounding) -> list[F
 
 
 def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
-    """The tolerance of each state, if all that was asked makes sense."""
+    """Check the question, and return the tolerance of each state."""
     if not isinstance(model, LinearModel):
         raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel or a LinearSystem")
     return checked_tolerance(tolerance, model.n, "states", base, basis)
 
 
 def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[Any]:
-    """Measurements, (steps, m), each of them a number."""
+    """Return measurements (steps, m) that are all numbers."""
     measured = np.asarray(z)
     if measured.ndim != 2 or measured.shape[1] != model.m or not len(measured) or steps not in (None, len(measured)):
         count = f"{steps} steps" if steps else "steps, at least one"
         column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
-        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else str(z)
-        raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
+        length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else "a single number"
+        raise ValueError(f"got {length}; needed one measurement for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
         raise ValueError(
@@ -231,11 +232,11 @@ def _error_over_tolerance(
     true: Checkpoints | None,
     tolerances: NDArray[np.float64],
 ) -> tuple[float, str]:
-    """Largest error, or without `true` largest bound, over tolerance; infinity and the reason if there is none."""
+    """Return the largest error, or without `true` the largest bound, over tolerance; or infinity and the reason."""
     asked, measured = np.isfinite(tolerances), fmt.array(z)
     try:
         run = _opened(model, fmt, form, checkpoint_steps, true is None)
-    except ValueError as error:  # a covariance is not definite in so few digits
+    except ValueError as error:  # with so few digits, a covariance is not definite
         return math.inf, str(error)
     run.take(measured)
     if run.stopped is not None:
@@ -247,14 +248,14 @@ def _error_over_tolerance(
         if run.indefinite is not None:
             lost = f"a computed variance was not positive at step {run.indefinite}"
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
-    ratio = float((np.abs(errors[:, asked]) / tolerances[asked]).max())
+    ratio = largest_ratio(np.abs(errors[:, asked]), tolerances[asked])
     return ratio, "the bound says nothing" if math.isinf(ratio) else ""
 
 
 def _opened(
     model: LinearModel, fmt: FloatFormat, form: AnyForm, checkpoint_steps: Sequence[int], bounded: bool
 ) -> Run | BoundedRun | ArrayRun:
-    """A run in compiled loops if the form has them and the model has no inputs, or else in array operations."""
+    """Return a run in compiled loops if the form has them and the model has no inputs, else in array operations."""
     if model.has_inputs or isinstance(form, ArrayForm):
         return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
     return (BoundedRun if bounded else Run)(model, fmt, form, checkpoint_steps)
@@ -268,7 +269,7 @@ def _guaranteed(
     tolerances: NDArray[np.float64],
     basis: Basis,
 ) -> tuple[float, str]:
-    """Guaranteed error, or three times the probable one, over tolerance; infinity and the reason if there is none."""
+    """Return the guaranteed error, or three times the probable error, over tolerance; or infinity and the reason."""
     asked = np.isfinite(tolerances)
     try:
         found = guarantee(model, fmt, within, form, horizon=1)
@@ -277,4 +278,4 @@ def _guaranteed(
     if not found.for_ever:
         return math.inf, found.why
     errors = found.bound if basis == "guarantee" else 3 * probable_error(found)
-    return float((errors[asked] / tolerances[asked]).max()), ""
+    return largest_ratio(errors[asked], tolerances[asked]), ""

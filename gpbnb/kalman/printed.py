@@ -1,4 +1,4 @@
-"""What (125) allows a run: the quantities of hung1984, ch. II, (122), taken from a run."""
+"""Evaluate (125) of hung1984, ch. II, for a run, with the quantities of (122) from this run."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from gpbnb.kalman.model import LinearModel
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    r"""What (125) needs of a run, after each of its first steps; arrays (c,).
+    r"""Quantities of a run that (125) needs, after each of the first steps; arrays (c,).
 
     Parameters
     ----------
     n, m : dimensions of the state and of the measurement.
     x : :math:`\|x_k\|`, norm (21).
-    u : largest :math:`\|u_i\|` so far, norm (21); the least that B may be, as (122) asks for it with i = 0.
-    columns, rows : largest :math:`\|F_i\|` so far, by the norm (22) and by that which belongs to (21).
+    u : largest :math:`\|u_i\|` so far, norm (21); by (122) with i = 0, B is at least this large.
+    columns, rows : largest :math:`\|F_i\|` so far, in norm (22) and in the matrix norm compatible with (21).
     """
 
     n: int
@@ -33,19 +33,19 @@ class Terms:
     rows: NDArray[np.float64]
 
     def smallest_bound(self, fmt: FloatFormat, k: int, **faults: bool) -> float:
-        """Bound (125) at step k with the least B that any filter with these inputs could have.
+        """Return bound (125) at step k with the least B that any filter with these inputs could have.
 
         Parameters
         ----------
-        fmt : gives β. k : 1 or more; beyond the last of the steps, x and u of the last are taken.
-        faults : to correct, as for :func:`gpbnb.kalman.report_bounds.coefficients`.
+        fmt : format that defines β. k : 1 or more; beyond the last step, x and u of the last step are used.
+        faults : faults to correct, as for :func:`gpbnb.kalman.report_bounds.coefficients`.
         """
         first, second = report_bounds.coefficients(k, self.n, self.m, **faults)
         last = min(k, len(self.x)) - 1
         return float(fmt.unit_roundoff) * (first * float(self.x[last]) + second * float(self.u[last]))
 
     def powers(self) -> float:
-        r"""How many powers of ten :math:`F^{k-1}`, which B must contain, is worth after the last step."""
+        r"""Return the power of ten of :math:`F^{k-1}`, a factor that B must contain, after the last step."""
         return (len(self.columns) - 1) * float(np.log10(self.columns[-1]))
 
 
@@ -54,11 +54,11 @@ def terms(model: LinearModel, true: Checkpoints) -> Terms:
 
     Parameters
     ----------
-    true : estimates and gains of each step from the first on.
+    true : estimates and gains of each step, from the first step on.
 
     Raises
     ------
-    ValueError : steps left out, or none.
+    ValueError : steps are missing, or there are none.
     """
     if not true.steps or true.steps != tuple(range(1, len(true.steps) + 1)):
         raise ValueError(f"got the steps {true.steps[:4]} …; needed 1, 2, 3, …; take range(1, {len(true.steps) + 1})")

@@ -1,4 +1,4 @@
-"""How likely a year stays within a tolerance: shares of records, their confidence, and the precision needed."""
+"""Estimate how likely a year stays within a tolerance: shares of records, confidence, and the precision needed."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ CONFIDENCE = 0.95
 class Share(NamedTuple):
     """Largest errors of a year in one format, over many records; in mas and mas/yr.
 
-    `low` and `high` limit the probability that a record stays within the tolerance; `quantile_limit` is an upper limit
-    of the 99 % quantile if the logarithms of the errors are normally distributed. Each has a confidence of 95 %,
-    one-sided.
+    `low` and `high` limit the probability that a record stays within the tolerance. `quantile_limit` is an upper limit
+    of the 99 % quantile if the logarithms of the errors are normally distributed. Each limit is one-sided and has a
+    confidence of 95 %.
     """
 
     setting: str
@@ -36,18 +36,18 @@ class Share(NamedTuple):
 
     @property
     def records(self) -> int:
-        """How many records there are."""
+        """Number of records."""
         return len(self.errors)
 
     def quantile(self, probability: float) -> float:
-        """Quantile of the errors that were observed."""
+        """Return a quantile of the observed errors."""
         return float(np.quantile(self.errors, probability))
 
 
 def interval(within: int, records: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
-    r"""Limits of a probability of which `within` of `records` trials were successes; Clopper and Pearson 1934.
+    r"""Return limits of a probability if `within` of `records` trials were successes; Clopper and Pearson 1934.
 
-    Each limit is one-sided: with n successes of n the lower one is :math:`(1-c)^{1/n}` for a confidence c.
+    Each limit is one-sided. With n successes in n trials, the lower limit is :math:`(1-c)^{1/n}` for a confidence c.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def interval(within: int, records: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def records_needed(probability: float, confidence: float = CONFIDENCE) -> int:
-    r"""How many records must all succeed before `probability` is shown: :math:`\ln(1-c)/\ln p`, rounded up.
+    r"""Return the number of records that must all succeed to show `probability`: :math:`\ln(1-c)/\ln p`, rounded up.
 
     Examples
     --------
@@ -82,9 +82,9 @@ def records_needed(probability: float, confidence: float = CONFIDENCE) -> int:
 
 
 def quantile_limit(errors: NDArray[np.float64], probability: float = 0.99, confidence: float = CONFIDENCE) -> float:
-    """Upper limit of a quantile of errors whose logarithms are normally distributed; the tolerance factor of Owen 1968.
+    """Return an upper limit of a quantile for errors with normally distributed logarithms, by Owen 1968.
 
-    Infinite with fewer than two records, or if an error is infinite.
+    The limit is infinite with fewer than two records, or if an error is infinite.
 
     Raises
     ------
@@ -101,12 +101,12 @@ def quantile_limit(errors: NDArray[np.float64], probability: float = 0.99, confi
 
 
 def shares(table: Table, tolerance: float = 1.0) -> tuple[Share, ...]:
-    """Shares of the records of each format that stay within the tolerance throughout the year.
+    """Return, for each format, the share of records that stay within the tolerance throughout the year.
 
     Parameters
     ----------
-    table : with the columns of ``COLUMNS``, and perhaps one named `setting` before them.
-    tolerance : of the drift angles in mas and of their rates in mas/yr, at every step.
+    table : table with the columns of ``COLUMNS``, and possibly a column `setting` before them.
+    tolerance : tolerance for the drift angles in mas and their rates in mas/yr, at every step.
     """
     groups: dict[tuple[str, ...], list[float]] = {}
     for row in table.records():
@@ -130,9 +130,10 @@ def _order(share: Share) -> tuple[object, ...]:
 class Needed(NamedTuple):
     """The smallest precisions of one base that meet a tolerance with a probability; None if no format does.
 
-    `observed`: the share of the records is as large. `lognormal`: the upper limit of the quantile is in the tolerance.
-    `shown`: the lower limit of the probability, without an assumption on the distribution, is as large; no higher
-    precision that was run refutes it, and those may have fewer records.
+    For `observed`, the share of records within the tolerance is at least this probability. For `lognormal`, the upper
+    limit of the quantile is within the tolerance. For `shown`, the lower limit of the probability, without an
+    assumption about the distribution, is at least this probability; higher precisions may have fewer records but must
+    not refute it.
     """
 
     observed: int | None
@@ -145,15 +146,15 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
 
     Parameters
     ----------
-    found : formats of one base, rounding, form and choice of states.
+    found : shares for formats of one base, rounding, form and choice of states.
 
     Raises
     ------
-    ValueError : no formats, or of several kinds.
+    ValueError : no formats, or formats of several kinds.
     """
     kinds = {(each.setting, each.states, each.form, each.fmt.base, each.fmt.rounding) for each in found}
     if len(kinds) != 1:
-        raise ValueError(f"got formats of {len(kinds)} kinds; needed those of one")
+        raise ValueError(f"got formats of {len(kinds)} kinds; needed formats of one kind")
 
     def first(meets: Sequence[bool]) -> int | None:
         enough = None

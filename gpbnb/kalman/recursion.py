@@ -1,4 +1,4 @@
-"""The precision of a recursion of your own: a function written with arrays of a format."""
+"""Find the precision for your own recursion, a function written with arrays of a format."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.missing import real_numbers
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio
 
 Recursion = Callable[..., Any]
-"""Called as ``run(fmt, z)``, or ``run(fmt)`` without z; gives the outputs of all steps as arrays of the format."""
+"""A function ``run(fmt, z)``, or ``run(fmt)`` without z, that returns the outputs of all steps in the format."""
 
 REFERENCE_DIGITS = {2: (237, 355), 10: (72, 108), 16: (60, 90)}
-"""Digits of the reference, and of a second run that shows that these are enough."""
+"""Digits of the reference, and of a second run that checks whether these are enough."""
 
 SETTLED = 2.0**-20
-"""The two runs of the reference differ by at most this share of the tolerance."""
+"""Largest difference allowed between the two runs of the reference, as a share of the tolerance."""
 
 
 def required_recursion_precision(
@@ -41,16 +41,17 @@ def required_recursion_precision(
 
     Parameters
     ----------
-    run : gets a format, and `z` rounded into it; gives an output a step, as one array (steps,) or (steps, p), or as a
-        list of arrays. All of its operations must be of the format: constants are ``fmt.array("0.1")``.
+    run : function of a format, and of `z` rounded into it. It returns an output for each step, as one array (steps,) or
+        (steps, p), or as a list of arrays. All operations must be in the format; write constants as
+        ``fmt.array("0.1")``.
     tolerance : largest error of each output, in its unit; one number, or (p,).
-    z : inputs, a row a step.
-    basis : only "emulation": the errors are differences from the same function in :data:`REFERENCE_DIGITS`.
+    z : inputs, one row for each step.
+    basis : only "emulation", where errors are differences from the same function in :data:`REFERENCE_DIGITS`.
 
     Raises
     ------
-    ValueError : another basis; outputs for fewer or more steps; a reference that depends on its digits, as where a
-        comparison decides between results far apart.
+    ValueError : another basis; outputs for fewer or more steps; a reference that depends on its digits, for
+        example because a comparison decides between very different results.
     TypeError : the function leaves the format.
 
     Examples
@@ -77,7 +78,7 @@ def survey_recursion(
     formats: Sequence[FloatFormat],
     basis: Basis = "emulation",
 ) -> tuple[tuple[int, float], ...]:
-    """Precision, and largest error over tolerance, in each of some formats of one base."""
+    """Return precision, and largest error / tolerance, for some formats of one base."""
     error = _question(run, None, tolerance, z, formats[0].base, basis)
     return tuple((fmt.precision, error(fmt)[0]) for fmt in formats)
 
@@ -85,7 +86,7 @@ def survey_recursion(
 def _question(
     run: Recursion, steps: int | None, tolerance: Any, z: Any, base: int, basis: Basis
 ) -> Callable[[FloatFormat], tuple[float, str]]:
-    """A function that gives the error over the tolerance in a format, and why it is infinite."""
+    """Return a function that computes error / tolerance in a format, and why it is infinite."""
     checked_tolerance(tolerance, max(np.size(tolerance), 1), "outputs", base, basis)
     if basis != "emulation":
         raise ValueError(f'got basis "{basis}" of a function; needed "emulation": bounds exist for models')
@@ -96,10 +97,10 @@ def _question(
     true = np.asarray(long.to_fractions(), dtype=object)
     tolerances = checked_tolerance(tolerance, true.shape[1], "outputs", base, basis)
     asked = np.isfinite(tolerances)
-    off = _largest(np.asarray(short.to_fractions(), dtype=object) - true)[asked] / tolerances[asked]
-    if not off.max() <= SETTLED:
+    off = largest_ratio(_largest(np.asarray(short.to_fractions(), dtype=object) - true)[asked], tolerances[asked])
+    if not off <= SETTLED:
         raise ValueError(
-            f"got a function whose reference in {REFERENCE_DIGITS[base][0]} digits is {off.max():.2g} of the tolerance "
+            f"got a function whose reference in {REFERENCE_DIGITS[base][0]} digits is {off:.2g} of the tolerance "
             f"from that in {REFERENCE_DIGITS[base][1]}; needed one that settles: do comparisons decide between results "
             "far apart?"
         )
@@ -109,7 +110,7 @@ def _question(
             found = np.asarray(_outputs(run, fmt, inputs, len(true)).to_fractions(), dtype=object)
         except (ZeroDivisionError, OverflowError, NegativeRootError, np.linalg.LinAlgError) as fault:
             return math.inf, f"the function stops: {fault}"
-        return float((_largest(found - true)[asked] / tolerances[asked]).max()), ""
+        return largest_ratio(_largest(found - true)[asked], tolerances[asked]), ""
 
     return error
 
@@ -126,7 +127,7 @@ def _float(value: Fraction) -> float:
 
 
 def _outputs(run: Recursion, fmt: FloatFormat, z: NDArray[Any] | None, steps: int | None) -> FloatArray:
-    """What the function gives, (steps, p)."""
+    """Return the outputs of the function, (steps, p)."""
     found = run(fmt) if z is None else run(fmt, fmt.array(z))
     if isinstance(found, (list, tuple)) and found and all(isinstance(each, FloatArray) for each in found):
         found = np.stack(found)

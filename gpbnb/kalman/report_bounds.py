@@ -1,7 +1,7 @@
 r"""The rounding error bounds of hung1984, ch. II, section 12, and its closing example.
 
-:func:`coefficients` gives (125) as printed and with each of its faults corrected. All functions are exact: ints and
-Fractions in, Fractions out.
+:func:`coefficients` gives (125) as printed and with each of its faults corrected. All functions are exact: they take
+ints and Fractions and return Fractions.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from gpbnb.arithmetic.search import smallest_precision
 
 
 def prediction_count(n: int) -> int:
-    """Roundings of the predicted covariance, 2n + 1; hung1984, ch. II, (103)."""
+    """Count the roundings of the predicted covariance, 2n + 1; hung1984, ch. II, (103)."""
     return 2 * n + 1
 
 
 def covariance_count(n: int, m: int) -> int:
-    """Roundings of the covariance, 3n + m + 2; hung1984, ch. II, (105)."""
+    """Count the roundings of the covariance, 3n + m + 2; hung1984, ch. II, (105)."""
     return 3 * n + m + 2
 
 
 def gain_count(n: int, m: int) -> int:
-    """Roundings of the gain, 4n + 2m + 3; hung1984, ch. II, (108)."""
+    """Count the roundings of the gain, 4n + 2m + 3; hung1984, ch. II, (108)."""
     return 4 * n + 2 * m + 3
 
 
 def transition_count(n: int, m: int) -> int:
-    """Roundings of the closed loop in a step, its product with the state among them, 6n + 3m + 5; (115)."""
+    """Count the roundings of the closed loop in a step, including its product with the state, 6n + 3m + 5; (115)."""
     return 6 * n + 3 * m + 5
 
 
 def input_count(n: int, m: int) -> int:
-    """Roundings of what a step adds, its addition among them, 4n + 3m + 4; hung1984, ch. II, (116)."""
+    """Count the roundings of the input of a step, including its addition, 4n + 3m + 4; hung1984, ch. II, (116)."""
     return 4 * n + 3 * m + 4
 
 
@@ -67,7 +67,7 @@ def printed_gain_bound(K: Any, beta: Fraction) -> NDArray[Any]:
 
 
 class Coefficients(NamedTuple):
-    r"""What multiplies :math:`\beta\|x_k\|` and :math:`\beta B` in a bound like (125)."""
+    r"""Factors of :math:`\beta\|x_k\|` and :math:`\beta B` in a bound like (125)."""
 
     first: int
     second: int
@@ -85,10 +85,10 @@ def coefficients(
     Parameters
     ----------
     k : steps. n, m : dimensions of the state and of the measurement.
-    once : do not count the product with the state and the last addition again, that (114)-(116) have counted already.
-    free_signs : let each term have an error of its own sign, :math:`a_0 + a_i` for :math:`a_0 - a_i`.
-    carried : let the errors of P from the steps before go on into P, K and F, as the report's own algebra does with
-        every other error: 3n + m + 2 more roundings at each step.
+    once : whether to count only once the product with the state and the last addition, which (114)-(116) count already.
+    free_signs : whether each term has an error of its own sign, so that :math:`a_0 + a_i` replaces :math:`a_0 - a_i`.
+    carried : whether the errors of P from earlier steps propagate into P, K and F, as all other errors do in the
+        report's own algebra; this adds 3n + m + 2 roundings at each step.
 
     Raises
     ------
@@ -130,10 +130,12 @@ def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fr
 
     Raises
     ------
-    ValueError : none, or not as many of one as of the other.
+    ValueError : no steps, or different numbers of transitions and inputs.
     """
     if not transitions or len(transitions) != len(inputs):
-        raise ValueError(f"got {len(transitions)} transitions and {len(inputs)} inputs; needed as many, at least one")
+        raise ValueError(
+            f"got {len(transitions)} transitions and {len(inputs)} inputs; needed equal numbers, at least one of each"
+        )
     F, u = max(map(column_sum_norm, transitions)), max(map(max_norm, inputs))
     return u * max(Fraction(1), F ** (len(inputs) - 1))
 
@@ -155,8 +157,8 @@ def precision_for_coefficient(
 
     Parameters
     ----------
-    coefficient : what multiplies β. tolerance : the error that is granted, in the same units.
-    base, rounding : of the format.
+    coefficient : the factor of β. tolerance : the allowed error, in the same units.
+    base, rounding : base and rounding of the format.
 
     Raises
     ------
@@ -170,7 +172,7 @@ def precision_for_coefficient(
         raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
     found = smallest_precision(lambda fmt: coefficient * fmt.unit_roundoff <= tolerance, base, rounding, monotone=True)
     if found is None:
-        raise ArithmeticError("the unit roundoff falls without limit: some precision must be enough")
+        raise ArithmeticError("got no sufficient precision, although the unit roundoff can be arbitrarily small")
     return found.precision
 
 
@@ -191,7 +193,7 @@ PRINTED = {
 
 
 def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction:
-    """The second coefficient with its plus sign read as times, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
+    """Return the second coefficient with × in place of +, k(3n + 1) · 0.5(k - 1)(7n + 3m + 6).
 
     Parameters
     ----------
@@ -201,14 +203,14 @@ def read_as_product(k: int, n: int, m: int, loop: int | None = None) -> Fraction
 
 
 def one_digit_misprints(k: int, n: int, m: int, printed: str) -> list[tuple[int, int, int]]:
-    """Every (a, b, c) that differs from (7, 3, 6) in one figure and for which k(an + bm + c) comes out as `printed`."""
+    """List every (a, b, c) that differs from (7, 3, 6) in one digit and makes k(an + bm + c) print as `printed`."""
     right = (7, 3, 6)
     changed = [(*right[:i], figure, *right[i + 1 :]) for i in range(3) for figure in range(10) if figure != right[i]]
     return [(a, b, c) for a, b, c in changed if prints_as(k * (a * n + b * m + c), printed)]
 
 
 def dependencies(second: bool) -> dict[str, set[str]]:
-    """Which of (98)-(101) needs which, with the first or the second form of (99)."""
+    """List which of (98)-(101) each of them needs, with the first or the second form of (99)."""
     return {
         "(100)": set(),
         "(99)": {"(101)"} if second else {"(100)"},
@@ -218,7 +220,7 @@ def dependencies(second: bool) -> dict[str, set[str]]:
 
 
 def order(second: bool) -> tuple[str, ...] | None:
-    """In which order (98)-(101) can be computed; None if in none."""
+    """Return an order in which (98)-(101) can be computed, or None."""
     try:
         return tuple(TopologicalSorter(dependencies(second)).static_order())
     except CycleError:
@@ -230,23 +232,23 @@ YEAR_SIZE = Fraction(6606)
 
 
 def bound_for_size(beta: Fraction, k: int, n: int, m: int, size: Fraction, **faults: bool) -> Fraction:
-    r"""Bound (125) with :math:`\|x_k\| = B` = size: every line of (125) in a figure is drawn by this function.
+    r"""Return bound (125) with :math:`\|x_k\| = B` = size; every line of (125) in a figure uses this function.
 
     Parameters
     ----------
     beta : unit roundoff. k, n, m : steps, states and measurements.
-    size : in the unit of the result.
-    faults : to correct, as for :func:`coefficients`.
+    size : size in the unit of the result.
+    faults : faults to correct, as for :func:`coefficients`.
     """
     return state_bound(size, size, beta, coefficients(k, n, m, **faults))
 
 
 def gravity_probe_b_bound(beta: Fraction, k: int, **faults: bool) -> float:
-    """Bound (125) for Gravity Probe B, in mas: n = 10, m = 2, and the drift of a year as size.
+    """Return bound (125) for Gravity Probe B in mas, with n = 10, m = 2, and the drift of a year as size.
 
     Parameters
     ----------
     beta : unit roundoff. k : steps.
-    faults : to correct, as for :func:`coefficients`.
+    faults : faults to correct, as for :func:`coefficients`.
     """
     return float(bound_for_size(beta, k, *EXAMPLE[1:], YEAR_SIZE, **faults))

@@ -1,4 +1,4 @@
-"""The answer to how many digits are needed, and what it rests on."""
+"""The required number of digits, and the basis of this answer."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
 @dataclass(frozen=True)
 class Requirement:
-    """The smallest precision that meets a tolerance, and what the answer rests on.
+    """The smallest precision that meets a tolerance, and the basis of this answer.
 
     Parameters
     ----------
     fmt : None if no format with compiled loops meets the tolerance, or if the largest precision tried misses it.
-    basis : "emulation", what happened with these measurements; or "bound", what could at most have happened.
-    steps : of the filter.
-    tried : precision, and largest error over tolerance of all states and checkpoints; infinite where the run stopped, a
-        variance was lost, or no bound exists.
-    why : of the largest precision below the answer that has no number for an error, why not; empty if all have one.
-        Shown where it kept the answer from being a smaller one.
-    form : of the filter.
-    irregular : precisions that meet the tolerance although a higher one was run and misses it; empty if all is regular.
+    basis : "emulation", for the observed errors with these measurements; or "bound", for the largest possible errors.
+    steps : steps of the filter.
+    tried : precision, and largest error / tolerance over states and checkpoints; infinite if the run stopped, a
+        variance was no longer positive, or no bound exists.
+    why : why, below the answer, the largest precision without a finite error has none; empty if all have one. It is
+        shown if it prevented a smaller answer.
+    form : form of the filter.
+    irregular : precisions that meet the tolerance although a higher one that was run misses it; usually empty.
     advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
     repairs : changes of the model's covariances, each as text.
     """
@@ -72,7 +72,7 @@ class Requirement:
 
 
 def listed(numbers: Sequence[int]) -> str:
-    """Whole numbers in rising order as text, runs of three and more as ranges: "2, 5–8"."""
+    """Format ascending whole numbers as text, with three or more in a row as ranges: "2, 5–8"."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and number == runs[-1][-1] + 1:
@@ -84,11 +84,11 @@ def listed(numbers: Sequence[int]) -> str:
 
 
 def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: str) -> NDArray[np.float64]:
-    """The tolerance of each of `count` states or outputs, if it, the base and the basis make sense.
+    """Check tolerance, base and basis, and return the tolerance of each of `count` states or outputs.
 
     Raises
     ------
-    ValueError : they do not; the message has what is needed.
+    ValueError : a check fails; the message states what is needed.
     """
     needed = f"needed an error above 0 for each of the {count} {what}, one finite"
     try:
@@ -111,3 +111,9 @@ def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: s
     if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     return np.broadcast_to(tolerances, (count,))
+
+
+def largest_ratio(errors: NDArray[np.float64], tolerances: NDArray[np.float64]) -> float:
+    """The largest error over its tolerance; infinite beyond the range of float64."""
+    with np.errstate(over="ignore"):
+        return float((errors / tolerances).max())

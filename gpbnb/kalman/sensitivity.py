@@ -1,4 +1,4 @@
-"""By how many bits each choice of the study moves the precision that a year needs."""
+"""Find by how many bits each choice of the study changes the precision that a year needs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _USUAL = ("deviation", "hung", "2", "nearest")
 
 
 class Moved(NamedTuple):
-    """One choice, changed: what it was and became, and by how many bits the precision for the tolerance moves."""
+    """One changed choice, before and after, and the resulting change in bits of the precision for the tolerance."""
 
     choice: str
     before: str
@@ -25,10 +25,10 @@ class Moved(NamedTuple):
 
 
 def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
-    """Precision at which the median error would equal the tolerance, for one kind of formats.
+    """Return the precision at which the median error would equal the tolerance, for one kind of formats.
 
-    The format whose median is nearest to the tolerance on a logarithmic scale is taken; each further digit is assumed
-    to divide its error by the base.
+    The estimate starts from the format whose median is nearest to the tolerance on a logarithmic scale, and assumes
+    that each further digit divides the error by the base.
 
     Raises
     ------
@@ -45,13 +45,13 @@ def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
 
 
 def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
-    """Change one choice at a time, beside deviation states, Hung's form, base 2 and rounding to nearest.
+    """Change one choice at a time, starting from deviation states, Hung's form, base 2 and rounding to nearest.
 
-    A choice is left out if no such formats were run.
+    A choice is omitted if no such formats were run.
 
     Parameters
     ----------
-    found : shares of the simple model, in the setting "simple", and of settings of the mission model.
+    found : shares for the simple model, in the setting "simple", and for settings of the mission model.
     """
     groups: dict[tuple[str, ...], list[Share]] = {}
     for each in found:
@@ -73,7 +73,7 @@ def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
 
 
 def _moved(choice: str, before: str, after: str, usual: Sequence[Share], other: Sequence[Share]) -> Moved:
-    """Compare two kinds of formats, in the formats that both have if there are any."""
+    """Compare two kinds of formats, if possible in the formats that both have."""
     common = {each.fmt.precision for each in usual} & {each.fmt.precision for each in other}
     if common:
         usual = [each for each in usual if each.fmt.precision in common]
@@ -87,8 +87,8 @@ def single_record(runs: Sequence[year.Year], precision: int = 24) -> tuple[Moved
 
     Parameters
     ----------
-    runs : years of :mod:`gpbnb.kalman.year`.
-    precision : in bits; each bit is assumed to halve the error.
+    runs : years from :mod:`gpbnb.kalman.year`.
+    precision : precision in bits; each bit is assumed to halve the error.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Simulated measurements of a model, block by block and the same on every machine."""
+"""Simulate measurements of a model, block by block and identically on every machine."""
 
 from __future__ import annotations
 
@@ -14,23 +14,24 @@ from gpbnb.kalman.covariance import factor
 from gpbnb.kalman.kernels.simulation import measured
 from gpbnb.kalman.model import LinearModel
 
-#: Steps whose noise one seeded generator draws, so that a run may begin again at any block.
+#: Steps for which one seeded generator draws the noise, so that a run can resume at any block.
 BLOCK = 4096
 
-#: Bits of a resolution that is fine beside the noise.
+#: Bits by which the resolution is finer than the noise.
 FINE_BITS = 30
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """Measurements of a simulated truth, block by block, the same on every run.
+    """Measurements of a simulated truth, block by block and identical in every run.
 
     Parameters
     ----------
-    model : says how the truth moves and is measured.
+    model : model of the truth and of its measurement.
     start : (n,), the truth at step 0.
-    seed : of the noise; block b is drawn by ``default_rng([seed, b])``.
-    resolution : measurements are rounded to its multiples, as by an analogue-to-digital converter; one number, or (m,).
+    seed : seed of the noise; ``default_rng([seed, b])`` draws block b.
+    resolution : unit to whose multiples measurements are rounded, as in an analogue-to-digital converter; one number,
+        or (m,).
     """
 
     model: LinearModel
@@ -41,11 +42,11 @@ class Simulation:
     def __post_init__(self) -> None:
         self.model.refuse_inputs("a simulation")
         if len(self.start) != self.model.n:
-            raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one a state")
+            raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one per state")
         given = np.asarray(self.resolution, dtype=np.float64)
         if given.shape not in ((), (self.model.m,)) or not ((given > 0) & (given < math.inf)).all():
             raise ValueError(
-                f"got resolution {self.resolution}; needed a number above 0, or {self.model.m}, one a measurement"
+                f"got resolution {self.resolution}; needed a number above 0, or {self.model.m}, one per measurement"
             )
 
     @cached_property
@@ -57,7 +58,7 @@ class Simulation:
     def block(
         self, number: int, truth: NDArray[np.float64], steps: int = BLOCK
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Measurements of at most 4096 steps after `number` blocks, given the truth there.
+        """Return measurements of at most 4096 steps after `number` blocks, given the truth there.
 
         Returns
         -------
@@ -73,7 +74,7 @@ class Simulation:
         return np.rint(z / unit) * unit, x
 
     def measurements(self, steps: int) -> NDArray[np.float64]:
-        """The first measurements, (steps, m)."""
+        """Return the first measurements, (steps, m)."""
         truth, blocks = np.array(self.start, dtype=np.float64), [np.empty((0, self.model.m))]
         for number in range(-(-steps // BLOCK)):
             z, truth = self.block(number, truth, steps - number * BLOCK)
@@ -82,16 +83,16 @@ class Simulation:
 
 
 def fine_resolution(model: LinearModel) -> tuple[float, ...]:
-    r"""A resolution far below the noise, in the units of each measurement; (m,).
+    r"""Return a resolution far below the noise, in the units of each measurement, (m,).
 
-    :math:`2^{\lfloor\log_2\sqrt{R_{ii}}\rfloor - 30}` with the least variance of a cycle. A change of units by powers
-    of two changes it by the same powers, so that it changes no answer.
+    It is :math:`2^{\lfloor\log_2\sqrt{R_{ii}}\rfloor - 30}` for the least variance of a cycle. A change of units by
+    powers of two changes it by the same powers, so it changes no answer.
     """
     least = [min(float(R[i, i]) for R in model.R) for i in range(model.m)]
     return tuple(2.0 ** ((math.frexp(variance)[1] - 1) // 2 - FINE_BITS) for variance in least)
 
 
 def _root(covariance: NDArray[Any]) -> NDArray[np.float64]:
-    """A square root, by plain float64 operations that are the same everywhere."""
+    """Return a square root, computed by plain float64 operations that give the same result everywhere."""
     lower, d = factor(covariance)
     return lower.astype(np.float64) * np.sqrt(d.astype(np.float64))

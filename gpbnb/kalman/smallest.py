@@ -1,6 +1,7 @@
-"""The smallest filters that break (105), (108) and (125): one step, in exact arithmetic on rounded Fractions.
+"""The smallest filters that violate (105), (108) and (125), in exact arithmetic on rounded Fractions.
 
-This is slow and obvious, shares nothing with the compiled filter of :mod:`gpbnb.kalman.filter_run`, and is its oracle.
+The code is slow and obvious, shares nothing with the compiled filter of :mod:`gpbnb.kalman.filter_run`, and is its
+oracle.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from gpbnb.kalman import exact_step, report_bounds
 
 
 class Case(NamedTuple):
-    """A filter and its first measurement, exact: the arguments of :func:`gpbnb.kalman.exact_step.exact_step`."""
+    """A filter and its first measurement, exact, as arguments of :func:`gpbnb.kalman.exact_step.exact_step`."""
 
     Phi: NDArray[Any]
     H: NDArray[Any]
@@ -29,7 +30,7 @@ class Case(NamedTuple):
 
 
 class Ratios(NamedTuple):
-    """Error over bound, the worst entry; infinite for an error where the bound allows none."""
+    """Largest error / bound over all entries; infinite for an error where the bound is zero."""
 
     covariance: float
     gain: float
@@ -37,12 +38,12 @@ class Ratios(NamedTuple):
 
 
 def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
-    """One state and one measurement, every number 1 but R and z, and perhaps H.
+    """Return a filter with one state and one measurement, with Q = 0 and every other number 1 except R, z and maybe H.
 
     Parameters
     ----------
-    fmt : for the R by default, a unit of the second digit after the last: b**(-t - 1), that 1 + R does not show.
-    r, h, z : others; numbers or strings.
+    fmt : format that determines the default R, b**(-t - 1), which is so small that 1 + R rounds to 1.
+    r, h, z : other values of R, H and z; numbers or strings.
     """
     one = exact([[1]])
     small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else Fraction(r)
@@ -50,9 +51,9 @@ def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
 
 
 def correlated() -> Case:
-    """Two states and one measurement: the smallest that breaks (108) with the first form of (99), in four digits.
+    """Return the smallest filter, with two states, that violates (108) with the first form of (99) in four digits.
 
-    The first entry of the gain is (1.001 · 1.001 - 1.002)/S: in four digits, nothing is left of it.
+    The first entry of the gain is (1.001 · 1.001 - 1.002)/S, which four-digit arithmetic rounds to zero.
     """
     one = np.eye(2, dtype=int)
     P = [["1.001", "-1.002"], ["-1.002", "2"]]
@@ -60,13 +61,13 @@ def correlated() -> Case:
 
 
 def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """One step with each operation rounded, in the order of the report: (100), (99), (101), (109)-(111).
+    """Take one step with each operation rounded, in the order of the report: (100), (99), (101), (109)-(111).
 
     Parameters
     ----------
-    fmt : rounds each result; the numbers of `case` are taken as they are.
-    case : of one measurement.
-    second : whether the estimate takes the second form of (99), with the new covariance.
+    fmt : format that rounds each result; the numbers of `case` are not rounded.
+    case : filter with one measurement.
+    second : whether the estimate uses the second form of (99), with the new covariance.
 
     Returns
     -------
@@ -78,7 +79,7 @@ def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[ND
     """
     Phi, H, Q, R, x, P, z = case
     if len(H) != 1:
-        raise ValueError(f"got {len(H)} measurements; needed one; take them one after another")
+        raise ValueError(f"got {len(H)} measurements; needed one; process several one after another")
     fl = np.vectorize(fmt.round, otypes=[object])
 
     def product(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
@@ -102,11 +103,11 @@ def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[ND
 
 
 def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -> Ratios:
-    r"""Compare the errors of the last of a few rounded steps with (105), (108) and (125).
+    r"""Compare the errors of the last of `steps` rounded steps with (105), (108) and (125).
 
     Parameters
     ----------
-    fmt, case, second : as for :func:`rounded_step`; each step brings the same measurement.
+    fmt, case, second : as for :func:`rounded_step`; each step has the same measurement.
     steps : k. The B of (125) is the least that (122) allows.
     """
     rounded, exactly = case, case
@@ -129,11 +130,11 @@ def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -
 
 
 def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
-    """The largest R up to 1 in :func:`scalar` that breaks each bound, of all R of the format above b**-t.
+    """Find the largest R in :func:`scalar` that violates each bound, among all R of the format above b**-t up to 1.
 
     Returns
     -------
-    largest : by the names of `Ratios`; a bound that none breaks is left out.
+    largest : values by the names of `Ratios`; a bound that no R violates is omitted.
     """
     largest: dict[str, Fraction] = {}
     b, t = fmt.base, fmt.precision

@@ -1,4 +1,4 @@
-"""The stored sweeps of the Kalman filter, which can be computed again and verified.
+"""The stored sweeps of the Kalman filter, which can be recomputed and verified.
 
 The commands of :mod:`gpbnb.kalman.year` and :mod:`gpbnb.kalman.ensembles` write the first two.
 """
@@ -21,17 +21,17 @@ from gpbnb.sweeps import Sweep
 
 HERE = Path(__file__).parent
 
-#: Steps of a year that a sample computes again, about eleven days.
+#: Steps of a year that a sample recomputes, about eleven days.
 SAMPLE_STEPS = 100_000
 
 
 def rows(cell: Any, result: Sequence[Any]) -> list[tuple[str, ...]]:
-    """Rows as computed; a saved result has lists for tuples."""
+    """Return rows as computed; a saved result has lists in place of tuples."""
     return [tuple(row) for row in result]
 
 
 def first_steps(case: Case, directory: Path | None = None, steps: int = SAMPLE_STEPS) -> list[tuple[str, ...]]:
-    """The rows of a year up to some step."""
+    """Return the rows of a year up to some step."""
     chosen = tuple(step for step in checkpoint_steps() if step <= steps)
     z = simulation(case.model).measurements(chosen[-1])
     fmt = case.fmt
@@ -47,19 +47,19 @@ def _true(name: str, base: int, chosen: tuple[int, ...]) -> Checkpoints:
 
 
 def sample_of_year(case: Case, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """The rows of the first eleven days."""
+    """Return the rows of the first eleven days."""
     return first_steps(case)
 
 
 def same_errors(stored: tuple[str, ...], computed: tuple[str, ...]) -> bool:
-    """Whether two rows of a year agree: the last digits of an eigenvalue depend on the machine's LAPACK."""
+    """Whether two rows of a year agree, apart from the last digits of an eigenvalue, which depend on LAPACK."""
     return stored[:-1] == computed[:-1] and math.isclose(
         float(stored[-1]), float(computed[-1]), rel_tol=1e-4, abs_tol=1e-12
     )
 
 
 def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
-    """The rows of one seed of the random filters."""
+    """Return the rows for one seed of the random filters."""
     todo = ensembles.tasks(1, first_seed=seed)
     return ensembles.lines(seed, ensembles.sweep(todo, batch=len(todo)))
 
@@ -92,6 +92,6 @@ ENSEMBLES: Sweep[int] = Sweep(
 
 
 def stored() -> tuple[Sweep[Any], ...]:
-    """All sweeps of the chapter that are stored."""
+    """Return all stored sweeps of the chapter."""
     later: tuple[Sweep[Any], ...] = tuple(each for each in (threshold.SWEEP, mission_runs.SWEEP) if each.file.exists())
     return (YEAR, ENSEMBLES, *later)

@@ -2,8 +2,8 @@ r"""Linear systems without a covariance: digital filters, controllers and observ
 
 .. math:: x_{k+1} = A x_k + B u_k, \qquad y_k = C x_k + D u_k
 
-Each row of A and B, and of C and D, is one sum from left to right. The error of an output is taken against the system
-with the coefficients as given, so that the errors of storing them are among those of the arithmetic.
+Each row of A and B, and of C and D, is one sum from left to right. The error of an output is the difference from the
+system with the given coefficients, so it includes the errors of storing them.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import advance
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import rounding_named, whole_number
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, listed
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
 
 
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
     r"""A linear system with known inputs: :math:`x_{k+1} = Ax_k + Bu_k`, :math:`y_k = Cx_k + Du_k`.
 
-    Entries are held exactly, as Fractions; numbers, strings and Decimals are read exactly too.
+    Entries are stored exactly, as Fractions; numbers, strings and Decimals are read exactly.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class LinearSystem:
     C : (p, n), outputs; by default the states.
     D : (p, m), feedthrough; by default none.
     x0 : (n,), the first state; by default zeros.
-    name : what tables and reports call it.
+    name : name in tables and reports.
 
     Raises
     ------
@@ -53,7 +53,7 @@ class LinearSystem:
 
     Examples
     --------
-    A moving average that forgets a tenth in each step:
+    Exponential smoothing that forgets a tenth in each step:
 
     >>> system = LinearSystem([["0.9"]], [["0.1"]])
     >>> system.n, system.m, system.p
@@ -95,25 +95,25 @@ class LinearSystem:
 
     @property
     def n(self) -> int:
-        """How many states there are."""
+        """Number of states."""
         return int(self.A.shape[0])
 
     @property
     def m(self) -> int:
-        """How many inputs there are."""
+        """Number of inputs."""
         return int(self.B.shape[1])
 
     @property
     def p(self) -> int:
-        """How many outputs there are."""
+        """Number of outputs."""
         return int(self.C.shape[0])
 
     def as_filter(self) -> LinearFilter:
-        """The same system as the guarantee takes it: its outputs follow the states."""
+        """Return the same system for the guarantee, with outputs after the states."""
         return state_space(self.A, self.B, self.C, self.D, self.name)
 
     def outputs(self, u: Any, fmt: FloatFormat | None = None) -> NDArray[np.float64]:
-        """Outputs in a format with every operation rounded, or in double-double, as pairs of float64.
+        """Return outputs in a format with every operation rounded, or in double-double, as pairs of float64.
 
         Parameters
         ----------
@@ -160,16 +160,16 @@ def required_system_precision(
     ----------
     tolerance : largest error of each output, in its unit; one number, or (p,).
     u : (steps, m), inputs.
-    basis : "emulation" compares with the system as given, for these inputs. "bound" holds for ever and for every input
-        that is nowhere larger than the largest of `u`, from rest; "guarantee" for inputs within the limits on the
+    basis : "emulation" compares with the system as given, for these inputs. "bound" holds forever and for every input
+        that is never larger than the largest of `u`, from rest; "guarantee" for inputs within the limits on the
         measurement. Both bound rounding, and the errors of storing coefficients and inputs. "probable" takes three
         standard deviations for rounding in place of its bound.
-    within : from :func:`gpbnb.kalman.guarantee.bound.limits`; only the limit on the measurement counts.
+    within : result of :func:`gpbnb.kalman.guarantee.bound.limits`; only the limit on the measurement is used.
 
     Raises
     ------
-    ValueError : inputs that are missing or do not fit; a tolerance that is not positive; a bound of a system that does
-        not start from rest.
+    ValueError : inputs are missing or do not fit; the tolerance is not positive; or a bound is required for a system
+        that does not start from rest.
     """
     tolerances = checked_tolerance(tolerance, system.p, "outputs", base, basis)
     steps, rounding = whole_number("steps", steps), rounding_named(rounding)
@@ -192,7 +192,7 @@ def required_system_precision(
             errors = _observed(system, u, fmt, true) if true is not None else _bounded(system, fmt, largest, basis)
         except (ValueError, OverflowError) as fault:
             return math.inf, str(fault)
-        ratio = float((errors / tolerances).max())
+        ratio = largest_ratio(errors, tolerances)
         return (ratio, "") if ratio < math.inf else (math.inf, "an output is not finite")
 
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
@@ -210,7 +210,7 @@ def _inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[A
 
 
 def _observed(system: LinearSystem, u: Any, fmt: FloatFormat, true: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest error of each output, (p,)."""
+    """Return the largest error of each output, (p,)."""
     found = system.outputs(u, fmt)
     error = (found[..., 0] - true[..., 0]) + (found[..., 1] - true[..., 1])
     largest = np.abs(error).max(axis=0)
@@ -218,7 +218,7 @@ def _observed(system: LinearSystem, u: Any, fmt: FloatFormat, true: NDArray[np.f
 
 
 def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64], basis: str) -> NDArray[np.float64]:
-    """Bound of the error of each output, (p,), by rounding and by storing coefficients and inputs.
+    """Bound the error of each output, (p,), due to rounding and to storing coefficients and inputs.
 
     With stored matrices marked by a hat, outputs differ by at most the peak gain of the difference of both systems
     times the largest input, and the peak gain of the stored system times the errors of the stored inputs.
@@ -239,5 +239,5 @@ def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64
     if not found.for_ever:
         raise ValueError(found.why)
     rounding = found.bound if basis != "probable" else 3 * probable_error(found)
-    # two sums of m products in float64, each off by less than 2**-40
+    # two sums of m products in float64, each with an error below 2**-40
     return np.asarray((rounding[system.n :] + (difference + stored * beta) @ largest) * (1 + 2.0**-40))

@@ -26,7 +26,7 @@ DOUBLE = FloatFormat(2, 53)
 
 
 def example(k: int, n: int, m: int) -> Table:
-    """The closing example for (125), printed and corrected: coefficients, β, digits, and the error in IEEE double."""
+    """Tabulate the closing example for (125), printed and corrected: coefficients, β, digits, error in IEEE double."""
     body = []
     for name, faults in report_bounds.CORRECTIONS.items():
         for term, coefficient in zip(("first", "second"), report_bounds.coefficients(k, n, m, **faults), strict=True):
@@ -45,7 +45,7 @@ def example(k: int, n: int, m: int) -> Table:
 
 
 def misprints(k: int, n: int, m: int) -> Table:
-    """Each printed number of the closing example, what the printed formula gives, and how the number arose."""
+    """Tabulate each printed number of the closing example, the value by the formula, and the likely origin."""
     first, second = report_bounds.coefficients(k, n, m)
     printed = report_bounds.PRINTED
     wrong = report_bounds.one_digit_misprints(k, n, m, printed["first coefficient"])
@@ -90,11 +90,11 @@ _SECOND = "second coefficient"
 
 
 def tolerances(k: int, n: int, m: int, tolerance: Fraction, size: Fraction) -> Table:
-    """Digits that each coefficient requires for an error as large as `size`, as in the example, and for `tolerance`.
+    """Tabulate digits that each coefficient requires for an error of `size`, as in the example, and `tolerance`.
 
     Parameters
     ----------
-    k, n, m : of the example. tolerance, size : the error that is wanted and what it is an error of, in the same units.
+    k, n, m : values of the example. tolerance, size : allowed error, and size of the quantity, in the same units.
     """
     body = []
     for name, coefficient in zip(("first", "second"), report_bounds.coefficients(k, n, m), strict=True):
@@ -113,7 +113,7 @@ def tolerances(k: int, n: int, m: int, tolerance: Fraction, size: Fraction) -> T
 
 
 def violations(fmts: Sequence[FloatFormat]) -> Table:
-    """The scalar filter that breaks all three bounds: error over bound in several formats, both forms of (99)."""
+    """Tabulate error / bound for the scalar filter that violates all bounds, by format and form of (99)."""
     body = []
     for fmt in fmts:
         for name, second in (("first", False), ("second", True)):
@@ -127,7 +127,7 @@ def violations(fmts: Sequence[FloatFormat]) -> Table:
 
 
 def order() -> Table:
-    """In which order the four equations can be computed."""
+    """Tabulate the order in which the four equations can be computed."""
     body = []
     for name, second in (("first", False), ("second", True)):
         found = report_bounds.order(second)
@@ -138,7 +138,7 @@ def order() -> Table:
 
 
 def largest_violating_noise(fmts: Sequence[FloatFormat]) -> Table:
-    """How large R may be, beside a variance of 1, for the scalar filter still to break each bound."""
+    """Tabulate the largest R, for a variance of 1, with which the scalar filter violates each bound."""
     body = []
     for fmt in fmts:
         for name, second in (("first", False), ("second", True)):
@@ -165,12 +165,14 @@ def _root(variance: float) -> str:
 
 
 def year_ends(runs: Sequence[year.Year]) -> Table:
-    """Errors at the last step of each run, and where it lost a positive variance; the model, if there are several."""
+    """Tabulate errors at the last step, the first non-positive variance, and the model if there are several."""
     several = len({run.case.model for run in runs}) > 1
     body = []
     for run in runs:
         if run.case.fmt is None:
-            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+            raise ValueError(
+                "got the reference among the runs; needed only rounded runs, because the reference has no error"
+            )
         found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
         cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
         lost = f"; first non-positive variance at step {run.indefinite:,}" if run.indefinite else ""
@@ -189,18 +191,20 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
 
 
 def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms) -> Table:
-    """Bound over error of the drift rate at the end of a year: the smallest that (125) can be, and the companion bound.
+    """Tabulate bound / error of the drift rate after a year, for the smallest value of (125) and the companion bound.
 
     Parameters
     ----------
-    runs, bounds : rounded runs, and of each the bound of its reference.
-    terms : of the model; the same for all.
+    runs, bounds : rounded runs, and the bound of the reference for each.
+    terms : terms of the model, the same for all runs.
     """
     body = []
     for run, reference in zip(runs, bounds, strict=True):
         fmt, k = run.case.fmt, int(run.steps[-1])
         if fmt is None or reference.steps[-1] != k:
-            raise ValueError(f"got {run.case.name} with a bound to step {reference.steps[-1]}; needed one to step {k}")
+            raise ValueError(
+                f"got {run.case.name} with a bound up to step {reference.steps[-1]}; needed one up to step {k}"
+            )
         at = int(np.abs(run.rate[-1]).argmax())
         error = abs(float(run.rate[-1, at]))
         companion = float(contraction.companion_bound(run.rate[-1, at], reference.rate[-1, at]))
@@ -216,7 +220,7 @@ def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms
 
 
 def trials(found: Sequence[Summary]) -> Table:
-    """Random filters: how many violate each bound, and the largest error over it, a line a kind and one for all."""
+    """Tabulate, for each kind of random filters and for all, the violations and the largest error / bound."""
     body = []
     kinds = list(dict.fromkeys(each.kind for each in found))
     for name, group in [(kind, [each for each in found if each.kind == kind]) for kind in kinds] + [
@@ -245,7 +249,7 @@ def trials(found: Sequence[Summary]) -> Table:
 
 
 def requirements(answers: Sequence[tuple[str, Requirement]]) -> Table:
-    """What :func:`gpbnb.kalman.precision.required_precision` answered."""
+    """Tabulate answers of :func:`gpbnb.kalman.precision.required_precision`."""
     body = []
     for name, answer in answers:
         ratio = f"{dict(answer.tried)[answer.fmt.precision]:.2g}" if answer.fmt else ""
@@ -265,7 +269,7 @@ def _yes(holds: bool, what: str) -> str:
 
 
 def shares(found: Sequence[Share]) -> Table:
-    """Share of the records that stay within the tolerance for a year, with its 95 % limits, and quantiles."""
+    """Tabulate the share of records within the tolerance for a year, with its 95 % limits, and quantiles."""
     rows = [
         (
             each.states,
@@ -293,13 +297,13 @@ def shares(found: Sequence[Share]) -> Table:
 
 
 def parameters() -> Table:
-    """The numbers of the mission model, with their sources."""
+    """Tabulate the numbers of the mission model with their sources."""
     rows = tuple((each.name, f"{each.value:g}", each.unit, each.source) for each in PARAMETERS)
     return Table("parameters of the mission model", ("parameter", "value", "unit", "source"), rows)
 
 
 def sensitivity(moved: Sequence[Moved]) -> Table:
-    """By how many bits each choice moves the answer."""
+    """Tabulate by how many bits each choice changes the answer."""
     rows = tuple(
         (each.choice, each.before, each.after, f"{each.bits:+.1f}".replace("-", "−"), str(each.records))
         for each in moved
@@ -308,10 +312,10 @@ def sensitivity(moved: Sequence[Moved]) -> Table:
 
 
 def needed_precisions(found: Sequence[Share]) -> Table:
-    """Smallest precisions that meet the tolerance with a probability of 99 %, and the records behind each answer.
+    """Tabulate the smallest precisions that meet the tolerance with a probability of 99 %, and the records used.
 
-    A line for each kind of formats. The counts and the 95 % limits are those of the smallest precision at which 99 %
-    of the records stay within the tolerance.
+    There is a row for each kind of formats. The counts and the 95 % limits are those of the smallest precision at which
+    99 % of the records stay within the tolerance.
     """
     groups: dict[tuple[str, ...], list[Share]] = {}
     for each in found:
@@ -333,7 +337,7 @@ def needed_precisions(found: Sequence[Share]) -> Table:
 
 
 def first_steps(found: Sequence[FirstStep]) -> Table:
-    """Models that exceed (105) in their first step, by kind, with the 95 % limits of the probability."""
+    """Tabulate models that exceed (105) in their first step, by kind, with the 95 % limits of the probability."""
     rows = [(each.kind, str(each.models), str(each.exceeded), f"{each.low:.2f} to {each.high:.2f}") for each in found]
     return Table(
         "models that exceed (105) in their first step",
@@ -343,7 +347,7 @@ def first_steps(found: Sequence[FirstStep]) -> Table:
 
 
 def shares_by_form(found: Sequence[ModelShare]) -> Table:
-    """Mean share of the formats in which random models exceed a bound, with its 95 % interval by model."""
+    """Tabulate the mean share of formats in which random models exceed a bound, with its 95 % interval by model."""
     rows = [
         (
             str(each.form),
@@ -361,12 +365,12 @@ def shares_by_form(found: Sequence[ModelShare]) -> Table:
 def bound_costs(
     found: Sequence[tuple[FloatFormat, BoundedHistory]], terms: Terms, reference: year.Bounds, time: float
 ) -> Table:
-    """What each bound of a run costs, and bound over error of the drift rates at the last step.
+    """Tabulate the cost of each bound of a run, and bound / error of the drift rates at the last step.
 
     Parameters
     ----------
-    found : formats and their bounded runs; all of the same measurements and steps.
-    terms : of the model, for (125).
+    found : formats and their bounded runs, all with the same measurements and steps.
+    terms : terms of the model for (125).
     reference : bounds of the run in double-double, which serves as the companion.
     time : processor time of that run with its bound, over that of a rounded run.
     """

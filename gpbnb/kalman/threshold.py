@@ -1,4 +1,4 @@
-"""How many digits a year needs, and with what probability: many measurement records in each number format.
+"""Find how many digits a year needs, and with what probability, from many measurement records in each format.
 
 ``python -m gpbnb.kalman.threshold`` computes the sweep and resumes where it was interrupted. The year is that of
 :mod:`gpbnb.kalman.year`: 3,153,600 steps, the simple model, measurements in whole milliarcseconds. Record 0 is the
@@ -34,7 +34,7 @@ STATES = ("absolute", "deviation")
 #: The forms of the sweep, by the name under which they are stored.
 FORMS = {"hung": Form.HUNG, "innovation": Form.INNOVATION}
 
-#: True drift rates less the predicted ones, mas/yr, 6606.1 - 6601.8 and 39.2 - 37.2, the measured differences.
+#: True minus predicted drift rates in mas/yr, from the measured differences 6606.1 - 6601.8 and 39.2 - 37.2.
 DEVIATION = (4.3, 2.0)
 
 SEED = 1984
@@ -56,14 +56,14 @@ class Cell:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """The first columns of this cell's first row."""
+        """Return the first columns of this cell's first row."""
         return (*self._head(self.precisions[0]), str(self.first))
 
     def _head(self, precision: int) -> tuple[str, ...]:
         return self.states, str(self.base), self.rounding, self.form, str(precision)
 
     def heads(self) -> list[tuple[str, ...]]:
-        """The first columns of the rows of each format."""
+        """Return the first columns of the rows of each format."""
         return [self._head(precision) for precision in self.precisions]
 
 
@@ -108,24 +108,24 @@ class SimpleYear:
 
     @property
     def start(self) -> tuple[float, ...]:
-        """The truth at step 0."""
+        """Return the truth at step 0."""
         return TRUTH if self.states == "absolute" else (*TRUTH[:2], *DEVIATION, *TRUTH[4:])
 
     def model(self, base: int) -> LinearModel:
-        """The filter's model, as stored in a base."""
+        """Return the filter's model as stored in a base."""
         return model(MODELS[0], base)
 
     def matrices(self, block: int, base: int) -> None:
         """Return None, because the model has the matrices."""
 
     def simulation(self, record: int) -> Simulation:
-        """The measurements of one record."""
+        """Return the measurements of one record."""
         return _simulation(self.states, record)
 
     def measurements(
         self, record: int, block: int, truth: NDArray[np.float64], H: NDArray[np.float64] | None, steps: int
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Measurements of a block, (steps, 2), and the truth after them."""
+        """Return measurements of a block, (steps, 2), and the truth after them."""
         return self.simulation(record).block(block, truth, steps)
 
 
@@ -152,7 +152,7 @@ def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
 
 
 def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
-    """Compute the row of one format and record alone."""
+    """Compute only the row of one format and record."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
     one = replace(cell, precisions=(precision,), first=record, count=1)
     return rows(one, compute(one))
@@ -183,6 +183,7 @@ SWEEP: Sweep[Cell] = Sweep(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
     return run_command(SWEEP, "A year for hundreds of measurement records.", Path(".cache/threshold"), arguments)
 
 

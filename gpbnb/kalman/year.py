@@ -1,6 +1,6 @@
 """A year of Gravity Probe B, 3,153,600 steps, in many formats and forms: ``python -m gpbnb.kalman.year``.
 
-The command continues where it was interrupted. Its results are stored beside this file, in ``year.csv`` and
+The command resumes where it was interrupted. Its results are stored next to this file, in ``year.csv`` and
 ``bounds.csv``, with their provenance in ``year.json``; :func:`load` and :func:`bounds` read them.
 """
 
@@ -43,8 +43,8 @@ class Year:
     ----------
     drift, rate : (c, 2), errors of the drift angles in mas and of their rates in mas/yr.
     state : largest error of any state, in its unit.
-    gain, covariance : norms (22) of their errors, relative to those of what they should be.
-    least_eigenvalue : of the covariance, scaled to ones on the true diagonal.
+    gain, covariance : norms (22) of their errors, relative to the true values.
+    least_eigenvalue : least eigenvalue of the covariance, scaled to ones on the true diagonal.
     """
 
     case: Case
@@ -61,7 +61,7 @@ class Year:
 
 
 def rows(case: Case, found: History) -> list[tuple[str, ...]]:
-    """Lines of ``year.csv``: six significant digits."""
+    """Return rows of ``year.csv`` with six significant digits."""
     numbers = np.column_stack(
         [found.state[:, :4], found.state_norm, found.gain_norm, found.covariance_norm, found.least_eigenvalue]
     )
@@ -73,9 +73,9 @@ def rows(case: Case, found: History) -> list[tuple[str, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """The contraction bound beside a run; as the errors of :class:`Year`, in the same units and norms.
+    """The contraction bound of a run, in the same units and norms as the errors of :class:`Year`.
 
-    The errors of a run that has none of its own are at most those against its reference, and the reference's bound:
+    The errors of a run without its own bound are at most its distance from the reference plus the reference's bound:
     :func:`gpbnb.kalman.contraction.companion_bound`.
     """
 
@@ -89,7 +89,7 @@ class Bounds:
 
 
 def bound_rows(case: Case, directory: Path, steps: int) -> list[tuple[str, ...]]:
-    """Lines of ``bounds.csv``, if the reference is followed: six significant digits, rounded upwards."""
+    """Return rows of ``bounds.csv``, if the case has bounds, with six significant digits, rounded upwards."""
     run, true = ResumableRun(case, directory, steps).run, reference_checkpoints(case, directory, steps)
     if not isinstance(run, BoundedRun):
         return []
@@ -117,7 +117,7 @@ _KEY_COLUMNS = (
     Column("step", "integer", 1, YEAR),
 )
 
-#: Columns of ``year.csv``. Errors have a sign; a covariance that is lost has eigenvalues below zero.
+#: Columns of ``year.csv``. Errors have a sign; an indefinite covariance has eigenvalues below zero.
 COLUMNS = (
     *_KEY_COLUMNS,
     *(Column(name) for name in _COLUMNS[:4]),
@@ -125,7 +125,7 @@ COLUMNS = (
     Column(_COLUMNS[7]),
 )
 
-#: Columns of ``bounds.csv``, which are not negative.
+#: Columns of ``bounds.csv``, whose values are not negative.
 BOUND_COLUMNS = (*_KEY_COLUMNS, *(Column(name, low=0) for name in _COLUMNS[:7]))
 
 _COMMAND = "python -m gpbnb.kalman.year"
@@ -166,7 +166,7 @@ def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = 
 
 
 def machine() -> dict[str, Any]:
-    """Where results are made, and with which versions."""
+    """Return the machine and the versions with which results are made."""
     return {
         "machine": f"{platform.system()} {platform.machine()}, python {platform.python_version()}",
         "versions": {name: version(name) for name in ("numpy", "numba", "llvmlite")},
@@ -174,7 +174,7 @@ def machine() -> dict[str, Any]:
 
 
 def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
-    """What the unrounded filter knew at the end: how far it was from the truth, and how far it thought it was."""
+    """Return the error of the unrounded filter at the end, and the standard deviation that it computed."""
     resumable = ResumableRun(case, directory, steps)
     true = reference_checkpoints(case, directory, steps)
     x, deviation = true.x[-1].astype(np.float64), np.sqrt(true.P[-1].diagonal().astype(np.float64))
@@ -189,7 +189,7 @@ def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
 
 @cache
 def load(directory: Path = _HERE) -> tuple[Year, ...]:
-    """The years that the package brings, in the order of ``CASES``."""
+    """Load the years that ship with the package, in the order of ``CASES``."""
     about = provenance(directory)["cases"]
     result = []
     for case, numbers in _read(directory / "year.csv", COLUMNS).items():
@@ -213,7 +213,7 @@ def load(directory: Path = _HERE) -> tuple[Year, ...]:
 
 @cache
 def bounds(directory: Path = _HERE) -> dict[Case, Bounds]:
-    """The contraction bounds of ``BOUNDED_CASES`` that the package brings."""
+    """Load the contraction bounds of ``BOUNDED_CASES`` that ship with the package."""
     return {
         case: Bounds(
             case, numbers[:, 0].astype(np.int64), numbers[:, 1:3], numbers[:, 3:5], *(numbers[:, i] for i in (5, 6, 7))
@@ -231,21 +231,25 @@ def _read(file: Path, columns: tuple[Column, ...]) -> dict[Case, NDArray[np.floa
 
 
 def provenance(directory: Path = _HERE) -> dict[str, Any]:
-    """How the years were made."""
+    """Return the provenance of the years."""
     return sweeps.read_record(directory / "year.json", _COMMAND)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog=_COMMAND, description="A year in many formats and forms.")
-    parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="where runs are saved on the way")
-    parser.add_argument("--steps", type=int, default=YEAR, help="fewer, for a trial")
-    parser.add_argument("--cases", type=int, default=len(CASES), help="only so many of the cases")
-    parser.add_argument("--output", type=Path, default=Path(".cache/year"), help="where year.csv and year.json go")
+    """Run the command; returns its exit status."""
+    parser = argparse.ArgumentParser(prog=_COMMAND, description="Run the filters for a year in many formats and forms.")
+    parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="folder for saved progress")
+    parser.add_argument("--steps", type=int, default=YEAR, help="number of steps; use fewer for a trial")
+    parser.add_argument("--cases", type=int, default=len(CASES), help="compute only this many cases")
+    parser.add_argument("--output", type=Path, default=Path(".cache/year"), help="folder for year.csv and year.json")
     given = parser.parse_args(arguments)
     try:
         run_cases(CASES[: given.cases], given.directory, given.steps)
     except KeyboardInterrupt:
-        print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
+        print(
+            f"interrupted; run the same command again to continue from the progress saved in {given.directory}",
+            file=sys.stderr,
+        )
         return 130
     given.output.mkdir(parents=True, exist_ok=True)
     write(CASES[: given.cases], given.directory, given.steps, given.output)

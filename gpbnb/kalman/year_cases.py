@@ -1,7 +1,7 @@
 """The runs of a year of Gravity Probe B: models, formats and forms.
 
-In one base all formats hold the same numbers: the model is stored once, in 14 bits or 4 decimal digits, and what is
-measured are whole milliarcseconds. So one reference serves them all, and errors are those of the arithmetic alone.
+In one base, all formats use the same numbers. The model is stored once, in 14 bits or 4 decimal digits, and
+measurements are whole milliarcseconds. So one reference serves all formats, and errors come only from the arithmetic.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from gpbnb.kalman.gravity_probe_b import YEAR, gravity_probe_b, gravity_probe_b_
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation
 
-#: In which format the model is stored, by base; a part of every other format of the base in :data:`CASES`.
+#: Format in which the model is stored, by base; every format of this base in :data:`CASES` contains it.
 STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
 
-#: The models, rolling in 600 s as in the reports, in 77.5 s as flown, and in 600 s without process noise.
+#: The models, with roll periods of 600 s as in the reports, 77.5 s as flown, and 600 s without process noise.
 MODELS = ("roll 600 s", "roll 77.5 s", "no process noise")
 
 
@@ -34,16 +34,17 @@ class Case(NamedTuple):
 
     @property
     def fmt(self) -> FloatFormat | None:
+        """The format of the run; None for double-double."""
         return FloatFormat(self.base, self.precision, self.rounding) if self.precision else None
 
     @property
     def reference(self) -> Case:
-        """The case whose results are true for this one."""
+        """The case that serves as the reference for this one."""
         return Case(self.model, self.base, 0, Rounding.NEAREST, Form.INNOVATION)
 
     @property
     def name(self) -> str:
-        """What files of it are called."""
+        """Name of the files for this case."""
         words = f"{self.model} {self.base} {self.precision} {self.rounding.value} {self.form.name.lower()}"
         return words.replace(" ", "-").replace(".", "_")
 
@@ -67,7 +68,7 @@ def _cases() -> tuple[Case, ...]:
     cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (16, 26, 40)]
     cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (14, 20, 28, 53)]
     cases += [Case(usual, 2, 53, nearest, form) for form in others]
-    # The neighbours of the smallest that meet a milliarcsecond a year, so that these are known to the digit.
+    # Neighbours of the smallest precisions that meet a milliarcsecond a year, so that these are exact.
     cases += [Case(usual, 10, 9, nearest, Form.HUNG), *(Case(usual, 2, t, nearest, Form.HUNG) for t in (31, 33))]
     return tuple(cases)
 
@@ -75,23 +76,23 @@ def _cases() -> tuple[Case, ...]:
 #: All runs, the most informative first.
 CASES = _cases()
 
-#: Runs with their own contraction bound, the references of the first model, on which the bounds of the others rest.
+#: Runs with their own contraction bound, the references of the first model, from which the other bounds follow.
 BOUNDED_CASES = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.INNOVATION) for base in STORED)
 
 
 @cache
 def model(name: str, base: int) -> LinearModel:
-    """One of :data:`MODELS`, as stored in a base."""
+    """Return one of :data:`MODELS` as stored in a base."""
     roll = "77.5" if name == MODELS[1] else "600"
     return gravity_probe_b(roll, process_noise=name != MODELS[2]).rounded(STORED[base])
 
 
 @cache
 def simulation(name: str) -> Simulation:
-    """The measurements, the same for both bases; the truth moves by the model of base 2."""
+    """Return the simulated measurements, the same for both bases; the truth follows the model of base 2."""
     return gravity_probe_b_year(model(name, 2))
 
 
 def checkpoint_steps(steps: int = YEAR) -> tuple[int, ...]:
-    """The steps whose results are saved: three a decade."""
+    """Return the steps whose results are saved, three per decade."""
     return log_spaced(steps, 3)

@@ -1,4 +1,4 @@
-"""Resumable runs of a year of Gravity Probe B: each is saved as it goes and continues where it was interrupted."""
+"""Resumable runs of a year of Gravity Probe B, which save their progress and resume where they were interrupted."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from gpbnb.kalman.simulation import BLOCK
 from gpbnb.kalman.year_cases import BOUNDED_CASES, Case, checkpoint_steps, model, simulation
 
 _BLOCKS_PER_SAVE = 64  # blocks
-_FINGERPRINT_STEPS = 200  # steps that show whether the code computes the same
+_FINGERPRINT_STEPS = 200  # steps that show whether the code's results are unchanged
 
 
 class ResumableRun:
-    """A run of a case, saved in a file; with its contraction bound if it is among ``BOUNDED_CASES``."""
+    """A run of one case, saved in a file, with its contraction bound if ``BOUNDED_CASES`` contains the case."""
 
     def __init__(self, case: Case, directory: Path, steps: int) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0
@@ -52,10 +52,11 @@ class ResumableRun:
 
     @property
     def finished(self) -> bool:
+        """Whether all steps are done, or the run has stopped."""
         return self.run.steps >= self.steps or self.run.stopped is not None
 
     def advance(self, blocks: int, bar: Any = None) -> None:
-        """Take at most so many blocks of measurements, and save."""
+        """Take at most `blocks` blocks of measurements, and save the run."""
         source = simulation(self.case.model)
         for _ in range(blocks):
             if self.finished:
@@ -69,7 +70,7 @@ class ResumableRun:
         self.save()
 
     def save(self) -> None:
-        """Write all of it, or nothing."""
+        """Save the run, either completely or not at all."""
         draft = self.file.with_suffix(f".{os.getpid()}.npz")
         arrays = self._arrays()
         if isinstance(self.run, BoundedRun):
@@ -110,11 +111,11 @@ def run_cases(
     progress: bool = True,
     each: int = _BLOCKS_PER_SAVE,
 ) -> None:
-    """Run the cases and their references, one after another, each from where it was saved.
+    """Run the cases and their references one after another, each from its saved state.
 
     Parameters
     ----------
-    directory : where runs are saved, each 64 blocks of 4096 steps.
+    directory : folder in which runs are saved after every 64 blocks of 4096 steps.
     """
     directory.mkdir(parents=True, exist_ok=True)
     todo = list(dict.fromkeys(part for case in cases for part in (case.reference, case)))
@@ -140,7 +141,7 @@ def _is_finished(case: Case, directory: Path, steps: int) -> bool:
 
 
 def history(case: Case, directory: Path, steps: int = YEAR) -> History:
-    """Errors of a finished run."""
+    """Return the errors of a finished run."""
     return compare_runs(
         ResumableRun(case, directory, steps).run, reference_checkpoints(case.reference, directory, steps)
     )
@@ -148,4 +149,5 @@ def history(case: Case, directory: Path, steps: int = YEAR) -> History:
 
 @cache
 def reference_checkpoints(case: Case, directory: Path, steps: int) -> Checkpoints:
+    """Checkpoints of a finished run that serves others as their reference."""
     return ResumableRun(case, directory, steps).run.checkpoints()

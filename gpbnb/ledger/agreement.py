@@ -12,9 +12,9 @@ from gpbnb.arithmetic.formats import Rounding, prints_as
 from gpbnb.ledger.formula import OPERATORS, Link, Relation
 
 DIGITS = 50
-"""Digits to which two sides are evaluated when they hold exponentials or roots."""
+"""Digits to which two sides are evaluated if they contain exponentials or roots."""
 NOTHING = sp.Float("1e-40", DIGITS)
-"""Largest difference that the rounding errors of the evaluation may leave."""
+"""Largest difference that rounding errors of the evaluation can cause."""
 
 
 def vanishes(expression: Any) -> bool:
@@ -46,13 +46,13 @@ def holds(link: Link) -> bool:
 
 
 def hold(links: Iterable[Link]) -> bool:
-    """Whether there are comparisons, and all of them hold."""
+    """Whether there is at least one comparison and all of them hold."""
     results = [holds(link) for link in links]
     return bool(results) and all(results)
 
 
 def prints_side(value: Any, relation: Relation, *roundings: Rounding) -> bool:
-    """Whether the last side of a relation is a number, and a value has its digits when rounded to as many.
+    """Whether the last side of a relation is a number to which a value rounds.
 
     Parameters
     ----------
@@ -63,5 +63,5 @@ def prints_side(value: Any, relation: Relation, *roundings: Rounding) -> bool:
 
 
 def matrix_of(value: Any) -> Any:
-    """A SymPy matrix for nested lists, and any other value as it is."""
+    """Return a SymPy matrix for nested lists, and any other value unchanged."""
     return sp.Matrix(value) if isinstance(value, list) else value

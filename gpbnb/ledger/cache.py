@@ -1,8 +1,9 @@
-"""Findings that are kept between runs, one file for each module of checks.
+"""Findings that are kept between runs, in one file for each module of checks.
 
-The name of a file has a digest of everything its findings depend on: the sources that the module imports, directly or
-through others, the data beside them, the versions of the libraries, and the processor. A change of any of them gives
-another file. Several processes share the files; while one runs checks of a module, the others wait for its findings.
+The name of a file contains a digest of everything on which its findings depend: the sources that the module imports,
+directly or indirectly, the data next to them, the versions of the libraries, and the processor. If any of these
+changes, a new file is used. Several processes share the files. While one process runs the checks of a module, the
+others wait.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _FIELDS = tuple(field.name for field in fields(Finding))
 
 
 class Findings:
-    """The findings of one module of checks that are known so far."""
+    """The known findings of one module of checks."""
 
     def __init__(self, path: Path | None) -> None:
         self._path = path
@@ -54,7 +55,7 @@ class Findings:
         self._changed = True
 
     def save(self) -> None:
-        """Write the file, if there is something new."""
+        """Write the file if there are new findings."""
         if self._path is None or not self._changed:
             return
         content = {name: [getattr(each, field) for field in _FIELDS] for name, each in self._known.items()}
@@ -62,12 +63,12 @@ class Findings:
         try:
             draft.write_text(json.dumps(content, default=lambda verdict: verdict.value), encoding="utf-8")
             draft.replace(self._path)
-        except OSError:  # a full disk costs time only
+        except OSError:  # a full disk only costs time
             draft.unlink(missing_ok=True)
 
 
 def known(module: Path) -> Findings:
-    """The findings of a module of checks, to read alone.
+    """Return the findings of a module of checks, for reading only.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def known(module: Path) -> Findings:
 
 @contextmanager
 def shared(module: Path) -> Iterator[Findings]:
-    """The findings of a module of checks, to add to: other processes wait, and the findings are saved at the end."""
+    """Yield the findings of a module of checks for additions, and save them; other processes wait."""
     path = _file(module)
     if path is None:
         yield Findings(None)
@@ -120,7 +121,7 @@ def _read(path: Path) -> dict[str, Finding]:
         content = json.loads(path.read_text(encoding="utf-8"))
         os.utime(path)
         return {name: _finding(**dict(zip(_FIELDS, values, strict=True))) for name, values in content.items()}
-    except (OSError, ValueError, TypeError):  # not there, or damaged: the checks are run again
+    except (OSError, ValueError, TypeError):  # the file is missing or damaged, so the checks run again
         return {}
 
 

@@ -20,7 +20,7 @@ FAILED = "failed"
 
 @dataclass(frozen=True)
 class Row:
-    """An entry and what its check found: nothing where there is no check, or where the check raised `error`."""
+    """An entry and the finding of its check; no finding if there is no check or the check raised `error`."""
 
     statement: Statement
     finding: Finding | None
@@ -28,7 +28,7 @@ class Row:
 
     @property
     def outcome(self) -> str:
-        """The verdict's value; ``missing`` without a check, ``failed`` where the check raised."""
+        """The verdict's value, ``missing`` without a check, or ``failed`` if the check raised an error."""
         if self.finding is not None:
             return self.finding.verdict.value
         return MISSING if self.error is None else FAILED
@@ -55,10 +55,13 @@ def owners(statements: Iterable[Statement], topics: Mapping[str, Checks] = TOPIC
     for topic, checks in topics.items():
         for key in checks:
             if key not in known:
-                raise ValueError(f"{topic} checks {key!r}, which is not in statements.csv; correct the id or add it")
+                raise ValueError(
+                    f"got a check of {key!r} in {topic}; needed an id from statements.csv; correct the id "
+                    "or add the statement"
+                )
             if key in found:
                 raise ValueError(
-                    f"{key!r} is checked by {found[key]} and by {topic}; a statement has one check: drop one"
+                    f"got checks of {key!r} in {found[key]} and in {topic}; needed one check per statement; remove one"
                 )
             found[key] = topic
     return found
@@ -69,17 +72,17 @@ def examine(
     topics: Mapping[str, Checks] = TOPICS,
     progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter,
 ) -> tuple[Row, ...]:
-    """Run the checks of `statements`; a check that raises leaves its error in the row and does not disturb the others.
+    """Run the checks of `statements`; if a check raises, its row records the error and the other checks still run.
 
     Parameters
     ----------
-    statements : which to check.
+    statements : the statements to check.
     topics : the checks of each topic.
-    progress : passes the statements on one by one, and may show how many are done.
+    progress : iterator that passes the statements on one by one, and may show progress.
 
     Returns
     -------
-    rows : in the order of `statements`. A check that takes no statement and judges several is called once.
+    rows : in the order of `statements`. A check that takes no statement and judges several runs once.
     """
     results: dict[Check, Finding | Exception] = {}
     rows: list[Row] = []
@@ -106,9 +109,9 @@ def examine_once(
     topics: Mapping[str, Checks] = TOPICS,
     progress: Callable[[Sequence[Statement]], Iterable[Statement]] = iter,
 ) -> tuple[Row, ...]:
-    """As :func:`examine`, but a check is not run again until a source or a datum changes that its finding depends on.
+    """Run :func:`examine`, but reuse each finding until a source or datum on which it depends changes.
 
-    Checks that are not part of the package are run each time.
+    Checks that are not part of the package run every time.
     """
     chosen = tuple(statements)
     by_module: dict[Path | None, list[Statement]] = {}
@@ -124,7 +127,7 @@ def examine_once(
             found |= {row.statement: row for row in examine(missing, topics, progress)}
         elif missing:
             with cache.shared(module) as findings:
-                found |= _known(missing, findings)  # another process may have run some meanwhile
+                found |= _known(missing, findings)  # another process may have run some checks in the meantime
                 for row in examine([each for each in missing if each not in found], topics, progress):
                     found[row.statement] = row
                     if row.finding is not None:
@@ -138,7 +141,7 @@ def _known(statements: Iterable[Statement], findings: cache.Findings) -> dict[St
 
 
 def _module(statement: Statement, topics: Mapping[str, Checks]) -> Path | None:
-    """The file of the package that has the check of a statement, if one has."""
+    """Return the file of the package that contains the check of a statement, if there is one."""
     check = next((checks[statement.id] for checks in topics.values() if statement.id in checks), None)
     if check is None:
         return None
@@ -157,18 +160,18 @@ def rows(
 
     Parameters
     ----------
-    entries : the whole inventory, that of the package by default.
-    document, chapter, sections : the part, as in `select`; all by default. Only its checks are run.
+    entries : the whole inventory, by default that of the package.
+    document, chapter, sections : the part, as in `select`; all by default. Only the checks of this part run.
     topics : the checks of each topic.
 
     Returns
     -------
-    rows : one an entry, in the order of the inventory; its finding is None where there is no check.
+    rows : one row for each entry, in the order of the inventory; the finding is None if there is no check.
 
     Raises
     ------
-    ExceptionGroup : checks raised; each error carries a note with its id.
-    ValueError : see `owners`; also for an empty selection.
+    ExceptionGroup : checks raised errors; each error has a note with the id of the statement.
+    ValueError : see `owners`; also if the selection is empty.
     """
     inventory = load_statements() if entries is None else tuple(entries)
     chosen = select(inventory, document, chapter, sections)
@@ -193,7 +196,7 @@ def counts(rows: Iterable[Row]) -> dict[str, int]:
 
 
 def in_reading_order(rows: Iterable[Row]) -> tuple[Row, ...]:
-    """Sort by document and chapter as they come and by section number; rows of a section keep their order."""
+    """Sort by document and chapter in order of appearance, then by section; rows of a section keep their order."""
     rows = tuple(rows)
     documents = list(dict.fromkeys(row.statement.document for row in rows))
     chapters = list(dict.fromkeys((row.statement.document, row.statement.chapter) for row in rows))

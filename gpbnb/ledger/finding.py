@@ -13,14 +13,14 @@ from enum import Enum
 class Verdict(Enum):
     """The judgement of a printed statement.
 
-    VERIFIED : correct as printed; to first order in the unit roundoff where the document says so.
+    VERIFIED : correct as printed, to first order in the unit roundoff if the document says so.
     MISPRINT : a slip on which nothing later depends.
     WRONG : an error on which a later result or a conclusion depends.
     INCONSISTENT : contradicts another place in the documents.
     NOT_REPRODUCED : a number that no reading of the documents reproduces, and no derivation shows to be wrong.
     OCR : the scan is wrong, not the author.
-    UNVERIFIABLE : the data or the picture it rests on is not in the documents; the note says what is missing.
-    GIVEN : a definition, given data or a heading: there is nothing to check.
+    UNVERIFIABLE : the underlying data or picture is not in the documents; the note names what is missing.
+    GIVEN : a definition, given data or a heading, which cannot be checked.
     OPEN : left undone in the documents and here.
     ANSWERED : left undone in the documents and done here; the note says where.
     """
@@ -52,7 +52,7 @@ _AGREES: dict[Verdict, tuple[bool | None, ...]] = {
 DISAGREEMENTS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.NOT_REPRODUCED, Verdict.MISPRINT, Verdict.OCR)
 """Verdicts on statements that do not agree with the recomputation, the most serious first."""
 _NEEDS_NOTE = {
-    Verdict.UNVERIFIABLE: "which data is missing",
+    Verdict.UNVERIFIABLE: "which data are missing",
     Verdict.GIVEN: "what it defines or gives",
     Verdict.ANSWERED: "where it is answered",
 }
@@ -64,11 +64,11 @@ class Finding:
 
     Parameters
     ----------
-    recomputed : what the project gets; prose with math between single dollar signs.
-    agrees : whether print and recomputation agree; None where there is nothing to compare.
+    recomputed : the project's result; prose with math between single dollar signs.
+    agrees : whether print and recomputation agree; None if there is nothing to compare.
     verdict : the judgement of the statement; it must fit `agrees`.
-    note : why, or where; same markup. Needed for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
-    root : id of the root error in ``roots.csv`` that makes the statement disagree; empty where it agrees.
+    note : reason or place, in the same markup. Required for `UNVERIFIABLE`, `GIVEN` and `ANSWERED`.
+    root : id of the root error in ``roots.csv`` that makes the statement disagree; empty if it agrees.
 
     Raises
     ------
@@ -85,28 +85,36 @@ class Finding:
     def __post_init__(self) -> None:
         for name, text in (("recomputed", self.recomputed), ("note", self.note)):
             if not isinstance(text, str):
-                raise TypeError(f"{name}={text!r} is a {type(text).__name__}; a str is needed: format it")
+                raise TypeError(f"got {name}={text!r} of type {type(text).__name__}; needed a str; format the value")
             if text.count("$") % 2 or "$$" in text:
-                raise ValueError(f"{name}={text!r} has an unpaired or doubled dollar sign; write math as $...$")
+                raise ValueError(f"got {name}={text!r} with an unpaired or doubled dollar sign; needed math as $...$")
         if not isinstance(self.verdict, Verdict):
-            raise TypeError(f"verdict={self.verdict!r} is a {type(self.verdict).__name__}; take one of {list(Verdict)}")
+            raise TypeError(
+                f"got verdict={self.verdict!r} of type {type(self.verdict).__name__}; needed one of {list(Verdict)}"
+            )
         if self.agrees is not None and not isinstance(self.agrees, bool):
             raise TypeError(
-                f"agrees={self.agrees!r} is a {type(self.agrees).__name__}; a bool or None is needed: use bool(...)"
+                f"got agrees={self.agrees!r} of type {type(self.agrees).__name__}; needed a bool or None; use bool(...)"
             )
         if self.agrees not in _AGREES[self.verdict]:
             needed = " or ".join(str(value) for value in _AGREES[self.verdict])
             raise ValueError(
-                f"verdict {self.verdict.value!r} came with agrees={self.agrees}; it needs {needed}: "
-                "let compare(), answer() or unverifiable() choose the verdict"
+                f"got verdict {self.verdict.value!r} with agrees={self.agrees}; needed {needed}; let "
+                "compare(), answer() or unverifiable() choose the verdict"
             )
         if self.root and self.verdict not in DISAGREEMENTS:
-            raise ValueError(f"verdict {self.verdict.value!r} came with the root error {self.root!r}; it has none")
+            raise ValueError(
+                f"got verdict {self.verdict.value!r} with the root error {self.root!r}; needed no root "
+                "error for this verdict; omit root"
+            )
         if self.agrees is not None and not self.recomputed.strip():
-            raise ValueError(f"agrees={self.agrees} came with a blank recomputed; say what was computed")
+            raise ValueError(
+                f"got agrees={self.agrees} with a blank recomputed text; needed a text that says what was computed"
+            )
         if self.verdict in _NEEDS_NOTE and not self.note.strip():
             raise ValueError(
-                f"verdict {self.verdict.value!r} came without a note; say there {_NEEDS_NOTE[self.verdict]}"
+                f"got verdict {self.verdict.value!r} without a note; needed a note that says "
+                f"{_NEEDS_NOTE[self.verdict]}"
             )
 
 
@@ -124,14 +132,14 @@ def compare(
     ----------
     agrees : outcome of the comparison.
     recomputed : what was computed.
-    otherwise : the verdict where `agrees` is False, one of `DISAGREEMENTS`.
-    note : goes with either outcome.
-    otherwise_note : replaces `note` where `agrees` is False.
-    root : id of the root error, used where `agrees` is False.
+    otherwise : the verdict if `agrees` is False, one of `DISAGREEMENTS`.
+    note : note for either outcome.
+    otherwise_note : replaces `note` if `agrees` is False.
+    root : id of the root error, used if `agrees` is False.
 
     Returns
     -------
-    finding : verified where `agrees`, else `otherwise`.
+    finding : verified if `agrees`, otherwise `otherwise`.
 
     Raises
     ------
@@ -140,7 +148,7 @@ def compare(
     """
     if otherwise not in DISAGREEMENTS:
         came = otherwise.value if isinstance(otherwise, Verdict) else otherwise
-        raise ValueError(f"otherwise={came!r}; a disagreement is one of {', '.join(v.value for v in DISAGREEMENTS)}")
+        raise ValueError(f"got otherwise={came!r}; needed one of {', '.join(v.value for v in DISAGREEMENTS)}")
     _require_bool("agrees", agrees)
     if agrees:
         return Finding(recomputed, True, Verdict.VERIFIED, note)
@@ -148,17 +156,17 @@ def compare(
 
 
 def answer(holds: bool, recomputed: str, note: str) -> Finding:
-    """Judge what the documents left undone by the check of the answer given here.
+    """Judge an item that the documents leave undone, by checking the answer given here.
 
     Parameters
     ----------
     holds : whether the answer passes its own check.
     recomputed : the answer.
-    note : where it stands.
+    note : where the answer is.
 
     Returns
     -------
-    finding : answered where `holds`, else open.
+    finding : answered if `holds`, otherwise open.
 
     Raises
     ------
@@ -171,7 +179,7 @@ def answer(holds: bool, recomputed: str, note: str) -> Finding:
 
 
 def unverifiable(recomputed: str, note: str) -> Finding:
-    """Record that a statement rests on data that is not in the documents.
+    """Record that a statement depends on data that is not in the documents.
 
     Parameters
     ----------
@@ -201,4 +209,4 @@ def given(note: str) -> Finding:
 
 def _require_bool(name: str, value: object) -> None:
     if not isinstance(value, bool):
-        raise TypeError(f"{name}={value!r} is a {type(value).__name__}; a bool is needed: use bool(...)")
+        raise TypeError(f"got {name}={value!r} of type {type(value).__name__}; needed a bool; use bool(...)")

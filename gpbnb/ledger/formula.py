@@ -4,14 +4,14 @@ A form is one or more parts, separated by semicolons. Each part is one of:
 
 - a relation: a chain of Python comparisons, as in ``abs(Q_tilde/Q) <= (n + m + 1)*beta``;
 - a number: ``label: literal unit``, as in ``total: 1.253 mas``; the literal keeps its digits, the unit is optional;
-- words: ``label: printed phrase | another phrase | ...``; the first phrase is what the document says, and the others
-  are what it could have said instead.
+- words: ``label: printed phrase | another phrase | ...``; the first phrase is printed in the document, and the others
+  are alternatives that it could have used.
 
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
 printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that
-a printed series leaves out; a check gives it a value, such as ``sp.O(mu**4)``.
+a printed series omits; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
@@ -55,12 +55,12 @@ _BINARY: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 class Undefined(ValueError):
-    """A printed expression has no value: an index without a quantity, or an operation on quantities that do not fit."""
+    """A printed expression has no value, because an index has no quantity or operands do not fit."""
 
 
 @dataclass(frozen=True)
 class Link:
-    """One comparison of a chain: ``left symbol right``, both sides evaluated."""
+    """One comparison of a chain, ``left symbol right``, with both sides evaluated."""
 
     left: Any
     symbol: str
@@ -75,7 +75,9 @@ class Link:
         ValueError : the symbol is ``≈``; the check must say how close is close enough.
         """
         if self.symbol == "≈":
-            raise ValueError(f"{self.left} ≈ {self.right}: compare the two sides of ≈ in the check")
+            raise ValueError(
+                f"got {self.left} ≈ {self.right}; needed a relation without ≈; compare the two sides in the check"
+            )
         left, right = self.left, self.right
         if self.symbol == "==" and isinstance(left, sp.Basic | sp.MatrixBase):
             difference = left - right
@@ -126,15 +128,15 @@ class Relation:
 
         Parameters
         ----------
-        names : values of names, as in ``{"n": 3}``; functions for calls and for indices:
-            ``{"a": lambda i, j: ...}`` gives ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
+        names : values of names, as in ``{"n": 3}``. Functions give the values of calls and of indexed names:
+            ``{"a": lambda i, j: ...}`` defines ``a[i, j]``. ``{"T": f, "inv": g}`` replace the attributes ``.T`` and
             ``.inv``; ``{"matrix": f}`` makes a matrix of a list in brackets. A name that is missing becomes a SymPy
             symbol, an indexed name the symbol ``a[i,j]``, and a call a SymPy function.
-        number : turns the exact value of a printed number into the arithmetic wanted; SymPy rationals by default.
+        number : function that converts the exact value of a printed number to another type; by default SymPy rationals.
 
         Returns
         -------
-        links : one a comparison; a part without a comparison has none.
+        links : one for each comparison; a part without a comparison has none.
 
         Raises
         ------
@@ -154,14 +156,16 @@ class Relation:
         return _Evaluation(names or {}, number)(tree.comparators[-1] if isinstance(tree, ast.Compare) else tree)
 
     def latex(self) -> str:
+        """Typeset the relation."""
         return typeset(self.tree, 0)
 
     def markdown(self) -> str:
+        """Typeset the relation as a formula in Markdown."""
         return f"${self.latex()}$"
 
 
 def _terms(node: ast.expr) -> list[tuple[bool, ast.expr]]:
-    """The terms of a sum, each with whether it is subtracted."""
+    """Return the terms of a sum, each with a flag that tells whether it is subtracted."""
     match node:
         case ast.BinOp(left=left, op=ast.Add(), right=right):
             return [*_terms(left), *_terms(right)]
@@ -185,19 +189,22 @@ class Number:
 
     @property
     def text(self) -> str:
+        """The number as the file of statements has it."""
         return f"{self.label}: {self.literal} {self.unit}".strip()
 
     def latex(self) -> str:
+        """Typeset the digits and the unit."""
         unit = rf"\ \text{{{self.unit.replace(chr(37), chr(92) + chr(37))}}}" if self.unit else ""
         return number_latex(self.literal) + unit
 
     def markdown(self) -> str:
+        """Typeset the number as a formula in Markdown."""
         return f"${self.latex()}$"
 
 
 @dataclass(frozen=True)
 class Words:
-    """A claim in words: what the document says, and what it could have said instead."""
+    """A claim in words: the document's phrase, and alternatives that it could have used."""
 
     label: str
     printed: str
@@ -205,9 +212,11 @@ class Words:
 
     @property
     def text(self) -> str:
+        """The claim as the file of statements has it."""
         return f"{self.label}: {' | '.join((self.printed, *self.others))}"
 
     def markdown(self) -> str:
+        """The claim as it is printed."""
         return self.printed
 
 
@@ -231,20 +240,20 @@ def _part(text: str) -> Part:
     if labelled and "|" in labelled[2]:
         first, *others = (phrase.strip() for phrase in labelled[2].split("|"))
         if not first or not others or not all(others) or len({first, *others}) <= len(others):
-            raise ValueError(f"{text!r} needs different phrases on both sides of |")
+            raise ValueError(f"got {text!r}; needed different phrases on the two sides of |")
         return Words(labelled[1], first, tuple(others))
     if labelled:
         number = _NUMBER.fullmatch(labelled[2])
         if not number:
             raise ValueError(
-                f"{text!r}: {labelled[2]!r} is not a number with a unit; write words as 'label: this | that'"
+                f"got {labelled[2]!r} in {text!r}; needed a number with a unit, or words as 'label: this | that'"
             )
         return Number(labelled[1], number[1], number[2] or "")
     try:
         relation = Relation(text)
         typeset(relation.tree, 0)
     except (SyntaxError, KeyError, TypeError) as error:
-        raise ValueError(f"{text!r} is not a relation ({error})") from error
+        raise ValueError(f"got {text!r}; needed a relation ({error})") from error
     return relation
 
 
@@ -293,7 +302,7 @@ class _Evaluation:
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
                 found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
                 return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
-        raise ValueError(f"{ast.unparse(node)} cannot be evaluated")
+        raise ValueError(f"got {ast.unparse(node)}; needed an expression that can be evaluated")
 
     def _indices(self, index: ast.expr) -> list[Any]:
         return [self(i) for i in (index.elts if isinstance(index, ast.Tuple) else [index])]
@@ -310,7 +319,7 @@ class _Evaluation:
     def _repeated(self, name: str, arguments: list[ast.expr]) -> Any:
         term, bounds = arguments
         if not isinstance(bounds, ast.Tuple) or not isinstance(bounds.elts[0], ast.Name):
-            raise ValueError(f"{name} needs (index, first, last)")
+            raise ValueError(f"got {name} without a range; needed (index, first, last)")
         index, (first, last) = bounds.elts[0].id, map(self, bounds.elts[1:])
         if name != "Int" and getattr(first, "is_Integer", True) and getattr(last, "is_Integer", True):
             terms = [
@@ -324,20 +333,20 @@ class _Evaluation:
                 total = total + each if name == "Sum" else total * each
             return total
         if name in ("Max", "Largest"):
-            raise ValueError(f"{name} needs a range of numbers, got {first} to {last}")
+            raise ValueError(f"got {name} from {first} to {last}; needed whole numbers")
         inner = _Evaluation({**self.names, index: sp.Symbol(index, integer=name != "Int")}, self.number)(term)
         operation = {"Sum": sp.summation, "Prod": sp.product, "Int": sp.integrate}[name]
         return operation(inner, (sp.Symbol(index, integer=name != "Int"), first, last))
 
     def _cases(self, arguments: list[ast.expr]) -> Any:
-        """The value of the only case whose condition holds."""
+        """Return the value of the only case whose condition holds."""
         values = [
             self(argument.elts[0])
             for argument in arguments
             if isinstance(argument, ast.Tuple) and self(argument.elts[1])
         ]
         if len(values) != 1:
-            raise Undefined(f"{len(values)} cases hold; exactly one is needed")
+            raise Undefined(f"got {len(values)} cases that hold; needed exactly one")
         return values[0]
 
 
@@ -345,7 +354,7 @@ def _apply(node: ast.expr, operation: Callable[..., Any], *operands: Any) -> Any
     try:
         return operation(*operands)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        raise Undefined(f"{ast.unparse(node)} has no value here: {error}") from error
+        raise Undefined(f"got {ast.unparse(node)}, which has no value here: {error}") from error
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

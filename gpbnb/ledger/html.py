@@ -17,7 +17,7 @@ CHAPTERS = {
     "budget": "Error budget",
     "geometry": "Measurement geometry",
 }
-"""Titles of the chapters by topic; the page of a topic has the topic's name."""
+"""Titles of the chapters by topic; the page of a topic has the name of the topic."""
 
 
 def chapter(topic: str) -> str:
@@ -26,7 +26,7 @@ def chapter(topic: str) -> str:
 
 
 EMPHASIS = re.compile(r"(?<![\w*])\*(\w(?:[^*]*\w)?)\*(?![\w*])")
-"""What stands between stars in a note."""
+"""Text between stars in a note."""
 
 _TOPIC = {title: topic for topic, title in CHAPTERS.items()}
 
@@ -57,7 +57,7 @@ def chapter_link(topic: str) -> str:
 
 
 def badge(outcome: str) -> str:
-    """Show a verdict as a word on a colour."""
+    """Show a verdict as a word on a coloured background."""
     return f'<span class="verdict verdict-{outcome.replace(" ", "-")}">{escape(outcome)}</span>'
 
 

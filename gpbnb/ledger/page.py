@@ -23,8 +23,8 @@ class LedgerPage:
 
     Parameters
     ----------
-    name : of the page.
-    title : of the page.
+    name : file name of the page, without its ending.
+    title : title of the page.
     document : short name of the document.
     sections : regular expression of the chapter and section, as in ``II.11.2``, of the statements on the page.
     """
@@ -35,7 +35,7 @@ class LedgerPage:
     sections: str
 
     def holds(self, statement: Statement) -> bool:
-        """Whether a statement stands on this page."""
+        """Whether a statement is on this page."""
         place = section_name(statement.chapter, statement.section)
         return statement.document == self.document and re.fullmatch(self.sections, place) is not None
 
@@ -45,7 +45,8 @@ PAGES = (
         "ledger-1984-1", "Report of 1984: rounding and inversion in general", "hung1984", r"I|II\.([1-9]|9\..*|10)"
     ),
     LedgerPage("ledger-1984-2", "Report of 1984: inversion by elimination", "hung1984", r"II\.11.*"),
-    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter, roll and deroll", "hung1984", r"II\.1[234]|III.*"),
+    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter", "hung1984", r"II\.1[234]"),
+    LedgerPage("ledger-1984-4", "Report of 1984: roll and deroll", "hung1984", r"III.*"),
     LedgerPage("ledger-1982-1", "Report of 1982: budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"),
     LedgerPage("ledger-1982-2", "Report of 1982: inversion by elimination", "hung1982", r"III\.11.*"),
     LedgerPage("ledger-1982-3", "Report of 1982: Kalman filter, geometry", "hung1982", r"III\.1[23]|IV"),
@@ -68,7 +69,7 @@ CLAIMS = {
     "hung1982.IV.eq8": "Deroll of the first drift",
     "hung1982.IV.eq9": "Deroll of the second drift",
     "savage2016.main.eq35": "Random walk of a trapezoidal integrator",
-    "savage2016.main.eq39": "The same for fast sampling",
+    "savage2016.main.eq39": "Random walk for fast sampling",
 }
 """The principal claims of the documents, by statement id."""
 
@@ -93,7 +94,7 @@ def topics() -> dict[str, str]:
 
 
 def address(statement: Statement) -> str:
-    """The link to a statement in the complete ledger."""
+    """Return the link to a statement in the complete ledger."""
     page = next(page for page in PAGES if page.holds(statement))
     return f"{page.name}.html#{escape(statement.id)}"
 
@@ -106,7 +107,7 @@ def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[R
     ValueError : no such topic.
     """
     if topic not in TOPICS:
-        raise ValueError(f"no topic {topic!r}; the topics are {', '.join(TOPICS)}")
+        raise ValueError(f"got topic {topic!r}; needed one of {', '.join(TOPICS)}")
     return tuple(
         row
         for row in rows
@@ -115,16 +116,16 @@ def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[R
 
 
 def count_table(rows: Iterable[Row], by: str) -> Table:
-    """Tabulate the counts of `rows`: a line per document, chapter of this book or kind, and a column per verdict.
+    """Count `rows` in a table with a row per document, chapter of this book or kind, and a column per verdict.
 
     Parameters
     ----------
-    rows : what to count.
+    rows : the rows to count.
     by : ``document``, ``chapter`` (of this book) or ``kind``.
 
     Raises
     ------
-    ValueError : `by` is something else.
+    ValueError : `by` has another value.
     """
     rows = in_reading_order(rows)
     owner = topics()
@@ -134,7 +135,7 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
         "kind": lambda row: row.statement.kind,
     }
     if by not in groups:
-        raise ValueError(f"by={by!r}; take one of {', '.join(groups)}")
+        raise ValueError(f"got by={by!r}; needed one of {', '.join(groups)}")
     total = counts(rows)
     inside: dict[str, list[Row]] = {}
     for row in rows:
@@ -151,7 +152,7 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
 def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
     """Lay out one page of the complete ledger: a form with filters, and a row per statement.
 
-    The form is hidden until the page's script, ``ledger.js``, shows and serves it.
+    The form is hidden until the page's script, ``ledger.js``, shows it and responds to it.
     """
     rows = in_reading_order(row for row in rows if page.holds(row.statement))
     owner = topics()
@@ -165,12 +166,12 @@ def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
 def error_table(rows: Iterable[Row]) -> Html:
     """Tabulate the errors behind the statements that disagree, the most serious first, with the statements affected.
 
-    Statements with the same root error share a row; their notes are collapsed.
+    Statements with the same root error share a row, in which their notes are collapsed; so do those with the same note.
     """
     found = [row for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS]
     groups: dict[str, list[Row]] = {}
     for row in found:
-        groups.setdefault((row.finding and row.finding.root) or row.statement.id, []).append(row)
+        groups.setdefault((row.finding and (row.finding.root or row.finding.note)) or row.statement.id, []).append(row)
     ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
     header = ("Error", "Verdict", "Statements affected")
     table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
@@ -207,7 +208,7 @@ def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
 
 
 def root_table(rows: Iterable[Row]) -> Html:
-    """Tabulate the root errors, those that spoil most statements first: the mistake, the reason, and the statements."""
+    """Tabulate the root errors, by the number of statements affected: the mistake, the reason, the statements."""
     roots = load_roots()
     found = sorted(by_root(rows).items(), key=lambda item: -len(item[1]))
     lines = []
@@ -218,7 +219,8 @@ def root_table(rows: Iterable[Row]) -> Html:
             f'<td><p>{typeset(roots[key].explanation)}</p><p class="spoils">{places}</p></td></tr>'
         )
     return Html(
-        f"{len(found)} root errors", _wrapped(("Root error", "Statements", "Why, and where"), lines, "ledger-roots")
+        f"{len(found)} root errors",
+        _wrapped(("Root error", "Statements", "Explanation and affected statements"), lines, "ledger-roots"),
     )
 
 
@@ -235,7 +237,10 @@ def claim_table(rows: Iterable[Row]) -> Html:
             f'<tr><th scope="row">{escape(claim)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
             f"<td><p>{text}</p><p>{chapter_link(owner[key])}</p></td></tr>"
         )
-    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "As printed, and where it is examined"), lines))
+    return Html(
+        f"{len(lines)} claims",
+        _wrapped(("Claim", "Outcome", "Printed statement, and the chapter that examines it"), lines),
+    )
 
 
 def _link(row: Row) -> str:
@@ -261,7 +266,7 @@ def _error(group: Sequence[Row]) -> str:
     for row in group:
         link = f'<a href="{address(row.statement)}">{typeset(row.statement.item)}</a>'
         places.setdefault(row.statement.document, []).append(link)
-    affected = "".join(f"<p>{document}: {', '.join(links)}</p>" for document, links in places.items())
+    affected = "".join(f"<p>{document[-4:]}: {', '.join(links)}</p>" for document, links in places.items())
     badges = " ".join(
         badge(outcome) for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
     )

@@ -27,13 +27,13 @@ def to_csv(rows: Iterable[Row]) -> str:
 
 
 def to_json(rows: Iterable[Row]) -> str:
-    """Write `rows` as a JSON array of objects with the keys `COLUMNS`; null where there is no finding."""
+    """Write `rows` as a JSON array of objects with the keys `COLUMNS`; null if there is no finding."""
     records = [dict(zip(COLUMNS, _record(row), strict=True)) for row in rows]
     return json.dumps(records, ensure_ascii=False, indent=1) + "\n"
 
 
 def to_text(rows: Iterable[Row]) -> str:
-    """Write `rows` one a line: outcome, id, what was recomputed, note."""
+    """Write `rows`, one per line: outcome, id, recomputed result, note."""
     lines = []
     for row in rows:
         found = (row.finding.recomputed, row.finding.note) if row.finding else ()
@@ -72,7 +72,7 @@ def table(rows: Iterable[Row]) -> Table:
 
 
 def describe(counted: dict[str, int]) -> str:
-    """Say `counted` in words, as in ``3 verified, 1 no check``."""
+    """Write `counted` in words, as in ``3 verified, 1 no check``."""
     return ", ".join(f"{number} {OUTCOMES.get(outcome, outcome)}" for outcome, number in counted.items())
 
 
@@ -90,7 +90,7 @@ def _place(entry: Statement) -> str:
 
 
 def section_name(chapter: str, section: str) -> str:
-    """Name a section with its chapter, as in ``II.9.1``; ``-`` where there is neither."""
+    """Name a section with its chapter, as in ``II.9.1``; ``-`` if there is neither."""
     return ".".join(part for part in (chapter, section) if part != "-") or "-"
 
 

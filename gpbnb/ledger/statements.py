@@ -31,11 +31,11 @@ class Statement:
     ----------
     id : unique; ``document.chapter.place``, as in ``hung1984.II.eq20``.
     document : short name, one of `DOCUMENTS`.
-    chapter, section : as numbered there; ``-`` where the document has none.
-    item : what it is called there, as in ``eq (20)``.
+    chapter, section : as numbered there; ``-`` if the document has none.
+    item : its name in the document, as in ``eq (20)``.
     kind : one of `KINDS`.
     text : the printed text, with math between single dollar signs; ``{{1}}`` stands for the first part of the form.
-    form : the machine-readable form, see :mod:`gpbnb.ledger.formula`; empty where there is none.
+    form : the machine-readable form, see :mod:`gpbnb.ledger.formula`; empty if there is none.
     """
 
     id: str
@@ -58,15 +58,15 @@ class Statement:
         return _PLACE.sub(lambda place: self.parts[int(place[1]) - 1].markdown(), self.text)
 
     def relation(self, number: int = 1) -> Relation:
-        """The relation with this number among the relations of the form, counted from 1.
+        """Return the relation with this number among the relations of the form, counted from 1.
 
         Raises
         ------
-        LookupError : the form has no such relation.
+        LookupError : the form has no relation with this number.
         """
         relations = [part for part in self.parts if isinstance(part, Relation)]
         if not 1 <= number <= len(relations):
-            raise LookupError(f"{self.id} has {len(relations)} relations; got number {number}")
+            raise LookupError(f"got relation number {number} of {self.id}; needed a number from 1 to {len(relations)}")
         return relations[number - 1]
 
     def links(
@@ -77,7 +77,7 @@ class Statement:
         return tuple(link for relation in relations for link in relation.links(names, number))
 
     def number(self, label: str) -> Number:
-        """The printed number with this label.
+        """Return the printed number with this label.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Statement:
         return self._labelled(Number, label)
 
     def says(self, label: str) -> str:
-        """The phrase that the document prints for this label.
+        """Return the phrase that the document prints for this label.
 
         Raises
         ------
@@ -99,11 +99,11 @@ class Statement:
 
         Parameters
         ----------
-        meanings : every phrase that it could print, and whether it would be right.
+        meanings : every phrase that could be printed, and whether it would be right.
 
         Raises
         ------
-        LookupError : the form has no phrase of this label, or prints one that `meanings` does not have.
+        LookupError : the form has no phrase with this label, or prints one that is not in `meanings`.
         """
         return meanings[self.says(label)]
 
@@ -112,7 +112,7 @@ class Statement:
             if isinstance(part, sort) and part.label == label:
                 return part
         labels = ", ".join(part.label for part in self.parts if isinstance(part, sort)) or "none"
-        raise LookupError(f"{self.id} has no {sort.__name__.lower()} {label!r}; it has: {labels}")
+        raise LookupError(f"got {sort.__name__.lower()} {label!r} of {self.id}; needed one of {labels}")
 
 
 _PLACE = re.compile(r"\{\{(\d+)\}\}")
@@ -124,7 +124,7 @@ def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
 
     Parameters
     ----------
-    source : a CSV file, such as a ``pathlib.Path``; the one of the package by default.
+    source : a CSV file, such as a ``pathlib.Path``; by default that of the package.
 
     Returns
     -------
@@ -139,19 +139,19 @@ def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
     try:
         text = source.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{source.name} is not UTF-8 ({error}); save it as UTF-8") from error
+        raise ValueError(f"got {source.name}, which is not UTF-8 ({error}); save it as UTF-8") from error
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     entries: list[Statement] = []
     seen: dict[str, int] = {}
     try:
         header = next(reader, [])
         if tuple(header) != HEADER:
-            raise ValueError(f"the header is {','.join(header)!r}; {','.join(HEADER)!r} is needed")
+            raise ValueError(f"got the header {','.join(header)!r}; needed {','.join(HEADER)!r}")
         for record in reader:
             entry = _entry(record)
             if entry.id in seen:
                 raise ValueError(
-                    f"id {entry.id!r} is that of line {seen[entry.id]} already; ids are unique: rename one"
+                    f"got id {entry.id!r}, which line {seen[entry.id]} has already; needed a unique id; rename one"
                 )
             seen[entry.id] = reader.line_num
             entries.append(entry)
@@ -166,40 +166,45 @@ def _by_id() -> dict[str, Statement]:
 
 
 def statement(key: str) -> Statement:
-    """The statement with the id `key`.
+    """Return the statement with the id `key`.
 
     Raises
     ------
     KeyError : there is no statement with this id.
     """
     if key not in _by_id():
-        raise KeyError(f"no statement {key!r} in statements.csv; correct the id")
+        raise KeyError(f"got {key!r}; needed the id of a statement in statements.csv")
     return _by_id()[key]
 
 
 def quote(key: str) -> str:
-    """The printed text of the statement `key`; KeyError as for :func:`statement`."""
+    """Return the printed text of the statement `key`; KeyError as for :func:`statement`."""
     return statement(key).printed
 
 
 def _entry(record: list[str]) -> Statement:
     if len(record) != len(HEADER):
-        raise ValueError(f"{len(record)} fields; {len(HEADER)} are needed: quote a field that holds a comma")
+        raise ValueError(f"got {len(record)} fields; needed {len(HEADER)}; quote a field that contains a comma")
     entry = Statement(*record)
     for name, value in zip(HEADER, record, strict=True):
         if (not value and name != "form") or value != value.strip():
-            raise ValueError(f"{name}={value!r} is blank or has blanks at an end; fill it in, '-' where there is none")
+            raise ValueError(
+                f"got {name}={value!r}; needed a text without leading or trailing blanks; write '-' where there is none"
+            )
     if entry.document not in DOCUMENTS:
-        raise ValueError(f"unknown document {entry.document!r}; take one of {', '.join(DOCUMENTS)}")
+        raise ValueError(f"got document {entry.document!r}; needed one of {', '.join(DOCUMENTS)}")
     if entry.kind not in KINDS:
-        raise ValueError(f"unknown kind {entry.kind!r}; take one of {', '.join(KINDS)}")
+        raise ValueError(f"got kind {entry.kind!r}; needed one of {', '.join(KINDS)}")
     if not entry.id.startswith(f"{entry.document}."):
-        raise ValueError(f"id {entry.id!r} does not begin with its document; write '{entry.document}.…'")
+        raise ValueError(f"got id {entry.id!r}; needed an id that begins with its document: '{entry.document}.…'")
     if entry.text.count("$") % 2 or "$$" in entry.text:
-        raise ValueError(f"text={entry.text!r} has an unpaired or doubled dollar sign; write math as $...$")
+        raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
     for place in _PLACE.findall(entry.text):
         if not 1 <= int(place) <= len(entry.parts):
-            raise ValueError(f"text has the place {{{{{place}}}}}, but the form has {len(entry.parts)} parts")
+            raise ValueError(
+                f"got the place {{{{{place}}}}} in text; needed a number up to {len(entry.parts)}, the "
+                "number of parts of the form"
+            )
     _ = entry.parts, entry.printed
     return entry
 
@@ -214,13 +219,13 @@ def select(
 
     Parameters
     ----------
-    entries : where from.
+    entries : the entries to choose from.
     document, chapter : all by default.
-    sections : numbers or names; ``9`` takes 9.1 and 9.2 too. All by default.
+    sections : numbers or names; ``9`` includes 9.1 and 9.2. All by default.
 
     Raises
     ------
-    ValueError : nothing is there of that document, of that chapter, or of one of the sections.
+    ValueError : there are no entries of this document, of this chapter, or of one of the sections.
     """
     found = tuple(entries)
     if document is not None:
@@ -230,7 +235,7 @@ def select(
     if sections is not None:
         wanted = [sections] if isinstance(sections, str) else [str(section) for section in sections]
         if not wanted:
-            raise ValueError("sections is empty; name at least one, or None for all")
+            raise ValueError("got an empty sections; needed at least one section, or None for all")
         within = {entry.id for section in wanted for entry in _keep(found, "section", section)}
         found = tuple(entry for entry in found if entry.id in within)
     return found
@@ -244,5 +249,5 @@ def _keep(entries: tuple[Statement, ...], field: str, value: str) -> tuple[State
     )
     if not kept:
         there = ", ".join(dict.fromkeys(getattr(entry, field) for entry in entries))
-        raise ValueError(f"no entry of {field} {value!r}; here are: {there}")
+        raise ValueError(f"got {field} {value!r}, which no entry has; needed one of {there}")
     return kept

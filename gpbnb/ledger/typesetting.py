@@ -66,7 +66,7 @@ def _wrap(text: str, needed: bool) -> str:
 
 
 def typeset(node: ast.expr, level: int) -> str:
-    """Typeset an expression; parentheses where its operator binds less tightly than `level`."""
+    """Typeset an expression, in parentheses if its operator binds less tightly than `level`."""
     match node:
         case ast.Constant(value=value):
             return r"\cdots" if value is Ellipsis else number_latex(getattr(node, "literal", None) or ast.unparse(node))
@@ -104,11 +104,11 @@ def typeset(node: ast.expr, level: int) -> str:
             return r"\begin{bmatrix}" + r" \\ ".join(lines) + r"\end{bmatrix}"
         case ast.List(elts=cells) | ast.Tuple(elts=cells):
             return rf"\left[{', '.join(typeset(cell, 0) for cell in cells)}\right]"
-    raise TypeError(f"{ast.unparse(node)} cannot be typeset")
+    raise TypeError(f"got {ast.unparse(node)}; needed an expression that can be typeset")
 
 
 def _without_minus(node: ast.expr) -> ast.expr | None:
-    """The product whose first factor has lost its minus sign; None if that factor has none."""
+    """Return the product without the minus sign of its first factor; None if that factor has none."""
     match node:
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return operand
@@ -118,7 +118,7 @@ def _without_minus(node: ast.expr) -> ast.expr | None:
 
 
 def _times(a: str, b: str) -> str:
-    """What stands between two factors."""
+    """Return the symbol between two factors."""
     if b[:1].isdigit() or b[:1] == ".":
         return r"\times "
     return r"\," if a[-1:].isalpha() and b[:1].isalpha() else ""

@@ -20,6 +20,7 @@ YEAR_SAMPLES = round(YEAR / INTERVAL)
 
 
 def samples_in(duration: float, interval: float) -> int:
+    """How many samples a record has, at least two."""
     if not (0 < interval < math.inf and 0 < duration < math.inf):
         raise ValueError(f"got {duration} s with a sample every {interval} s; needed two finite positive numbers")
     n = round(duration / interval)

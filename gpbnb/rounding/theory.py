@@ -1,11 +1,11 @@
-"""Theory: bounds on the errors of sums, products, inner products and matrix products.
+r"""Theory: bounds on the errors of sums, products, inner products and matrix products.
 
 Bounds named ``printed_…`` are those of the documents; the others are derived in
 :mod:`gpbnb.rounding.derivation`. ``beta`` is the unit roundoff β, ``FloatFormat.unit_roundoff``.
 All values are exact: entries are Fractions, and so are the bounds.
 
 A first-order bound omits terms in β². A strict bound, built from
-:math:`\\gamma_n = n\\beta/(1-n\\beta)`, omits nothing.
+:math:`\gamma_n = n\beta/(1-n\beta)`, omits nothing.
 """
 
 from __future__ import annotations
@@ -83,27 +83,46 @@ def strict_sum_bound(x: Any, beta: Fraction) -> Fraction:
 
 
 MANY_TERMS = 1000
-"""For more float64 terms than this, the strict bound is itself computed in float64 and rounded up."""
+"""For more terms than this, the strict bound is itself computed in float64 and rounded up."""
 
 
 def _strict_bound_of_floats(x: Any, beta: Fraction) -> Fraction | None:
-    """Return the strict bound for many float64 terms, too large by at most a relative 2**-45, or None for other terms.
+    """Return the strict bound for many terms, too large by at most a relative 2**-45, or None for other terms.
 
-    The exact sum has a denominator of millions of digits. Here the relative error of each factor and product is below
-    2**-50, their sum is correctly rounded, and the result is raised by more than all of these errors.
+    The exact sum has a denominator of millions of digits. Here the unit roundoff, each term, factor and product are off
+    by a few roundings, together less than 2**-49, as no denominator is below one half. Their sum is correctly rounded,
+    and the result is raised by more than all of these errors.
     """
-    if not isinstance(x, np.ndarray) or x.dtype != np.float64 or x.ndim != 1 or len(x) <= MANY_TERMS:
+    if (size := _sizes(x)) is None:
         return None
-    size = np.abs(x)
     if not np.isfinite(size).all() or (size[size > 0] < 1e-250).any() or (size > 1e250).any():
         return None
-    gamma(len(x) - 1, beta)  # raises if there are too many roundings
+    gamma(len(size) - 1, beta)  # raises if there are too many roundings
     unit = float(beta)
-    if Fraction(unit) != beta or unit * len(x) > 0.5:
+    if unit < 1e-250 or unit * len(size) > 0.5:
         return None
-    weights = np.array(sum_weights(len(x)), dtype=np.float64)
+    weights = np.arange(len(size), 0, -1, dtype=np.float64)  # sum_weights
+    weights[0] -= 1
     total = math.fsum((weights * unit / (1 - weights * unit) * size).tolist())
     return Fraction(total) * (1 + Fraction(1, 2**46))
+
+
+def _sizes(x: Any) -> NDArray[np.float64] | None:
+    """Absolute values of many real terms, each the nearest float64 or exact; None for others."""
+    if hasattr(x, "to_fractions"):  # an array of a format
+        if x.ndim != 1 or len(x) <= MANY_TERMS:
+            return None
+        try:
+            return np.abs(np.asarray(x.to_float()))
+        except OverflowError:
+            return None
+    if isinstance(x, (list, tuple)):
+        if len(x) <= MANY_TERMS or not set(map(type, x)) <= {int, float}:
+            return None
+        x = np.asarray(x)
+    if not isinstance(x, np.ndarray) or x.dtype.kind not in "iuf" or x.dtype.itemsize > 8 or x.ndim != 1:
+        return None
+    return np.abs(x.astype(np.float64)) if len(x) > MANY_TERMS else None
 
 
 def probabilistic_sum_factor(n: int, beta: Fraction, failure: float = 0.01) -> float:
@@ -145,7 +164,9 @@ def strict_product_bound(n: int, m: int, beta: Fraction) -> Fraction:
 
 def _operations(n: int, m: int) -> int:
     if n < 1 or m < 0:
-        raise ValueError(f"got {n} factors and {m} divisors; needed at least 1 and 0; write 1/y with the factor 1")
+        raise ValueError(
+            f"got {n} factors and {m} divisors; needed at least 1 factor and 0 divisors; write 1/y with the factor 1"
+        )
     return n + m - 1
 
 
@@ -187,7 +208,7 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     """
     value = abs(_total(_products(a, b)))
     if value == 0:
-        raise ZeroDivisionError("got an inner product of zero; needed another; use strict_dot_bound")
+        raise ZeroDivisionError("got an inner product of zero; needed a nonzero one; use strict_dot_bound")
     return strict_dot_bound(a, b, beta) / value
 
 
@@ -304,7 +325,7 @@ def _vector(x: Any) -> NDArray[Any]:
 def _products(a: Any, b: Any) -> NDArray[Any]:
     left, right = _vector(a), _vector(b)
     if len(left) != len(right):
-        raise ValueError(f"got vectors of {len(left)} and {len(right)}; needed equal lengths")
+        raise ValueError(f"got vectors of lengths {len(left)} and {len(right)}; needed equal lengths")
     return np.asarray(left * right)
 
 

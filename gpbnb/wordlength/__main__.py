@@ -13,7 +13,8 @@ from gpbnb.wordlength.models import read_measurements, read_model
 from gpbnb.wordlength.report import study
 
 EPILOG = """
-The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. Numbers are read as decimals.
+The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. A filter may have known inputs
+B and u (or --inputs) and known offsets b of the states and d of the measurements. Numbers are read as decimals.
 Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.
 """
 
@@ -27,20 +28,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("model", type=Path, help="TOML file")
-    parser.add_argument("--tolerance", required=True, help="largest error: one number, or one for each state: 0.01,inf")
-    parser.add_argument("--measurements", type=Path, help="CSV file, a row a step; by default simulated")
-    parser.add_argument("--steps", type=int, help="how many steps to simulate; 1000 by default")
-    parser.add_argument("--base", type=int, default=2, help="2, 10 or 16; 2 by default")
-    parser.add_argument("--rounding", default="nearest", help='such as "nearest" or "chop"')
-    parser.add_argument("--form", default="innovation", help='such as "innovation", "Joseph" or "UD"')
-    parser.add_argument("--basis", action="append", choices=("emulation", "bound"), help="both by default")
+    parser.add_argument(
+        "--tolerance", required=True, help="largest allowed error: one number, or one per state, such as 0.01,inf"
+    )
+    parser.add_argument(
+        "--measurements", type=Path, help="CSV file with one row per step; default: simulated measurements"
+    )
+    parser.add_argument("--inputs", type=Path, help="CSV file with the known inputs u of the filter, one row per step")
+    parser.add_argument("--steps", type=int, help="number of steps to simulate; default: 1000")
+    parser.add_argument("--base", type=int, default=2, help="2, 10 or 16; default: 2")
+    parser.add_argument("--rounding", default="nearest", help='rounding rule, such as "nearest" or "chop"')
+    parser.add_argument(
+        "--form",
+        default="innovation",
+        help='form of the covariance update, such as "innovation", "Joseph", "UD" or "Cholesky"',
+    )
+    parser.add_argument(
+        "--basis",
+        action="append",
+        choices=("emulation", "bound"),
+        help="how to find the precision; may be given twice; default: both",
+    )
     parser.add_argument("--report", type=Path, help="HTML file to write, with a JSON file of the same name beside it")
     given = parser.parse_args(arguments)
     command = shlex.join(["python", "-m", "gpbnb.wordlength", *map(str, arguments or sys.argv[1:])])
     try:
         tolerance = [float(each) for each in given.tolerance.split(",")]
         form_named(given.form), rounding_named(given.rounding)
-        model = read_model(given.model)
+        model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
         z = read_measurements(given.measurements) if given.measurements else None
         report = study(
             model,

@@ -367,7 +367,7 @@ def _peak_sums(A: NDArray[Any], G: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _effects(program: Program, coefficients: NDArray[Any], wide: bool) -> NDArray[Any]:
-    """Return the effect on the states of a step of an error in each rounding, (n, roundings)."""
+    """Return the effect of each rounding error on the states after the step, (n, roundings)."""
     n, first = program.n, program.n + program.m
     count = first + len(program.operations)
     effects = [[Fraction(0)] * n for _ in range(count)]

@@ -17,13 +17,16 @@ from gpbnb.kalman.system import LinearSystem
 from gpbnb.sweeps import plain_number
 
 KALMAN = ("Phi", "H", "Q", "R", "x0", "P0")
-"""Keys of a Kalman filter in a TOML file; ``name`` is optional."""
+"""Keys of a Kalman filter in a TOML file."""
+
+INPUTS = ("B", "u", "b", "d", "steps")
+"""Further keys of a Kalman filter, for known inputs and offsets; see :class:`gpbnb.kalman.model.LinearModel`."""
 
 SYSTEM = ("A", "B")
-"""Keys of a linear system in a TOML file; ``C``, ``D``, ``x0`` and ``name`` are optional."""
+"""Keys of a linear system in a TOML file; ``C``, ``D`` and ``x0`` are optional. Each model may have a ``name``."""
 
 
-def read_model(source: Any) -> LinearModel | LinearSystem:
+def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
     """Read a model from a TOML file, a mapping of its matrices, or an object of another library.
 
     Parameters
@@ -31,6 +34,7 @@ def read_model(source: Any) -> LinearModel | LinearSystem:
     source : a path to a TOML file with :data:`KALMAN` or :data:`SYSTEM`; a mapping with the same keys; a discrete
         ``scipy.signal.dlti``, ``scipy.signal.StateSpace`` or ``control.StateSpace``, read as a linear system; a
         ``filterpy`` Kalman filter (``F, H, Q, R, x, P``), whose current estimate becomes the initial one.
+    u : known inputs of a Kalman filter, (steps, p), in place of those in `source`, which must have B.
 
     Raises
     ------
@@ -44,12 +48,14 @@ def read_model(source: Any) -> LinearModel | LinearSystem:
     >>> model.name, model.n
     ('halves', 1)
     """
+    if isinstance(source, (str, Path)):
+        return _from_toml(Path(source), u)
+    if isinstance(source, Mapping):
+        return _from_mapping(source, "the mapping", u)
+    if u is not None:
+        raise ValueError(f"got inputs for a {type(source).__name__}; needed a TOML file or a mapping with B")
     if isinstance(source, (LinearModel, LinearSystem)):
         return source
-    if isinstance(source, (str, Path)):
-        return _from_toml(Path(source))
-    if isinstance(source, Mapping):
-        return _from_mapping(source, "the mapping")
     if all(hasattr(source, letter) for letter in ("F", "H", "Q", "R", "x", "P")):
         x = np.asarray(source.x, dtype=np.float64).reshape(-1)
         name = type(source).__name__
@@ -59,8 +65,9 @@ def read_model(source: Any) -> LinearModel | LinearSystem:
     if all(hasattr(source, letter) for letter in ("A", "B", "C", "D")):
         if not getattr(source, "dt", None):
             raise ValueError(
-                f"got a {type(source).__name__} without a time step, that is a continuous system; needed a discrete "
-                "one; discretize it first, as with its to_discrete(dt) or scipy.signal.cont2discrete"
+                f"got a {type(source).__name__} without a time step, so a continuous system; needed a "
+                "discrete system; discretize it first, for example with its to_discrete(dt) or "
+                "scipy.signal.cont2discrete"
             )
         A, B, C, D = (np.asarray(getattr(source, letter), dtype=np.float64) for letter in ("A", "B", "C", "D"))
         return LinearSystem(A, B, C, D, name=type(source).__name__)
@@ -70,25 +77,27 @@ def read_model(source: Any) -> LinearModel | LinearSystem:
     )
 
 
-def _from_toml(path: Path) -> LinearModel | LinearSystem:
+def _from_toml(path: Path, u: Any) -> LinearModel | LinearSystem:
     try:
         found = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path.name} is not TOML: {error}") from None
-    return _from_mapping(found, path.name)
+    return _from_mapping(found, path.name, u)
 
 
-def _from_mapping(given: Mapping[str, Any], where: str) -> LinearModel | LinearSystem:
+def _from_mapping(given: Mapping[str, Any], where: str, u: Any) -> LinearModel | LinearSystem:
+    if u is not None:
+        given = {**given, "u": u}
     kalman = any(key in given for key in ("Phi", "H", "Q", "R", "P0"))
     needed = KALMAN if kalman else SYSTEM
-    allowed = {*needed, "name", "repair"} if kalman else {*needed, "C", "D", "x0", "name"}
+    allowed = {*needed, *INPUTS, "name", "repair"} if kalman else {*needed, "C", "D", "x0", "name"}
     missing, unknown = [key for key in needed if key not in given], sorted(set(given) - allowed)
     if missing or unknown:
         problems = [f"{', '.join(missing)} missing"] if missing else []
         problems += [f"{', '.join(unknown)} unknown"] if unknown else []
         raise ValueError(
-            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter, or {', '.join(SYSTEM)} "
-            "and perhaps C, D, x0 for a linear system"
+            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter, or "
+            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system"
         )
     arguments: dict[str, Any] = {"repair": True} if kalman else {}
     arguments |= {"name": where.removesuffix(".toml")} | dict(given)

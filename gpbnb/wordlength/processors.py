@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32
 from gpbnb.kalman.emulation import compare_runs
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
@@ -34,6 +34,7 @@ class Processor:
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` by default.
     fused : whether products are added by fused multiply-add.
     compensated : whether the program updates the estimate by Kahan's compensated summation.
+    order : of the additions in matrix products.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Processor:
     sums: Format | None = None
     fused: bool = False
     compensated: bool = False
+    order: Order = "left"
 
 
 #: A microcontroller with single precision, an accelerator with and without wide sums, and 16-bit fixed point.
@@ -64,6 +66,7 @@ def variants(precision: int) -> tuple[Processor, ...]:
         Processor("ties to even", even),
         Processor("and the range of binary32", ranged),
         Processor("and fused multiply-add", ranged, fused=True),
+        Processor("and pairwise sums instead", ranged, order="pairwise"),
     ]
     if precision < BINARY32.precision:
         found.append(Processor("and binary32 sums instead", ranged, sums=BINARY32))
@@ -96,9 +99,9 @@ def outcome(
     """
     steps = log_spaced(len(z), 16)
     nothing = np.full(model.n, math.inf)
-    options = {"fused": processor.fused, "sums": processor.sums, "compensated": processor.compensated}
+    fused, sums, compensated, order = processor.fused, processor.sums, processor.compensated, processor.order
     try:
-        run = Run(model, processor.fmt, form, steps, **options)  # type: ignore[arg-type]
+        run = Run(model, processor.fmt, form, steps, fused, sums, compensated, order)  # type: ignore[arg-type]
         run.take(processor.fmt.array(z))
     except OverflowError as error:
         return Outcome(processor, nothing, f"overflow in the model or the measurements: {error}")
@@ -124,50 +127,6 @@ def typical_errors(
         true = reference(model, z, log_spaced(len(z), 16))
         squares += np.array([outcome(model, z, each, form, true).error for each in processors]) ** 2
     return np.asarray(np.sqrt(squares / len(records)))
-
-
-def by_arrays(
-    model: LinearModel, z: Any, processor: Processor, order: linalg.Order = "left", block: int = 32
-) -> NDArray[Any]:
-    """Run the innovation form with arrays, slowly, for any order of summation and any number of measurements.
-
-    With the order "left" it gives the same digits as :class:`~gpbnb.kalman.filter_run.Run`; a test compares them.
-
-    Returns
-    -------
-    estimates : (steps, n), exact Fractions.
-    """
-    model.refuse_inputs("this emulation")
-    fmt, n = processor.fmt, model.n
-    Phi, H, Q, R = ([fmt.array(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R))
-    increments = [fmt.array(each - np.eye(n, dtype=int)) for each in model.Phi]
-    x, P = fmt.array(model.x0.reshape(n, 1)), fmt.array(model.P0)
-    carried, identity = fmt.array(np.zeros((n, 1))), fmt.array(np.eye(n))
-
-    def times(a: FloatArray, b: FloatArray) -> FloatArray:
-        return linalg.matmul(a, b, order, processor.fused, block, processor.sums)
-
-    estimates = []
-    for k, measured in enumerate(fmt.array(z)):
-        phi, h, q, r = (each[k % len(each)] for each in (Phi, H, Q, R))
-        V = times(times(phi, P), phi.T) + q
-        PHt = times(V, h.T)
-        K = times(PHt, _inverse(times(h, PHt) + r))
-        P = times(identity - times(K, h), V)
-        if processor.compensated:
-            d = times(increments[k % len(increments)], x)
-            d = (d + times(K, measured[:, np.newaxis] - times(h, x + d))) - carried
-            total = x + d
-            carried, x = (total - x) - d, total
-        else:
-            u = times(phi, x)
-            x = u + times(K, measured[:, np.newaxis] - times(h, u))
-        estimates.append(x[:, 0].to_fractions())
-    return np.array(estimates, dtype=object)
-
-
-def _inverse(a: FloatArray) -> FloatArray:
-    return linalg.inv(a)
 
 
 class Sum(NamedTuple):

@@ -110,7 +110,7 @@ def survey_records(
     """
     if not isinstance(model, LinearModel):
         raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
-    form = form_named(form)
+    form, chunk = form_named(form), whole_number("chunk", chunk)
     given = tuple(formats)
     if not given or len(set(given)) != len(given):
         raise ValueError(f"got {len(given)} formats, {len(set(given))} different; needed different ones, at least one")

@@ -180,13 +180,24 @@ def _plain(label: str, answer: Requirement) -> Answer:
 # -- the page -------------------------------------------------------------------------------------------------
 
 _STYLE = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; color: #1b1b1b;
-  background: #fff }
-h1 { font-size: 1.6rem } h2 { font-size: 1.2rem; margin-top: 2rem }
-table { border-collapse: collapse } th, td { text-align: left; padding: .25rem .8rem .25rem 0; vertical-align: top;
-  border-bottom: 1px solid #ccc }
-pre { background: #f3f3f3; padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere }
-.answer { font-size: 1.25rem; border-left: .3rem solid #0b5cad; padding-left: .8rem }
+:root { color-scheme: light dark; --text: #1b1b1b; --page: #fff; --soft: #f3f3f3; --line: #ccc; --grid: #ddd;
+  --c0: #0b5cad; --c1: #a3341f; --c2: #2e7d32; --c3: #7b3fa0; --c4: #7a5b00; --c5: #555 }
+@media (prefers-color-scheme: dark) {
+  :root { --text: #e8e8e8; --page: #16181b; --soft: #24272b; --line: #4a4f55; --grid: #33373c;
+    --c0: #6db3f8; --c1: #ff9c86; --c2: #7fd183; --c3: #d3a2f2; --c4: #e3c15a; --c5: #b5b5b5 }
+}
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; color: var(--text);
+  background: var(--page); overflow-wrap: anywhere }
+h1 { font-size: 1.6rem; line-height: 1.25 } h2 { font-size: 1.2rem; margin-top: 2rem }
+table { border-collapse: collapse; width: 100% } th, td { text-align: left; padding: .25rem .8rem .25rem 0;
+  vertical-align: top; border-bottom: 1px solid var(--line); overflow-wrap: break-word }
+td:first-child { min-width: 6rem }
+pre { background: var(--soft); padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere; font-size: .85rem }
+svg { display: block; width: 100%; height: auto; fill: var(--text) }
+.legend { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; list-style: none; font-size: .9rem }
+.legend i { display: inline-block; width: 1.4rem; border-top: .2rem solid; margin-right: .4rem; vertical-align: middle }
+.answer { font-size: 1.25rem; border-left: .3rem solid var(--c0); padding-left: .8rem }
+@media (max-width: 34rem) { svg { font-size: 20px } th, td { padding-right: .5rem } }
 """
 
 
@@ -254,7 +265,8 @@ def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
     )
 
 
-_COLOURS = ("#0b5cad", "#a3341f", "#2e7d32", "#7b3fa0", "#8a6d00", "#555555")
+_COLOURS = 6  # of _STYLE, one a form
+_DASHES = (("", "solid"), ("7 3", "dashed"), ("2 3", "dotted"))  # one a basis
 
 
 def _curves(answers: Sequence[Answer], unit: str) -> str:
@@ -273,22 +285,29 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
     for log in range(low, high + 1, max(1, (high - low) // 6)):
         _, y = place(left, log)
         drawn.append(f'<text x="52" y="{y + 4:.1f}" text-anchor="end">1e{log}</text>')
-        drawn.append(f'<line x1="60" x2="620" y1="{y:.1f}" y2="{y:.1f}" stroke="#ddd"/>')
+        drawn.append(f'<line x1="60" x2="620" y1="{y:.1f}" y2="{y:.1f}" stroke="var(--grid)"/>')
     for t in range(left, right + 1, max(1, (right - left) // 8)):
         x, _ = place(t, low)
         drawn.append(f'<text x="{x:.1f}" y="298" text-anchor="middle">{t}</text>')
     _, one = place(left, 0)
-    drawn.append(f'<line x1="60" x2="620" y1="{one:.1f}" y2="{one:.1f}" stroke="#1b1b1b" stroke-dasharray="6 4"/>')
-    for number, each in enumerate(answers):
-        colour = _COLOURS[number % len(_COLOURS)]
+    drawn.append(f'<line x1="60" x2="620" y1="{one:.1f}" y2="{one:.1f}" stroke="var(--text)" stroke-dasharray="6 4"/>')
+    legend = []
+    bases = list(dict.fromkeys(each.basis for each in answers))
+    forms = list(dict.fromkeys(each.label.removesuffix(each.basis) for each in answers))
+    for each in answers:
+        form, basis = forms.index(each.label.removesuffix(each.basis)), bases.index(each.basis)
+        colour, (dash, border) = f"var(--c{form % _COLOURS})", _DASHES[basis % len(_DASHES)]
         line = [place(t, math.log10(r)) for t, r in each.tried if r is not None and r > 0]
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in line)
-        drawn.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"/>')
+        drawn.append(
+            f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
+        )
         drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
-        drawn.append(f'<text x="440" y="{34 + 16 * number}" fill="{colour}">{html.escape(each.label)}</text>')
+        legend.append(f'<li><i style="border-top: .2rem {border} {colour}"></i>{html.escape(each.label)}</li>')
     return (
         '<svg viewBox="0 0 640 330" role="img" aria-label="Error divided by tolerance, against precision; one line '
         f'for each form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
-        f'<text x="340" y="320" text-anchor="middle">{html.escape(unit)}</text></svg>'
+        f'<text x="340" y="322" text-anchor="middle">{html.escape(unit)}</text></svg>'
+        f'<ul class="legend">{"".join(legend)}</ul>'
         "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance.</p>"
     )

@@ -103,10 +103,12 @@ def test_the_form_waits_for_the_script_and_every_control_has_a_label():
 def test_the_error_table_lists_disagreements_with_the_most_serious_first():
     table = ledger.error_table(ROWS)
     found = re.findall(r'class="verdict verdict-([\w-]+)"', table.html)
-    assert found == ["wrong"] * 131 + ["misprint"] * 131 == sorted(found, key=["wrong", "misprint"].index)
+    assert found == sorted(found, key=["wrong", "misprint"].index)
     links = [a["href"] for a in Elements(table.html).all("a") if a["href"].startswith("ledger")]
     by_address = {page.address(row.statement): row for row in ROWS}
-    assert {by_address[link].finding.verdict for link in links} == {Verdict.WRONG, Verdict.MISPRINT}
+    disagreeing = [row for row in ROWS if row.finding and row.finding.verdict in (Verdict.WRONG, Verdict.MISPRINT)]
+    assert len(disagreeing) == 262
+    assert sorted(by_address[link].statement.id for link in links) == sorted(row.statement.id for row in disagreeing)
 
 
 def test_the_error_table_has_a_row_for_each_root_error_with_all_its_statements():
@@ -177,7 +179,7 @@ def test_counts_add_up(by):
 
 
 def test_counts_by_something_else_are_refused():
-    with pytest.raises(ValueError, match="by='colour'; take one of document, chapter, kind"):
+    with pytest.raises(ValueError, match="by='colour'; needed one of document, chapter, kind"):
         ledger.count_table(ROWS, "colour")
 
 
@@ -187,7 +189,7 @@ def test_select_topic():
     assert [row.statement.id for row in found] == [s.id for s in STATEMENTS if owner.get(s.id) == "rounding"]
     wrong = ledger.select_topic(ROWS, "rounding", Verdict.WRONG, Verdict.MISPRINT)
     assert wrong == tuple(row for row in found if row.outcome in ("wrong", "misprint")) != ()
-    with pytest.raises(ValueError, match="no topic 'Rounding'; the topics are rounding"):
+    with pytest.raises(ValueError, match="topic 'Rounding'; needed one of rounding"):
         ledger.select_topic(ROWS, "Rounding")
 
 

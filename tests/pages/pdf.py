@@ -43,6 +43,9 @@ def main() -> None:
         page.evaluate("document.querySelectorAll('img').forEach(i => i.loading = 'eager')")
         page.evaluate(tools.SETTLED)
         page.wait_for_function("[...document.images].every(i => i.complete)")
+        page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        if unset := page.locator("article .math:not(:has(mjx-container))").count():
+            raise SystemExit(f"{unset} formulas were not typeset")
         page.pdf(
             path=PDF,
             prefer_css_page_size=True,

@@ -40,7 +40,7 @@ def count(page):
 
 def test_everything_is_shown_at_first(page):
     shown, every = count(page)
-    assert shown == every > 100
+    assert shown == every > 50
 
 
 @pytest.mark.parametrize("name", ["verdict", "kind", "chapter"])
@@ -88,7 +88,7 @@ def test_the_count_is_announced(page):
 def test_the_keyboard_alone_searches_filters_and_resets(page):
     words = page.locator('input[name="words"]')
     words.focus()
-    page.keyboard.type("deroll")
+    page.keyboard.type("gain")
     found, every = count(page)
     assert 0 < found < every
     for name in ("verdict", "kind", "chapter"):
@@ -103,11 +103,11 @@ def test_the_keyboard_alone_searches_filters_and_resets(page):
 
 def test_enter_in_the_search_box_stays_on_the_page(page):
     words = page.locator('input[name="words"]')
-    words.fill("roll")
+    words.fill("gain")
     before = page.url
     words.press("Enter")
     assert page.url == before
-    assert words.input_value() == "roll"
+    assert words.input_value() == "gain"
 
 
 def test_a_link_to_a_hidden_entry_shows_it(page):
@@ -126,7 +126,7 @@ UNSET = (
 
 def test_collapsed_formulas_are_typeset_when_opened_and_all_before_printing(open_page):
     with open_page(LEDGER) as page:
-        evidence = page.locator("details:has(.math):not([open])").first
+        evidence = page.locator(".ledger tr[id] details:has(.math)").first
         assert evidence.locator("mjx-container").count() == 0
         evidence.locator("summary").click()
         evidence.locator("mjx-container").first.wait_for()

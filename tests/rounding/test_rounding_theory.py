@@ -14,7 +14,7 @@ import pytest
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.arithmetic.rational import column_sum_norm
+from gpbnb.arithmetic.rational import column_sum_norm, exact
 from gpbnb.rounding import theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -282,11 +282,16 @@ REFUSED = [
         )
     ),
     *(
-        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of 2 and 1; needed equal lengths")
+        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of lengths 2 and 1; needed equal lengths")
         for bound in (theory.dot_bound, theory.strict_dot_bound, theory.relative_dot_bound)
     ),
     *(
-        (bound, (0, 2, BETA), ValueError, r"got 0 factors and 2 divisors; needed at least 1 and 0; write 1/y")
+        (
+            bound,
+            (0, 2, BETA),
+            ValueError,
+            r"got 0 factors and 2 divisors; needed at least 1 factor and 0 divisors; write 1/y",
+        )
         for bound in (theory.printed_product_bound, theory.product_bound, theory.strict_product_bound)
     ),
     (theory.product_bound, (2, -1, BETA), ValueError, r"got 2 factors and -1 divisors"),
@@ -327,3 +332,19 @@ def test_a_strict_bound_of_a_million_terms_takes_a_second_and_is_an_upper_one():
     fast = theory.strict_sum_bound(x[:1500], Fraction(1, 2**24))
     assert exactly <= fast <= exactly * (1 + Fraction(1, 2**44))
     assert found > theory.strict_sum_bound(x[:-1000], beta)
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 24), FloatFormat(10, 9), FloatFormat(16, 6)], ids=str)
+@pytest.mark.parametrize("kind", [list, tuple, "array", "float32", "whole"])
+def test_a_strict_bound_of_many_terms_of_any_kind_is_the_exact_one_and_little_more(kind, fmt):
+    x = np.round(np.random.default_rng(5).standard_normal(1200) * 1000)
+    if kind == "array":
+        terms = fmt.array(x / 7)
+    elif kind in ("float32", "whole"):
+        terms = x.astype(np.float32 if kind == "float32" else np.int64)
+    else:
+        terms = kind((x / 7).tolist())
+    found = theory.strict_sum_bound(terms, fmt.unit_roundoff)
+    sizes = map(abs, exact(terms))
+    true = sum(gamma(w, fmt.unit_roundoff) * size for w, size in zip(theory.sum_weights(1200), sizes, strict=True))
+    assert true <= found <= true * (1 + Fraction(1, 2**45))

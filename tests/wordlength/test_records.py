@@ -105,7 +105,7 @@ def test_shares_and_what_is_enough():
         ({"formats": [FloatFormat(2, 24, emin=-126, emax=127)]}, "needed a FloatFormat without limits"),
         ({"basis": "guarantee"}, 'got basis "guarantee"; needed "emulation" or "bound"'),
         ({"tolerance": 0}, "got tolerance 0"),
-        ({"chunk": 0}, "got chunks of 0 cells"),
+        ({"chunk": 0}, "got 0 chunk; needed a whole number"),
     ],
 )
 def test_bad_questions_are_refused(given, message):

@@ -146,3 +146,27 @@ def test_the_commands_are_listed(capsys):
     assert all(f"  {name} " in shown for name in top.COMMANDS)
     with pytest.raises(SystemExit, match="2"):
         top.main(["bake"])
+
+
+def test_the_command_takes_known_inputs(files, capsys):
+    folder, z = files
+    u = np.round(np.sin(np.arange(60) / 7), 3).reshape(-1, 1)
+    (folder / "u.csv").write_text("push\n" + "\n".join(map(repr, u[:, 0].tolist())), encoding="utf-8")
+    (folder / "model.toml").write_text(MODEL + "B = [[0.005], [0.1]]\nd = [0.5]\n", encoding="utf-8")
+    given = [str(folder / "model.toml"), "--measurements", str(folder / "z.csv"), "--tolerance", "0.01,inf"]
+    assert main([*given, "--inputs", str(folder / "u.csv"), "--basis", "emulation", "--form", "Cholesky"]) == 0
+    model = read_model(folder / "model.toml", u)
+    expected = required_precision(model, 60, (0.01, math.inf), z=z, form="Cholesky")
+    shown = capsys.readouterr()
+    assert shown.out.strip() == str(expected)
+    assert "Carlson, emulation: " in shown.err
+    assert main(given) == 2
+    assert "got B without u" in capsys.readouterr().err
+
+
+def test_inputs_without_a_place_for_them_are_refused():
+    system = LinearSystem([["0.5"]], [[1]])
+    with pytest.raises(ValueError, match="got inputs for a LinearSystem"):
+        read_model(system, [[1]])
+    with pytest.raises(ValueError, match="u unknown"):
+        read_model(MATRICES, [[1]])

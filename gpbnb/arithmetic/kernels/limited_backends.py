@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, cast, get_args
 
 import numpy as np
 
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Backend, Compiled, Components, Exact, Floats, Pairs
 from gpbnb.arithmetic.kernels.limited import limited_kernel
-from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Rounding, Rules
+from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Order, Rounding, Rules
 
 _MODES: dict[Rounding, Any] = {
     Rounding.NEAREST: tags.Away,
@@ -29,7 +29,7 @@ _UNLIMITED = 2**60  # exponent of base 10
 class Accumulator(Protocol):
     """A format that can keep sums of products."""
 
-    def run_tag(self, fused: bool = False) -> tags.Tag:
+    def run_tag(self, fused: bool = False, *, order: Order = "left", block: int = 32) -> tags.Tag:
         """The arithmetic for a compiled loop."""
 
 
@@ -138,16 +138,35 @@ def _emax(rules: Rules) -> int:
     return e + rules.precision - 1
 
 
-def run_tag(backend: Backend, rules: Rules, fused: bool) -> tags.Tag:
+def check_order(order: Order, fused: bool, block: int) -> None:
+    """Check how sums of products are to be computed.
+
+    Raises
+    ------
+    ValueError : an unknown order, pairwise sums with fused multiply-add, or blocks without a product.
+    """
+    if order not in get_args(Order):
+        raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
+    if block < 1:
+        raise ValueError(f"block: got {block}; needed at least 1")
+    if fused and order == "pairwise":
+        raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
+
+
+def run_tag(backend: Backend, rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
     """The tag for a compiled loop of its own; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
+    check_order(order, fused, block)
     if not isinstance(backend, Compiled):
         raise ValueError(f"got {rules}; needed a format with compiled loops")
-    if not fused:
+    if not fused and order == "left":
         return backend.run_tag()
     tag = _float_tag(rules, hardware=False) if rules.base in (2, 16) else None
     if tag is None:
-        raise ValueError(f"got fused multiply-add in {rules}; needed base 2 up to 52 digits, or 16 up to 13")
-    return cast(tags.Limited, tag._replace(sums=tags.Fused()))
+        what = "fused multiply-add" if fused else f"{order} sums"
+        raise ValueError(f"got {what} in {rules}; needed base 2 up to 52 digits, or 16 up to 13")
+    products: Any = tags.Fused() if fused else tags.Separate()
+    sums = {"left": products, "pairwise": tags.Pairwise(), "blocked": tags.Blocked(block, products)}[order]
+    return cast(tags.Limited, tag._replace(sums=sums))
 
 
 def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:

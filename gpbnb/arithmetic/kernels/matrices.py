@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
+import numpy as np
+from numba.extending import overload
 
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     check,
@@ -25,15 +27,16 @@ from gpbnb.arithmetic.kernels.scalar import (
     subtract,
     zero,
 )
+from gpbnb.arithmetic.kernels.tags import Blocked, Limited, Mixed, Pairwise
 
 
-@njit(nogil=True)
+@inner
 def is_zero(fmt: Any, x: Any) -> Any:
     """Whether a number is zero."""
     return compare(fmt, x, zero(fmt)) == 0
 
 
-@njit(nogil=True)
+@inner
 def copy(fmt: Any, a: Any, c: Any) -> None:
     """c = a."""
     for i in range(a.shape[0]):
@@ -41,7 +44,7 @@ def copy(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (i, j), load(fmt, a, (i, j)))
 
 
-@njit(nogil=True)
+@inner
 def transpose(fmt: Any, a: Any, c: Any) -> None:
     """c = a'; c is not a."""
     for i in range(a.shape[0]):
@@ -49,7 +52,7 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (j, i), load(fmt, a, (i, j)))
 
 
-@njit(nogil=True)
+@inner
 def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a + b."""
     for i in range(a.shape[0]):
@@ -57,7 +60,7 @@ def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
             store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
-@njit(nogil=True)
+@inner
 def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a - b."""
     for i in range(a.shape[0]):
@@ -65,9 +68,73 @@ def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
             store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
-@njit(nogil=True)
+def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """c = a b if the tag wants its sums pairwise or in blocks; returns whether it does."""
+    raise TypeError("got a call of product_in_order from Python; needed one from a function compiled by numba")
+
+
+@inner
+def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> Any:
+    # Without recursion, which numba's cache does not survive: product k completes every part that it is the last of.
+    count = 0
+    for k in range(n):
+        sums[count] = multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)))
+        count += 1
+        first, end = 0, n
+        while end - first > 1:
+            if k == end - 1:
+                count -= 1
+                sums[count - 1] = add(fmt, sums[count - 1], sums[count])
+            middle = (first + end) // 2
+            first, end = (first, middle) if k < middle else (middle, end)
+    return sums[0]
+
+
+@inner
+def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, n: int) -> Any:
+    total = zero(fmt)
+    for first in range(0, n, fmt.sums.block):
+        s = multiply(fmt, load(fmt, a, (i, first)), load(fmt, b, (first, j)))
+        for k in range(first + 1, min(first + fmt.sums.block, n)):
+            s = multiply_add(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)), s)
+        total = s if first == 0 else add(fmt, total, s)
+    return total
+
+
+@overload(product_in_order, strict=False)
+def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    kind = getattr(fmt, "instance_class", None)
+    mixed = kind is Mixed
+    limited = fmt.types[1] if mixed else fmt
+    order = limited.types[2].instance_class if getattr(limited, "instance_class", None) is Limited else None
+
+    def pairwise(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        of_sums = fmt.sums if mixed else fmt
+        sums = np.zeros(64)
+        for i in range(c.shape[0]):
+            for j in range(c.shape[1]):
+                put(fmt, c, (i, j), _pairwise(of_sums, a, b, i, j, a.shape[1], sums))
+        check(fmt, c)
+        return True
+
+    def blocked(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        of_sums = fmt.sums if mixed else fmt
+        for i in range(c.shape[0]):
+            for j in range(c.shape[1]):
+                put(fmt, c, (i, j), _blocked(of_sums, a, b, i, j, a.shape[1]))
+        check(fmt, c)
+        return True
+
+    if order is Pairwise:
+        return pairwise
+    return blocked if order is Blocked else lambda fmt, a, b, c: False
+
+
+@inner
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right, over the entries of a that are not zero; c is neither a nor b."""
+    if product_in_order(fmt, a, b, c):
+        return
     for i in range(a.shape[0]):
         fresh = True
         for k in range(a.shape[1]):
@@ -87,9 +154,11 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """As :func:`product`, with the same digits, over the entries of b that are not zero."""
+    if product_in_order(fmt, a, b, c):
+        return
     for j in range(b.shape[1]):
         fresh = True
         for k in range(a.shape[1]):
@@ -109,7 +178,7 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def inverse(fmt: Any, a: Any, c: Any) -> Any:
     """c = the inverse of a, by elimination without exchange of rows, which a covariance does not need; a is used up.
 
@@ -142,7 +211,7 @@ def inverse(fmt: Any, a: Any, c: Any) -> Any:
     return answer
 
 
-@njit(nogil=True)
+@inner
 def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
     """u = the factors of a covariance a = U D U', D on the diagonal of u and U, with ones there, above; a is used up.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 
 class Rounding(Enum):
@@ -30,6 +30,9 @@ class Rounding(Enum):
         """The two roundings of the reports: to nearest with ties away from zero, and chopping."""
         return Rounding.NEAREST, Rounding.CHOP
 
+
+#: How a sum of products is added up: from left to right, halves of halves, or in blocks.
+Order = Literal["left", "pairwise", "blocked"]
 
 #: Stochastic rounding compares so many random bits with the digits that are dropped.
 DRAW_BITS = 24

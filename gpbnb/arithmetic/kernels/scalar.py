@@ -24,13 +24,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
+    Blocked,
     Decimal,
     Double,
     DoubleDouble,
@@ -43,7 +45,7 @@ from gpbnb.arithmetic.kernels.tags import (
     ShortDecimal,
 )
 
-_INLINE = {"forceinline": True}
+_INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
 _MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, LimitedDecimal: decimal, DoubleDouble: doubledouble}
 _MACHINE = {Hardware32: processor.SINGLE, Hardware64: processor.DOUBLE}
 
@@ -53,6 +55,13 @@ _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**
 def _tag(fmt: Any) -> Any:
     """The class of a tag, from its numba type."""
     return getattr(fmt, "instance_class", None)
+
+
+def _fuses(fmt: Any) -> bool:
+    if _tag(fmt) is not Limited:
+        return False
+    sums = fmt.types[2]
+    return _tag(sums.types[1] if _tag(sums) is Blocked else sums) is Fused
 
 
 def _only_compiled(name: str) -> TypeError:
@@ -178,32 +187,32 @@ def settle(fmt: Any, c: Any) -> None:
 # -- plain float64 -----------------------------------------------------------------------------------
 
 
-@njit
+@inner
 def _double_add(fmt: Any, a: Any, b: Any) -> Any:
     return a + b
 
 
-@njit
+@inner
 def _double_subtract(fmt: Any, a: Any, b: Any) -> Any:
     return a - b
 
 
-@njit
+@inner
 def _double_multiply(fmt: Any, a: Any, b: Any) -> Any:
     return a * b
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _double_divide(fmt: Any, a: Any, b: Any) -> Any:
     return a / b
 
 
-@njit
+@inner
 def _double_sqrt(fmt: Any, a: Any) -> Any:
     return math.sqrt(a)
 
 
-@njit
+@inner
 def _double_round(fmt: Any, x: Any) -> Any:
     return x
 
@@ -352,7 +361,7 @@ def _one(fmt: Any) -> Any:
 
 @overload(multiply_add, strict=False, jit_options=_INLINE)
 def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    if _tag(fmt) is Limited and fmt.types[2].instance_class is Fused:
+    if _fuses(fmt):
         return lambda fmt, a, b, c: fused(fmt, a, b, c)
     if _tag(fmt) is ShortDecimal:
         return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
@@ -446,7 +455,7 @@ def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
 # -- sums of products --------------------------------------------------------------------------------
 
 
-@njit(nogil=True)
+@inner
 def dot(fmt: Any, x: Any, y: Any) -> Any:
     """Inner product from left to right; the first product is not added to zero."""
     n = len(x)
@@ -458,7 +467,7 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
     return stored_sum(fmt, s)
 
 
-@njit(nogil=True)
+@inner
 def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry the :func:`dot` of a row and a column; c is neither a nor b.
 
@@ -480,7 +489,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def check(fmt: Any, c: Any) -> None:
     """Settle the matrix c; OverflowError if a number in it has left the range of its backend."""
     settle(fmt, c)

@@ -92,12 +92,23 @@ class Fused(NamedTuple):
     """Products in sums are added by fused multiply-add."""
 
 
+class Pairwise(NamedTuple):
+    """The sum of the first half of the products, rounded down, is added to that of the second, and so on in each."""
+
+
+class Blocked(NamedTuple):
+    """Products are summed from left to right in blocks, and so are the sums of the blocks."""
+
+    block: int
+    products: Any  # Separate or Fused
+
+
 class Limited(NamedTuple):
     """Bases 2 and 16 with any rounding mode, and with a range; a number is a float64, an array float64 (...)."""
 
     digits: Any  # Two or Sixteen
     mode: Any
-    sums: Any  # Separate or Fused
+    sums: Any  # Separate, Fused, Pairwise or Blocked
     precision: int
     gradual: float  # numbers below it have the spacing of those just above; 0 without subnormal numbers
     least: float  # results below it, but an exact zero, become `below`

@@ -1,7 +1,8 @@
-"""How sharp a guarantee is: choose admissible measurements so that every rounding pushes the same way.
+"""Test the sharpness of a guarantee with admissible measurements whose rounding errors all have the same effect.
 
-After each step, the measurement is taken, among some admissible ones, whose roundings push the error furthest along the
-response of one state at one later step. A plan keeps the state large, and the search steers the last digits.
+At each step, the search chooses among some admissible measurements. It takes the one whose rounding errors most
+increase the error of one state at one later step. A plan keeps the state large, and the search determines the last
+digits.
 """
 
 from __future__ import annotations
@@ -10,13 +11,12 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
@@ -27,16 +27,16 @@ from gpbnb.kalman.kernels.bounded import widened
 
 @dataclass(frozen=True, eq=False)
 class Attack:
-    """Runs of a filter against measurements that were chosen, and its largest errors.
+    """Runs of a filter with chosen measurements, and the largest errors.
 
     Parameters
     ----------
     errors : (n,), the largest error of each state in any run, at any step.
     ratio : largest of these over their bounds; a guarantee is violated above 1.
     ratios : (n,), the ratio of each state.
-    runs, steps : how many were tried, and steps of each.
+    runs, steps : number of runs, and steps of each.
     z : (steps, m), measurements of the run with the largest ratio, numbers of the format, in float64.
-    admissible : whether the exact filter stayed within its limits in all of them.
+    admissible : whether the exact filter stayed within its limits in all runs.
     """
 
     errors: NDArray[np.float64]
@@ -49,18 +49,18 @@ class Attack:
 
 
 def number(fmt: Any, x: Any) -> Any:
-    """A float64 rounded into a format; in base 10, its first decimals."""
+    """Round a float64 into a format; in base 10, use its first decimals."""
     raise TypeError("got a call of number from Python; needed one from a function compiled by numba")
 
 
-@overload(number, strict=False, jit_options={"forceinline": True})
+@overload(number, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_number(fmt: Any, x: Any) -> Any:
     if getattr(fmt, "instance_class", None) in (Decimal, ShortDecimal):
         return lambda fmt, x: round_(fmt, _scaled(x))
     return lambda fmt, x: round_(fmt, x)
 
 
-@njit
+@inner
 def _scaled(x: float) -> Any:
     e = 0
     while x != 0.0 and abs(x) < 1e15:
@@ -72,9 +72,9 @@ def _scaled(x: float) -> Any:
     return np.int64(x), np.int64(e)
 
 
-@njit(nogil=True)
+@inner
 def _times(a: Any, x: Any, c: Any) -> None:
-    """c = a x, for a matrix and a column in double-double."""
+    """Compute c = a x for a matrix and a column in double-double."""
     exactly = DoubleDouble()
     for i in range(a.shape[0]):
         s = (0.0, 0.0)
@@ -84,9 +84,9 @@ def _times(a: Any, x: Any, c: Any) -> None:
         put(exactly, c, i, s)
 
 
-@njit(nogil=True)
+@inner
 def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
-    """What the error of an estimate is worth."""
+    """Return the weighted error of an estimate."""
     exactly, total = DoubleDouble(), 0.0
     for i in range(x_exact.shape[0]):
         e = doubledouble.subtract(exactly, widened(fmt, load(fmt, x, i)), load(exactly, x_exact, i))
@@ -118,18 +118,18 @@ def greedy(
 ) -> Any:
     """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
 
-    Most products of a step depend on the estimate alone. So with `ahead`, each candidate is judged by the error after
-    one step more, with a measurement from the middle of what is admissible there.
+    Most products of a step depend only on the estimate. So with `ahead`, each candidate is judged by the error one step
+    later, after a measurement from the middle of the admissible range.
 
     Parameters
     ----------
-    rows : (steps, n), what an error after each step is worth.
+    rows : (steps, n), weight of an error after each step.
     pool : (steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
     x, x_exact : the first estimate, packed and double-double.
-    limits : of the exact filter.
-    steer : (m, n + 1), with `by_range`: what is added to innovations is steer (x_predicted, share), within their limit;
+    limits : limits of the exact filter.
+    steer : (m, n + 1), with `by_range`: steer (x_predicted, share) is added to innovations, within their limit;
         the share rises from 0 to 1 in `ramp` steps.
-    chosen : (steps, m[, 2]), the measurements taken, packed.
+    chosen : (steps, m[, 2]), the chosen measurements, packed.
 
     Returns
     -------
@@ -217,7 +217,7 @@ def greedy(
 
 
 def responses(given: Schedule, F: NDArray[np.float64], state: int, steps: int) -> NDArray[np.float64]:
-    """What an error after each step adds to the error of one state after the last, (steps, n)."""
+    """Return the contribution of an error after each step to the error of one state after the last, (steps, n)."""
     rows = np.zeros((steps, given.program.n))
     c = np.eye(given.program.n)[state]
     for k in range(steps - 1, -1, -1):
@@ -239,14 +239,15 @@ def attack(
 ) -> Attack:
     """Attack a guarantee with measurements chosen step by step, within its limits.
 
-    A gain that never repeats is replaced by one of those that the guarantee covers, the same in every cycle.
+    A gain that never repeats is replaced by a gain that the guarantee covers and that repeats in every cycle.
 
     Parameters
     ----------
-    steps : of each run; the response of each state is aimed at the last.
-    candidates : to choose from at each step.
-    states : which to aim at; all by default.
-    center : (n,), for limits on state and innovation: where the exact filter is to stay; by default near the limits.
+    steps : length of each run; the attack maximizes the error after the last step.
+    candidates : number of measurements to choose from at each step.
+    states : the states whose errors to maximize; all by default.
+    center : (n,), for limits on state and innovation: the state near which the exact filter stays; by default near
+        the limits.
     plans : courses of the measurements to try for each state.
     """
     given, rng = found.schedule, np.random.default_rng(seed)
@@ -274,11 +275,11 @@ def attack(
 
 
 def random_errors(found: Guarantee, steps: int, center: Any = None, seed: int = 0) -> NDArray[np.float64]:
-    """Errors after each step, (steps, n), of one run with random measurements within the limits.
+    """Return errors after each step, (steps, n), of one run with random measurements within the limits.
 
     Parameters
     ----------
-    center : as for :func:`attack`.
+    center : see :func:`attack`.
 
     Raises
     ------
@@ -305,7 +306,7 @@ def run_against(
     ramp: float = 1.0,
     ahead: bool = False,
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
-    """One run of :func:`greedy`: steps outside the limits, measurements in float64, and errors (steps, n)."""
+    """Run :func:`greedy` once; return the steps outside the limits, measurements in float64, and errors (steps, n)."""
     given, program = found.schedule, found.schedule.program
     backend = cast(Compiled, given.fmt.backend)
     steps = len(rows)
@@ -346,7 +347,7 @@ def _pool(
     by_range: bool,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Candidates at each step: near the largest measurements of one sign, of a response, or anywhere."""
+    """Return candidates at each step: near the largest measurements of one sign, of a response, or anywhere."""
     m = found.schedule.program.m
     if by_range:
         share = (1.0, 0.3, 0.05)[plan % 3]
@@ -355,7 +356,7 @@ def _pool(
     width = (0.05, 0.5, 1.0, 2.0)[plan % 4]
     signs = rng.choice((-1.0, 1.0), m) if plan < 4 else 1.0
     course = np.ones((steps, m)) * signs
-    if plan >= 4:  # the worst case of the peak gain of a state
+    if plan >= 4:  # the input that attains the peak gain of a state
         given = found.schedule
         back = responses(given, F, (state + plan) % given.program.n, steps)
         at = np.array(
@@ -371,12 +372,12 @@ def _pool(
 
 
 def _steering(found: Guarantee, center: Any) -> NDArray[np.float64]:
-    """Innovations that bring the exact filter to a place: a regulator for the pair of transition and gain."""
+    """Return a regulator whose innovations bring the exact filter to a given state, from transition and gain."""
     given, n, m = found.schedule, found.schedule.program.n, found.schedule.program.m
     Phi, K = given.Phi[-1, :, :, 0], given.exact[-1, :, :, 0]
     limits = np.where(np.isfinite(found.limits.state), found.limits.state, 1.0)
     place = np.zeros(n) if center is None else np.asarray(center, dtype=np.float64)
-    # x = p + K nu; take nu that makes |x - place| / limits least, over a few steps, by a regulator.
+    # x = p + K nu; a regulator chooses nu to minimize |x - place| / limits over a few steps.
     P = np.diag(limits**-2.0)
     weight = np.diag(found.limits.innovation**-2.0) * 1e-2
     for _ in range(2000):

@@ -1,4 +1,4 @@
-r"""The guarantee: rounding never moves the estimate by more than this, whatever the measurements within their limits.
+r"""The guarantee: a bound on the effect of rounding for all measurements within their limits.
 
 Let the program of a step compute, with coefficients that are known exactly, the linear function
 :math:`\hat F_k x + \hat K_k z` up to its roundings, and let the exact filter be
@@ -8,7 +8,7 @@ Let the program of a step compute, with coefficients that are known exactly, the
 .. math:: e_k = \hat F_k e_{k-1} + \Delta F_k x_{k-1} + (\hat K_k - K_k)\nu_k + \Gamma_k\rho_k, \qquad
     \Delta F_k = \hat F_k - (I - \hat K_kH_k)\Phi_k,
 
-with the rounding errors ρ of the operations and, in the columns of Γ, what each of them does to the result. See
+where ρ holds the rounding errors of the operations, and the columns of Γ their effects on the result. See
 :func:`gpbnb.kalman.guarantee.derivation.recursion` for the algebra and :mod:`gpbnb.kalman.guarantee.envelope` for the
 sums over all earlier steps.
 """
@@ -45,24 +45,24 @@ PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
 
 BUDGET = 3e8
-"""Multiplications that a guarantee spends on the steps before the gain settles, about; a few seconds."""
+"""Approximate number of multiplications for the steps before the gain settles, a few seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class Guarantee:
-    """A bound on what rounding does to an estimate.
+    """A bound on the effect of rounding on an estimate.
 
     Parameters
     ----------
-    bound : (n,), bounds the error of each state after every step; infinite where there is none.
-    steps : None if the bound holds for ever; else, after how many steps it ends.
-    why : if it does not hold for ever, why not.
+    bound : (n,), bound of the error of each state after every step; infinite if there is none.
+    steps : None if the bound holds forever; otherwise the number of steps for which it holds.
+    why : why the bound does not hold forever, if it does not.
     history : (k, n), bounds after each of the first steps.
-    parts : (n, 4), the bound of the state at the step where it is largest, part by part; see :data:`PARTS`.
-    limits : on the filter without rounding, with what follows from those that were given.
+    parts : (n, 4), the parts of each state's bound at the step where it is largest; see :data:`PARTS`.
+    limits : limits on the filter without rounding: those given, and those that follow from them.
     schedule : the filter's coefficients.
-    lags : how many steps back the sums go.
-    radius : growth of an error in a step, on average over a period.
+    lags : number of earlier steps that the sums include.
+    radius : growth of an error per step, averaged over a period.
     """
 
     bound: NDArray[np.float64]
@@ -77,6 +77,7 @@ class Guarantee:
 
     @property
     def for_ever(self) -> bool:
+        """Whether the bound holds for any number of steps."""
         return self.steps is None
 
     def __str__(self) -> str:
@@ -90,11 +91,11 @@ class Guarantee:
 
 
 def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf) -> Limits:
-    """Limits on the filter without rounding, each one number or one for each entry.
+    """Set limits on the filter without rounding, each either one number or one number per entry.
 
     Raises
     ------
-    ValueError : a limit that is negative or NaN; too few of them finite.
+    ValueError : a limit is negative or NaN, or too few limits are finite.
     """
     X, V, Z = (
         np.array(np.broadcast_to(np.asarray(each, dtype=np.float64), (size,)))
@@ -120,27 +121,27 @@ def guarantee(
     horizon: int = 1_000,
     budget: float = BUDGET,
 ) -> Guarantee:
-    """Bound what rounding does to the estimates of a Kalman filter, for every admissible measurement sequence.
+    """Bound the effect of rounding on the estimates of a Kalman filter, for every admissible measurement sequence.
 
     Parameters
     ----------
     model, fmt, form : the filter. It is compared with the exact filter of the same stored model and measurements.
     within : limits on the exact filter, from :func:`limits`.
-    most : how many steps to emulate until the gain settles.
-    horizon : for how many steps to give a bound where there is none for ever.
-    budget : about how many multiplications the disturbances of the steps before the gain settles may cost. With more of
-        them, the bound of a filter that takes long to settle is smaller.
+    most : largest number of steps to emulate until the gain settles.
+    horizon : number of steps for which to give a bound if none holds forever.
+    budget : approximate number of multiplications for disturbances before the gain settles. A larger budget gives a
+        smaller bound for a filter that settles slowly.
 
     Raises
     ------
-    ValueError : a format without compiled loops, or in which a covariance is not definite.
+    ValueError : the format has no compiled loops, or a covariance is not definite in it.
     """
     model.refuse_inputs("a guarantee")
     return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
 
 
 def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget: float = BUDGET) -> Guarantee:
-    """As :func:`guarantee`, of a filter whose coefficients are known; for linear filters of any origin."""
+    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`."""
     n = given.program.n
     why, radius = given.why, _radius(given)
     for_ever = given.settled and radius < 1
@@ -195,24 +196,24 @@ def _disturbances(
 
 
 def disturbances_of(found: Guarantee) -> Disturbances:
-    """Closed loops and disturbances behind a guarantee that holds for ever."""
+    """Return the closed loops and disturbances behind a guarantee that holds forever."""
     return _disturbances(found.schedule, found.limits, found.bound)
 
 
 def _parts_of(given: Schedule) -> NDArray[np.int64]:
-    """Which part of a bound each column of the disturbances belongs to."""
+    """Return the part of the bound to which each column of the disturbances belongs."""
     n, m, groups = given.program.n, given.program.m, len(given.program.roots)
     return np.array([ROUNDING] * groups + [LOOP] * n + [GAIN] * m)
 
 
 def closed_loops(given: Schedule) -> NDArray[np.float64]:
-    """Closed loop of each step of a schedule, (steps, n, n), in float64."""
+    """Return the closed loop of each step of a schedule, (steps, n, n), in float64."""
     known = Limits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
     return _disturbances(given, known, np.zeros(given.program.n)).F
 
 
 def _radius(given: Schedule) -> float:
-    """Spectral radius of the closed loop over a period, as a factor a step; an estimate that only steers."""
+    """Estimate the spectral radius of the closed loop over a period, as a factor per step; proofs do not use it."""
     if not given.settled:
         return math.nan
     F = closed_loops(given)[given.first :]
@@ -228,13 +229,13 @@ def _enough_lags(radius: float, period: int) -> int:
 
 
 def _window(given: Schedule, columns: int, steps: int, budget: float) -> int:
-    """For how many steps disturbances are kept apart: for all, if that is cheap."""
+    """Return the number of steps whose disturbances are kept separate, all steps if that is cheap."""
     n = given.program.n
     return int(np.clip(budget / (max(steps, 1) * (columns + n) * n * n), 8, max(steps, 1)))
 
 
 def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], float]:
-    """What a lag is worth at most, and from where on it no longer matters; it only steers."""
+    """Return the largest contribution of a lag, and a negligible one; the proof does not use them."""
     each = (np.abs(found.G) * np.where(found.G == 0, 0, found.limits[:, None, :])).sum(axis=2) + found.slack
     size = each.max(axis=0)
     grown = size / (1 - radius) if radius < 1 else size
@@ -251,7 +252,7 @@ def _sums(
     steps: int,
     budget: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
-    """Bounds after each step, and their parts; the last rows are those of the period."""
+    """Return bounds after each step, and their parts; the last rows are those of the period."""
     n, part = given.program.n, _parts_of(given)
     used = (np.abs(found.G).max(axis=1) * found.limits).max(axis=0) > 0
     columns = np.ascontiguousarray(found.G[:, :, used]), np.ascontiguousarray(found.limits[:, used])
@@ -273,7 +274,7 @@ def _sums(
     begin, parts = forward(*arrays[:5], reach, 0, given.first, np.zeros(n), size)
     largest = np.maximum(b, begin.max(axis=0, initial=0.0))
     rows, row_parts = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
-    for _ in range(200):  # the error of the last steps is carried on: raise the bound until it bounds itself
+    for _ in range(200):  # the error of the last steps persists, so raise the bound until it bounds itself
         rows, row_parts = [], []
         for certificate in sums:
             carried = (certificate.residual + certificate.tail) @ largest
@@ -285,7 +286,7 @@ def _sums(
         if not (new <= largest).all():
             largest = np.maximum(largest, new * (1 + 2.0**-40))
             continue
-        if not given.first:  # without a beginning of its own, sums of fewer terms
+        if not given.first:  # without a separate start, sums have fewer terms
             return np.array(rows), np.array(row_parts), lags
         after, after_parts = onward(*arrays, given.first, lags, reach, size, largest)
         new = after.max(axis=0)
@@ -296,10 +297,10 @@ def _sums(
 
 
 def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: bool, steps: int) -> Limits:
-    r"""Limits on state and innovation of the exact filter that follow from those on the measurements.
+    r"""Derive limits on state and innovation of the exact filter from those on the measurements.
 
-    The exact filter obeys :math:`x_k = \hat F x_{k-1} + \hat K z_k - \Delta F x_{k-1} - (\hat K - K)\nu_k`, with small
-    last terms: its worst-case peak gain, by the certificate of the error bound.
+    The exact filter obeys :math:`x_k = \hat F x_{k-1} + \hat K z_k - \Delta F x_{k-1} - (\hat K - K)\nu_k`, where
+    the last terms are small. The certificate of the error bound gives its worst-case peak gain.
     """
     n, m = given.program.n, given.program.m
     ones = Limits(np.ones(n), np.ones(m), np.ones(m))
@@ -338,9 +339,9 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
 
 
 def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
-    """Peak of each operation's own linear function: less than what the peaks of the states allow it.
+    """Bound each operation's own linear function, more tightly than the peaks of the states do.
 
-    For a filter whose coefficients never change; the exact filter then is the program without roundings.
+    The coefficients of the filter must never change. The exact filter is then the program without roundings.
     """
     program, first = given.program, given.program.n + given.program.m
     if given.steps != 1 or given.HPhi.any():

@@ -1,4 +1,4 @@
-r"""The algebra of the guarantee, checked by sympy; matrices are symbols that do not commute."""
+r"""Derive the algebra of the guarantee with SymPy; matrices are symbols that do not commute."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from gpbnb.display.derivation import Derivation, Step, over, together, unevaluat
 
 
 def recursion() -> Derivation:
-    r"""The recursion of the error, for every n and m, and every program that is linear but for its roundings.
+    r"""Derive the recursion of the error, for every n and m and every program that is linear apart from roundings.
 
-    :math:`\hat F, \hat K` are what the program computes with, F and K those of the exact filter; w is what the
-    roundings of the step add, p the exact estimate before it.
+    The program uses :math:`\hat F, \hat K`, and the exact filter F and K. The roundings of the step add w, and p is the
+    exact estimate before the step.
     """
     phi, h, k, known, loop = sp.symbols(r"\Phi H K \hat{K} \hat{F}", commutative=False)
     e, p, z, w = sp.symbols("e p z w", commutative=False)
@@ -36,10 +36,10 @@ def recursion() -> Derivation:
 
 
 def telescope() -> Derivation:
-    r"""Two lags of the certificate: with :math:`r_l = c_lF - c_{l+1}`, rows need not be exact."""
+    r"""Derive two lags of the certificate; with :math:`r_l = c_lF - c_{l+1}`, rows need not be exact."""
     f, g = sp.symbols("F G", commutative=False)
     c0, c1, c2 = sp.symbols("c_0 c_1 c_2", commutative=False)
-    e, v, w = sp.symbols("e v w", commutative=False)  # error two steps before; disturbances of the two steps
+    e, v, w = sp.symbols("e v w", commutative=False)  # error two steps earlier; disturbances of the two steps
     before = g * e + v
     return Derivation(
         (
@@ -53,7 +53,7 @@ def telescope() -> Derivation:
 
 
 def induction() -> Derivation:
-    r"""One state: a bound that bounds itself, from sums cut after L steps and a remainder ρ."""
+    r"""Derive, for one state, a bound that bounds itself, from sums truncated after L steps and a remainder ρ."""
     f, w = sp.symbols("F w", positive=True)
     lags = sp.Symbol("L", integer=True, positive=True)
     cut = w * over(1 - f**lags, 1 - f)
@@ -69,9 +69,9 @@ def induction() -> Derivation:
 
 
 def ellipsoid() -> Derivation:
-    r"""An ellipsoid that takes in a segment: the inequality of Cauchy and Schwarz as a square.
+    r"""Derive an ellipsoid that contains the sum with a segment; the Cauchy-Schwarz inequality becomes a square.
 
-    Here u is the half-width of the ellipsoid in some direction, v that of the segment, and t and τ are any positive
+    In some direction, u is the half-width of the ellipsoid and v that of the segment. t and τ are any positive
     numbers.
     """
     u, v = sp.symbols("u v", nonnegative=True)
@@ -89,7 +89,7 @@ def ellipsoid() -> Derivation:
 
 
 def joseph() -> Derivation:
-    r"""What an error δ of the gain does to Joseph's form, for every n and m; primes mark transposes.
+    r"""Derive the effect of an error δ of the gain on Joseph's form, for every n and m; primes mark transposes.
 
     With :math:`C = I - KH` and :math:`S = HVH^T + R`, the first remainder is zero for the gain of V, and the second if
     V is symmetric too.

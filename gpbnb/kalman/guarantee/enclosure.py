@@ -1,7 +1,7 @@
 r"""Gains that never repeat, enclosed for all time.
 
-Rounding can change the last digits of a computed covariance for ever. Then no finite emulation lists all gains, but a
-set that the computed covariance never leaves contains them: all :math:`P`, symmetric or not, with
+Rounding can change the last digits of a computed covariance forever. Then no finite emulation lists all gains, but they
+follow from a set that the computed covariance never leaves: all :math:`P`, symmetric or not, with
 :math:`|P - P^*| \le B` entry by entry, where the symmetric :math:`P^*` is near the limit of the exact covariance.
 
 Let :math:`\mathcal E` be the exact step of the covariance, A and S the closed loop and the innovation covariance of the
@@ -12,12 +12,12 @@ step from :math:`P^*`, :math:`G = \Phi^TH^TS^{-1}H\Phi`, and F the closed loop o
 
 which needs no symmetry; see :func:`gpbnb.kalman.derivation.contraction`. So the computed covariance obeys
 :math:`E_k = AE_{k-1}A^T + w_k`, where w collects :math:`FEGEA^T`, the roundings of a step and the small
-:math:`\mathcal E(P^*) - P^*`. If :math:`|w| \le W` holds for every P in the set, the set is never left if
+:math:`\mathcal E(P^*) - P^*`. If :math:`|w| \le W` holds for every P in the set, the covariance never leaves the set if
 
 .. math:: \sum_{l<L} |A^l|\,W\,|A^l|^T + |A^L|\,B\,|A^L|^T + \max_l |A^l|\,|E_0|\,|A^l|^T \le B ,
 
-by induction. Products of closed loops are float64, with their own roundings as further terms. The roundings of a step
-come from ball arithmetic with a bound for every operation. One step does not blow up. It restarts twice, from the
+by induction. Products of closed loops are float64, with their own rounding errors as further terms. Ball arithmetic
+with a bound for every operation gives the roundings of a step. To keep the balls small, it restarts twice, from the
 computed predicted covariance V and from the computed gain, because later operations undo a part of earlier errors: the
 error of V enters as :math:`C\,\delta V\,C^T` with :math:`C = I - KH`, and that of the gain as :math:`\delta K\,HV` or,
 in Joseph's form and for a symmetric V, :math:`\delta K\,S\,\delta K^T`. In a cycle of several models, each phase has
@@ -39,11 +39,11 @@ from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
 FORMS = (Form.INNOVATION, Form.JOSEPH)
-"""Forms whose estimate is computed with the gain alone, and whose gain can be enclosed."""
+"""Forms that compute the estimate only with the gain, and whose gain can be enclosed."""
 
 _UP = 1 + 2.0**-50
 _SUMS = 1 + 1e-10
-"""Enlarges sums and products of matrices with entries of one sign by more than their roundings in float64."""
+"""Factor that exceeds the effect of float64 roundings on sums and products of matrices with entries of one sign."""
 _BITS = 160
 _SLOWEST, _SMALL = 0.9999, 1e-5
 """Closed loops with a larger spectral radius are not tried. Powers are computed until they are about this small."""
@@ -60,14 +60,14 @@ def predicted(Phi: NDArray[Any], Q: NDArray[Any], P: NDArray[Any]) -> NDArray[An
 
 
 def gain(H: NDArray[Any], R: NDArray[Any], V: NDArray[Any], one: Any) -> NDArray[Any]:
-    """Compute the gain from the predicted covariance, likewise; `one` is the number 1."""
+    """Compute the gain from the predicted covariance in the same way; `one` is the number 1."""
     HV = _product(H, V.T)
     S = _product(H, HV.T) + R
     return _product(_inverse(S, one).T, HV).T
 
 
 def updated(form: Form, H: NDArray[Any], R: NDArray[Any], V: NDArray[Any], K: NDArray[Any], one: Any) -> NDArray[Any]:
-    """Compute the updated covariance, likewise, in the innovation form or Joseph's."""
+    """Compute the updated covariance in the same way, in the innovation form or Joseph's."""
     n, zero = len(V), one - one
     identity = np.array([[one if i == j else zero for j in range(n)] for i in range(n)], dtype=object)
     W = identity - _product(H.T, K.T).T
@@ -79,7 +79,7 @@ def updated(form: Form, H: NDArray[Any], R: NDArray[Any], V: NDArray[Any], K: ND
 
 
 def _product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """Each entry summed from left to right."""
+    """Multiply matrices, with each entry summed from left to right."""
     total = np.multiply.outer(a[:, 0], b[0])
     for k in range(1, a.shape[1]):
         total = total + np.multiply.outer(a[:, k], b[k])
@@ -87,7 +87,7 @@ def _product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
 
 
 def _inverse(a: NDArray[Any], one: Any) -> NDArray[Any]:
-    """Inverse by elimination without exchange of rows."""
+    """Invert a matrix by elimination without pivoting."""
     m, a = len(a), a.copy()
     zero = one - one
     c = np.array([[one if i == j else zero for j in range(m)] for i in range(m)], dtype=object)
@@ -110,7 +110,7 @@ def _inverse(a: NDArray[Any], one: Any) -> NDArray[Any]:
 
 
 class Enclosed:
-    """A ball that holds an exact value, and a bound for how far the computed value may be from it.
+    """A ball that contains an exact value, and a bound on the error of the computed value.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ class Enclosed:
 
 
 def _enclosed(values: NDArray[Any], unit: float, spread: NDArray[np.float64] | None = None) -> NDArray[Any]:
-    """Balls around numbers as :class:`Enclosed`, of radius zero, or of those in `spread`."""
+    """Return numbers as :class:`Enclosed` balls with radius zero or with the radii in `spread`."""
     out = np.empty(values.shape, dtype=object)
     for at in np.ndindex(values.shape):
         radius = 0.0 if spread is None else float(spread[at])
@@ -181,7 +181,7 @@ def _enclosed(values: NDArray[Any], unit: float, spread: NDArray[np.float64] | N
 
 
 def _restarted(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.float64]]:
-    """Take computed values as exact ones, in wider balls; return these, and the bounds of their errors until here."""
+    """Treat computed values as exact in wider balls; return these balls and the bounds of the errors so far."""
     out, errors = np.empty(values.shape, dtype=object), np.empty(values.shape)
     for at in np.ndindex(values.shape):
         each: Any = values[at]
@@ -200,7 +200,7 @@ def _ball(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Enclosure:
-    """Gains of each phase of a model's cycle from some step on.
+    """Limits on the gains of each phase of a model's cycle, from some step on.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ class Enclosure:
 
 @dataclass(frozen=True, eq=False)
 class _Phase:
-    """One phase of the cycle: the model, the center before the step, and what follows from them, upper limits."""
+    """One phase of the cycle: the model, the center before the step, and upper limits that follow from them."""
 
     given: tuple[NDArray[Any], ...]
     center: NDArray[np.float64]
@@ -231,17 +231,17 @@ class _Phase:
 
 
 def enclose(stored: LinearModel, run: Run, fmt: FloatFormat, form: Form, trials: int = 60) -> Enclosure | None:
-    """Find a step from which on the computed covariance stays in a set for ever, and enclose its gains.
+    """Find a step from which on the computed covariance stays in a set forever, and enclose its gains.
 
     Parameters
     ----------
     stored : the model, rounded to the format.
     run : a run of the filter with every step as a checkpoint.
-    trials : how many sets to try.
+    trials : number of sets to try.
 
     Returns
     -------
-    enclosure : or None, for another form or if no such set was found.
+    enclosure : None for another form or if no such set was found.
     """
     start = _settled(stored, run.steps, float(fmt.unit_roundoff)) if form in FORMS else None
     if start is None:
@@ -264,7 +264,7 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int,
     moved = [_abs(phase.after - _matrix(phases[(j + 1) % cycle].center)) for j, phase in enumerate(phases)]
     P = _to_matrix(run.exactly(run.C[start - 1]))
     first = _abs(P - _matrix(phases[0].center))
-    # E_0 is the error before phase 0: on its way to the step before phase j it meets every power of that phase.
+    # E_0 is the error before phase 0; before phase j it has been multiplied by every power of that phase.
     begun = [_largest([M @ first @ M.T for M in each.products]) for each in powers]
     B = [2 * each for each in begun]
     given = [[_enclosed(each, unit) for each in phase.given] for phase in phases]
@@ -295,7 +295,7 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int,
 
 
 class _Disturbed(NamedTuple):
-    """What a step adds to the error of the covariance, and how far its gain is from that of the center."""
+    """Error that a step adds to the covariance, and distance of its gain from that of the center."""
 
     covariance: NDArray[np.float64]
     gain: NDArray[np.float64]
@@ -328,7 +328,7 @@ def _disturbed(form: Form, phase: _Phase, given: list[NDArray[Any]], B: NDArray[
 
 
 def _settled(stored: LinearModel, steps: int, unit: float) -> int | None:
-    """A step, a multiple of the cycle, after which the exact covariance changes far less than rounding changes it."""
+    """Find a step, a multiple of the cycle, after which the exact covariance changes far less than by rounding."""
     cycle = stored.cycle
     start = -(-64 // cycle) * cycle
     while start <= steps:
@@ -344,7 +344,7 @@ def _settled(stored: LinearModel, steps: int, unit: float) -> int | None:
 
 
 def _phases(stored: LinearModel, start: int) -> list[_Phase]:
-    """Centers of the set before each phase, from the exact filter a cycle after the start."""
+    """Return the centers of the set before each phase, from the exact filter one cycle after the start."""
     n, cycle = stored.n, stored.cycle
     run = Run(stored, None, Form.INNOVATION, range(start + cycle, start + 2 * cycle))
     run.take(np.zeros((start + 2 * cycle, stored.m)))
@@ -366,7 +366,7 @@ def _phases(stored: LinearModel, start: int) -> list[_Phase]:
 class _Powers(NamedTuple):
     """Products M of the closed loops of the last 0, 1, ... steps before a phase, in float64, magnitudes only.
 
-    Their own roundings are in `residuals`: M of a lag times the loop before it, less M of the next lag.
+    `residuals` holds their own roundings: M of a lag times the loop before it, minus M of the next lag.
     """
 
     products: list[NDArray[np.float64]]
@@ -374,7 +374,7 @@ class _Powers(NamedTuple):
 
 
 def _powers(phases: list[_Phase]) -> list[_Powers] | None:
-    """Products of closed loops until they are small; None if they do not become small."""
+    """Return products of closed loops until they are small; None if they do not become small."""
     cycle, n = len(phases), len(phases[0].center)
     whole = np.eye(n)
     for phase in phases:
@@ -401,7 +401,7 @@ def _middle(X: Any) -> NDArray[np.float64]:
 
 
 def _largest(matrices: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Largest value of each entry."""
+    """Return the largest value of each entry."""
     return np.asarray(np.max(matrices, axis=0) * _SUMS)
 
 
@@ -418,5 +418,5 @@ def _matrix(values: NDArray[np.float64]) -> Any:
 
 
 def _abs(X: Any) -> NDArray[np.float64]:
-    """Upper limits of the magnitudes of the entries of a matrix of balls."""
+    """Return upper limits of the magnitudes of the entries of a matrix of balls."""
     return np.array([[float(each.abs_upper()) * _UP for each in row] for row in X.tolist()])

@@ -1,21 +1,22 @@
-r"""Bounds of sums over all earlier steps, by a certificate that a finite computation can check.
+r"""Bound sums over all earlier steps by a certificate that a finite computation can check.
 
 Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` and
 :math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
 
 .. math:: c_0 e_k = \sum_{l<L} c_l w_{k-l} + \sum_{l<L} r_l e_{k-l-1} + c_L e_{k-L}.
 
-So the rows need not be exact: what float64 makes of :math:`c_{l+1} = c_l F_{k-l}` will do, since its own rounding
-errors are the small residuals :math:`r_l`. Nor must the infinite sum be cut with an estimate of its tail: the tail is
-the last term. If the error was within b at all earlier steps, then
+So the rows need not be exact. A float64 value of :math:`c_{l+1} = c_l F_{k-l}` is sufficient, since its rounding errors
+are the small residuals :math:`r_l`. The infinite sum needs no estimate of its tail, because the tail is the last term.
+If the error was within b at all earlier steps, then
 
 .. math:: |c_0 e_k| \le \sum_{l<L} |c_l w_{k-l}| + \Big(\sum_{l<L} |r_l| + |c_L|\Big) b,
 
-and if the right side is at most b for each state (and each step of the period), then it is so for ever, by induction.
+and if the right side is at most b for each state and each step of the period, then the error stays within b forever, by
+induction.
 
-Disturbances come as columns: :math:`w_k = \sum_g G_{k,g}\rho_g + s`, :math:`|\rho_g| \le h_{k,g}`, :math:`|s| \le
+Disturbances are given as columns: :math:`w_k = \sum_g G_{k,g}\rho_g + s`, :math:`|\rho_g| \le h_{k,g}`, :math:`|s| \le
 \text{slack}_k`, and :math:`|c w| \le \sum_g |c\,G_g| h_g + |c|\,\text{slack}`, which is smaller than :math:`|c||w|`
-where a disturbance reaches several states at once.
+if a disturbance affects several states at once.
 
 Everything is float64. Each sum of terms of one sign is enlarged by more than its own rounding errors.
 """
@@ -35,16 +36,16 @@ from gpbnb.kalman.guarantee.program import MULTIPLY, effects, functionals
 
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
-"""Enlarges a sum of up to 2**12 terms of one sign by more than its roundings."""
+"""Factor that exceeds the effect of roundings on a sum of up to 2**12 terms of one sign."""
 
 ROUNDING, LOOP, GAIN, START = range(4)
-"""Parts of a bound (roundings of the step, of the stored closed loop, error of the gain, and what is carried on)."""
+"""Parts of a bound (roundings of the step, of the stored closed loop, error of the gain, and earlier errors)."""
 
 
 class Units(NamedTuple):
     r"""The largest rounding error of a result of at most a given size, :math:`\tfrac12 b^{e-t}` or :math:`b^{e-t}`.
 
-    The size is below :math:`b^e`. Exponents are without limit in a ``FloatFormat``; the table spans 2**±900.
+    The size is below :math:`b^e`. Exponents are unlimited in a ``FloatFormat``; the table spans 2**±900.
     """
 
     #: powers of the base, rounded down.
@@ -92,7 +93,7 @@ def _is_power(units: Any, high: float, low: float) -> bool:
 
 
 class Limits(NamedTuple):
-    """What is known about the filter without rounding; each float64, not negative, may be infinite.
+    """Limits on the filter without rounding, in float64; none is negative, some may be infinite.
 
     The state and the innovation, or the measurement, must be finite.
     """
@@ -106,7 +107,7 @@ class Limits(NamedTuple):
 
 
 class Disturbances(NamedTuple):
-    """Closed loops and disturbances of some steps, in float64, with bounds of what float64 leaves out."""
+    """Closed loops and disturbances of some steps in float64, with bounds of the errors of float64."""
 
     #: (steps, n, n), closed loop of the program.
     F: NDArray[np.float64]
@@ -116,7 +117,7 @@ class Disturbances(NamedTuple):
     G: NDArray[np.float64]
     #: (steps, g), their limits.
     limits: NDArray[np.float64]
-    #: (steps, n), a further disturbance of each state.
+    #: (steps, n), limit of a further disturbance of each state.
     slack: NDArray[np.float64]
     #: (steps, n, m), gain of the program, and (steps, n, n) and (steps, n, m), its difference from the exact filter.
     K: NDArray[np.float64]
@@ -141,21 +142,21 @@ def disturbances(
     b: Any,
     caps: Any,
 ) -> Any:
-    r"""Disturbances of each step, :math:`e_k = \hat F e_{k-1} + q_k + \Delta F x_{k-1} + (\hat K - K)\nu_k`.
+    r"""Compute disturbances of each step, :math:`e_k = \hat F e_{k-1} + q_k + \Delta F x_{k-1} + (\hat K - K)\nu_k`.
 
-    If the coefficients of a step are known only within limits, each value differs by at most its drift from what the
-    given coefficients would make of the same operands and rounding errors. The drift of the results is a further
-    disturbance.
+    If the coefficients of a step are known only within limits, each value differs by at most its drift from the value
+    that the given coefficients would give for the same operands and rounding errors. The drift of the results is a
+    further disturbance.
 
     Parameters
     ----------
-    operations, outputs, groups, roots : of a :class:`gpbnb.kalman.guarantee.program.Program`.
+    operations, outputs, groups, roots : fields of a :class:`gpbnb.kalman.guarantee.program.Program`.
     coefficients : (steps, c, 2), double-double.
-    offsets : (steps, c), how far the coefficients of a step may be from these.
-    units : of the format.
+    offsets : (steps, c), largest distance of the true coefficients of a step from these.
+    units : units of the format.
     Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), double-double.
     exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain, double-double, and a bound of its error.
-    limits : of the filter without rounding.
+    limits : limits on the filter without rounding.
     b : (n,), bound of the error before and after each step.
     caps : (o,), bound of each operation's linear function of the exact filter; infinite if not known.
     """
@@ -193,7 +194,7 @@ def disturbances(
         for o in range(o_count):
             v = first + o
             code, a, c = operations[o, 0], operations[o, 1], operations[o, 2]
-            # How large the result may be, by state and measurement, or by state and innovation.
+            # The largest possible size of the result, by state and measurement, or by state and innovation.
             seen, known, carried = 0.0, 0.0, 0.0
             for j in range(n):
                 r, tiny = rows[v, j, 0], 2.0**-50 * sizes[v, j]
@@ -312,17 +313,17 @@ def _two_product(a: float, b: float, p: float) -> Any:
 
 
 class Certificate(NamedTuple):
-    """What :func:`certify` found for each start."""
+    """Results of :func:`certify` for each start."""
 
-    #: (t, 4), sums of each part of the disturbances, apart from what is carried on.
+    #: (t, 4), sums of each part of the disturbances, without earlier errors.
     sums: NDArray[np.float64]
     #: (t, n), sums of the residuals; they multiply the bound of errors at any earlier step.
     residual: NDArray[np.float64]
     #: (t, n), the last rows; they multiply the bound of the error where the rows end.
     tail: NDArray[np.float64]
-    #: (t, n), the rows that met the first estimate, zero if none did.
+    #: (t, n), the rows that reached the first estimate, zero if none did.
     start: NDArray[np.float64]
-    #: how many steps back the rows went.
+    #: number of steps that the rows went back.
     lags: int
 
 
@@ -342,15 +343,15 @@ def certify(
     scale: Any,
     small: float,
 ) -> Any:
-    """Sum what all earlier disturbances do to some linear functions of the error after step k.
+    """Sum the effects of all earlier disturbances on some linear functions of the error after step k.
 
     Parameters
     ----------
-    F, spread, G, limits, slack : fields of :class:`Disturbances`; the rows from `first` on repeat for ever.
-    part : (g,), which part of the bound a column belongs to.
+    F, spread, G, limits, slack : fields of :class:`Disturbances`; the rows from `first` on repeat forever.
+    part : (g,), the part of the bound to which each column belongs.
     starts : (t, n), the functions.
-    k : the step; with `steady`, counted from `first`, and the past is without end.
-    most : how many steps to go back.
+    k : the step; with `steady`, it counts from `first`, and the past is infinite.
+    most : largest number of steps to go back.
     scale, small : (n,), stop when every ``abs(c) @ scale`` is below small.
     """
     n, t, g_count = F.shape[1], starts.shape[0], G.shape[2]
@@ -424,13 +425,13 @@ def peaks(
     scale: Any,
     small: float,
 ) -> Any:
-    """Worst-case peaks of state and innovation of the exact filter, the columns being what drives it.
+    """Return worst-case peaks of state and innovation of the exact filter, driven by the columns.
 
     Parameters
     ----------
-    HPhi : (steps, m, n), float64. X, V : peaks so far, which the small terms and the tail meet. Z : (m,), limits of
+    HPhi : (steps, m, n), float64. X, V : peaks so far, for the small terms and the tail. Z : (m,), limits of
         the measurements. x0 : (n,), size of the first estimate.
-    early : how many steps to look at from the first. steady : look at each step of the period as well.
+    early : number of first steps to examine. steady : whether to examine each step of the period as well.
     """
     n, m, rows = F.shape[1], HPhi.shape[1], F.shape[0]
     peak_x, peak_v = x0.copy(), np.zeros(m)

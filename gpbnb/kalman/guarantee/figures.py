@@ -1,4 +1,4 @@
-"""Figures of guarantees: bound and errors against the step."""
+"""Figures of guarantees, with bound and errors against the step."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from gpbnb.kalman.guarantee.bound import Guarantee
 
 
 def errors_of(found: Guarantee, z: Any) -> NDArray[np.float64]:
-    """Errors after each step, (steps, n), of the run with these measurements, (steps, m), numbers of the format."""
+    """Return errors (steps, n) of the run with measurements `z` (steps, m), which are numbers of the format."""
     measured = np.asarray(z, dtype=np.float64)
     n, m = found.schedule.program.n, found.schedule.program.m
     return run_against(found, np.zeros((len(measured), n)), measured[:, None, :], np.zeros((m, n + 1)), False)[2]
 
 
 def bound_of(found: Guarantee, state: int, steps: int) -> NDArray[np.float64]:
-    """Bound of the error of a state after each of the first steps, (steps,)."""
+    """Return the bound of the error of a state after each of the first steps, (steps,)."""
     history = found.history[:steps, state]
     return np.concatenate([history, np.full(steps - len(history), found.bound[state])])
 
@@ -34,7 +34,7 @@ def draw_errors(
     Parameters
     ----------
     chosen, random : (steps, n), errors.
-    state : which state. quantity : its name and unit, for the axis.
+    state : index of the state. quantity : its name and unit, for the axis.
     """
     steps = np.arange(1, len(chosen) + 1)
     ax.plot(steps, bound_of(found, state, len(steps)), color=VALID, label="bound for every measurement sequence")

@@ -1,8 +1,8 @@
-"""Coefficients of a filter for all time: emulate the covariance until it repeats, and enclose the exact gain beside it.
+"""Find a filter's coefficients for all time: emulate the covariance until it repeats, and enclose the exact gain.
 
-In t digits the recursion of the covariance is a map of a finite set of numbers that never sees a measurement. When the
-computed covariance is digit for digit what it was a whole number of cycles of the model before, everything after
-repeats as well: a proof by exhaustion.
+In t digits, the recursion of the covariance maps a finite set of numbers into itself and does not depend on
+measurements. Once the computed covariance equals, digit for digit, the one a whole number of model cycles earlier,
+everything repeats from then on. This is a proof by exhaustion.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from gpbnb.kalman.model import LinearModel
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """Coefficients of each step of a linear filter, and the exact filter that it stands for.
+    """Coefficients of each step of a linear filter, and the corresponding exact filter.
 
-    Row k of each array is for step k + 1; the rows from `first` on repeat for ever if `settled`.
+    Row k of each array is for step k + 1. If `settled`, the rows from `first` on repeat forever.
 
     Parameters
     ----------
     program : operations of a step.
     fmt : their format.
     coefficients : (steps, c, 2), double-double.
-    packed : the same as the compiled loops of the format take them.
+    packed : the coefficients as the compiled loops of the format expect them.
     Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), the model as stored, double-double.
     exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain and a bound of its error.
     x0 : (n,), the first estimate as stored.
-    first : where the period begins. settled : whether the rows after it repeat for ever.
-    repeat, period : step at which the computed covariance was first what it would be again, `period` steps later.
-    why : if not settled, why not.
-    enclosed : if the computed gain never repeats but stays within limits, the step from which it does.
-    limits : (steps, c), how far the coefficients of a step may be from these; None if they are known exactly.
+    first : row at which the period begins. settled : whether the rows from there on repeat forever.
+    repeat, period : first step whose computed covariance occurs again, `period` steps later.
+    why : why the gain has not settled, if it has not.
+    enclosed : the step from which on a gain that never repeats stays within limits.
+    limits : (steps, c), largest distance of the true coefficients from these; None if they are known exactly.
     """
 
     program: Program
@@ -74,13 +74,13 @@ class Schedule:
 
     @property
     def offsets(self) -> NDArray[np.float64]:
-        """How far the coefficients of each step may be from those given, (steps, c)."""
+        """Largest distance of the true coefficients of each step from those given, (steps, c)."""
         return np.zeros(self.coefficients.shape[:2]) if self.limits is None else self.limits
 
 
 @compiled
 def _stored_loops(fmt: Any, K: Any, H: Any, Phi: Any, identity: Any, F: Any) -> None:
-    """Closed loops (I - KH)Φ of some steps, with every operation rounded, in the order of the filter."""
+    """Compute closed loops (I - KH)Φ of some steps with every operation rounded, in the order of the filter."""
     T, W = np.empty_like(identity), np.empty_like(identity)
     for k in range(K.shape[0]):
         product_by_sparse(fmt, K[k], H[k % H.shape[0]], T)
@@ -90,7 +90,7 @@ def _stored_loops(fmt: Any, K: Any, H: Any, Phi: Any, identity: Any, F: Any) -> 
 
 @compiled
 def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
-    """D = the inverse of the unit upper triangle U times H, by back substitution, for each step."""
+    """Compute D, the inverse of the unit upper triangle U times H, by back substitution for each step."""
     for k in range(D.shape[0]):
         u, h = U[k % U.shape[0]], H[k % H.shape[0]]
         for j in range(D.shape[2]):
@@ -106,18 +106,18 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
 def schedule(
     model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_000, horizon: int | None = None
 ) -> Schedule:
-    """Coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
+    """Find the coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
 
     Parameters
     ----------
-    model, fmt, form : as for a run of the filter. The exact filter has model and measurements as the format stores
+    model, fmt, form : as for a run of the filter. The exact filter uses model and measurements as the format stores
         them.
-    most : steps to try.
-    horizon : steps to give where the gain does not settle; by default all that were tried.
+    most : largest number of steps to try.
+    horizon : number of steps to return if the gain does not settle; by default all that were tried.
 
     Raises
     ------
-    ValueError : a format without compiled loops, or in which a covariance is not definite.
+    ValueError : the format has no compiled loops, or a covariance is not definite in it.
     """
     stored = replace(model.rounded(fmt), x0=np.array([Fraction(0)] * model.n, dtype=object))
     run, repeat, period = _emulated(stored, fmt, form, most)
@@ -167,7 +167,7 @@ def schedule(
 
 
 def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int64]:
-    """Which emulated step has the coefficients of each step."""
+    """Return, for each step, the emulated step with the same coefficients."""
     k = np.arange(steps)
     if repeat is None or period is None:
         return k
@@ -175,7 +175,7 @@ def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int6
 
 
 def _emulated(stored: LinearModel, fmt: FloatFormat, form: Form, most: int) -> tuple[Run, int | None, int | None]:
-    """A run that keeps every gain, and after how many steps the computed covariance first was what it is again."""
+    """Return a run that keeps every gain, and the number of steps after which the computed covariance first repeats."""
     steps = min(most, max(128, 2 * stored.cycle))
     while True:
         run = Run(stored, fmt, form, range(1, steps + 1))
@@ -196,19 +196,19 @@ def _emulated(stored: LinearModel, fmt: FloatFormat, form: Form, most: int) -> t
 def packed_coefficients(
     run: Run, fmt: FloatFormat, form: Form, rows: NDArray[np.int64], before: int = 0
 ) -> tuple[Program, NDArray[Any]]:
-    """The program of a form and its coefficients, row by row, as the run had them.
+    """Return the program of a form and its coefficients, row by row, from a run.
 
     Parameters
     ----------
-    rows : which of the run's checkpoints; its first is for step `before` + 1.
+    rows : indices of the run's checkpoints; the first checkpoint is for step `before` + 1.
     """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H, identity = run.matrices[0], run.matrices[2], run.matrices[9]
+    Phi, H, identity = run.matrices[0], run.matrices[2], run.matrices[7]
     K = np.ascontiguousarray(run.G[:last])
     tail = K.shape[3:]
 
     def flat(matrices: NDArray[Any]) -> NDArray[Any]:
-        """Entries of the matrix of each step, a row a step."""
+        """Return the entries of the matrix of each step, with one row for each step."""
         return matrices[rows].reshape(len(rows), -1, *tail)
 
     def of_cycle(matrices: NDArray[Any]) -> NDArray[Any]:
@@ -223,7 +223,7 @@ def packed_coefficients(
         D = np.empty((cycle, m, n, *tail), K.dtype)
         _decorrelated(run.tag, run.UR, H, D)
         U = np.array(run.UR)
-        for i in range(m):  # the diagonal holds variances, and ones are meant there
+        for i in range(m):  # the diagonal stores variances in place of ones
             U[:, i, : i + 1] = 0
         parts = [of_cycle(each) for each in (Phi, U, D)]
         return sequential_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
@@ -232,7 +232,7 @@ def packed_coefficients(
 
 
 def pack(fmt: FloatFormat, values: Any) -> NDArray[Any]:
-    """Numbers as the compiled loops of a format take them."""
+    """Convert numbers to the form that the compiled loops of a format expect."""
     array = fmt.array(values)
     if not isinstance(array.backend, Compiled):
         raise OverflowError(f"got numbers beyond the range of the compiled loops of {fmt}; scale the states")
@@ -240,7 +240,7 @@ def pack(fmt: FloatFormat, values: Any) -> NDArray[Any]:
 
 
 def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Packed numbers of any format as double-double: exact in base 2 and 16, the nearest in base 10."""
+    """Convert packed numbers of any format to double-double, exactly in base 2 and 16, to the nearest in base 10."""
     if packed.dtype == np.float64:
         return np.stack([packed, np.zeros_like(packed)], axis=-1)
     significands, exponents = packed[..., 0], packed[..., 1]
@@ -262,11 +262,11 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
 def _exact_gains(
     stored: LinearModel, repeat: int, period: int | None, most: int, fmt: FloatFormat
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], bool, int]:
-    """The exact filter's gain in double-double, a bound of its error, whether it holds for ever, and from which row.
+    """Return the exact gain in double-double, a bound of its error, whether it holds forever, and from which row.
 
-    Without a period, of the first `repeat` steps. With one, until the exact gain is periodic too: if the exact
-    covariance is within some distance of the computed one at the beginning of a period, measured in the norm of the
-    contraction bound, and within the same distance of the same one at its end, then so it is for ever.
+    Without a period, these cover the first `repeat` steps. With a period, they go on until the exact gain is periodic,
+    too. Distances are measured in the norm of the contraction bound. If the exact covariance is within some distance of
+    the computed one at the beginning of a period, and within the same distance at its end, it stays so forever.
     """
     n, m = stored.n, stored.m
     if period is None:
@@ -284,7 +284,7 @@ def _exact_gains(
             break
         steps = min(max(most, repeat + 2 * period), repeat + period * (2 + 2 * ((steps - repeat) // period)))
     for _ in range(6):
-        # The invariant distance: found roughly by trial, then made as small as one more period shows it can be.
+        # Find the invariant distance roughly by trial, then reduce it as far as one more period allows.
         for larger in (4.0, 1e3, 1e6, 1e9):
             closed = _closes(stored, run, first, period, larger, most)
             if closed is not None:
@@ -309,7 +309,7 @@ def _bounded_run(stored: LinearModel, steps: int) -> BoundedRun:
 
 
 class _Closed(NamedTuple):
-    """A run of one more period, the bound of its gain's error, and the factor that would have been enough."""
+    """A run of one more period, the bound of its gain's error, and the smallest sufficient factor."""
 
     run: BoundedRun
     dK: NDArray[np.float64]
@@ -317,7 +317,7 @@ class _Closed(NamedTuple):
 
 
 def _closes(stored: LinearModel, run: BoundedRun, first: int, period: int, larger: float, most: int) -> _Closed | None:
-    """Follow one more period from a distance that is to be invariant, `larger` times what the last period moved."""
+    """Follow one more period from a trial invariant distance, `larger` times the change in the last period."""
     steps = run.steps + period
     longer = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     longer.take(np.zeros((run.steps, stored.m)))
@@ -338,7 +338,7 @@ def _closes(stored: LinearModel, run: BoundedRun, first: int, period: int, large
     carried = (1 + kappa) ** 2 * arb(float(end.zeta))
     if not carried + arb(moved) <= arb(float(trial)):
         return None
-    shrinks = 1 - float(carried.mid()) / trial  # by this share a distance shrinks in a period
+    shrinks = 1 - float(carried.mid()) / trial  # a distance shrinks by this share in a period
     return _Closed(longer, longer.bounds[1], 1.1 * max(moved, wrap) / shrinks / max(begin.zeta, wrap))
 
 
@@ -353,7 +353,7 @@ def _symmetric_of(run: BoundedRun, row: int) -> NDArray[Any]:
 
 
 def _distance(inverse: Any, change: NDArray[Any]) -> float:
-    """Upper bound of the norm of a change of the covariance in the units of the weights, float64."""
+    """Return an upper bound of the norm of a change of the covariance in units of the weights, float64."""
     D = arb_mat([[arb(a.numerator) / arb(a.denominator) for a in row] for row in change])
     X = inverse * D * inverse.transpose()
     return _upper(_norm(X.entries()))
@@ -365,7 +365,7 @@ def _frobenius_to_identity(X: Any) -> Any:
 
 
 def _norm(balls: Iterable[Any]) -> Any:
-    """Upper bound of the root of the sum of squares; a ball around zero has no square root of its own."""
+    """Return an upper bound of the root of the sum of squares; a ball around zero has no square root."""
     return sum((arb(x.abs_upper()) ** 2 for x in balls), arb(0)).sqrt()
 
 

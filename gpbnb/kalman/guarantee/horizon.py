@@ -1,8 +1,8 @@
-"""A bound up to a stated step, in blocks, for a filter that takes too long to settle.
+"""A bound up to a stated step, in blocks, for a filter that settles too slowly.
 
-Gravity Probe B's filter is one: its drift rates have a time constant of months. Gains and disturbances of a year would
-fill 10 GB, and this module keeps those of one cycle of the model at a time. Several limits share a pass: the two
-choices of state, drift or deviations from the predicted drift, have the same gains.
+Gravity Probe B's filter is an example: its drift rates have a time constant of months. Gains and disturbances of a year
+would fill 10 GB, so this module keeps only those of one cycle of the model at a time. Several limits share a pass. The
+two choices of states, drift or deviations from the predicted drift, have the same gains.
 
 ``python -m gpbnb.kalman.guarantee.horizon`` computes ``horizon.csv`` and resumes where it was interrupted. The rows
 that it has written hold for the steps done so far.
@@ -55,7 +55,7 @@ SAVE_EVERY = 50
 
 @dataclass
 class _Carried:
-    """What is carried from block to block for one choice of limits."""
+    """State that is carried from block to block for one choice of limits."""
 
     within: Limits
     assumed: NDArray[np.float64]
@@ -87,15 +87,15 @@ def bounds_in_blocks(
     window: int = 8,
     saved: Path | None = None,
 ) -> Iterator[tuple[int, list[Bounds]]]:
-    """Bound what rounding does to the estimates of the first steps, block by block.
+    """Bound the effect of rounding on the estimates of the first steps, block by block.
 
     Parameters
     ----------
     model, fmt, form : the filter, as for :func:`gpbnb.kalman.guarantee.bound.guarantee`.
-    within : limits on state and innovation, one for each bound that is wanted.
-    assumed : for each, (n,), an error that is not exceeded. It enters the size of the computed estimate; a bound above
-        it ends the iteration with an ``ArithmeticError``.
-    steps : how many. block : how many at a time; by default a cycle of the model.
+    within : limits on state and innovation, one for each bound.
+    assumed : for each bound, (n,), an error that is assumed not to be exceeded. It enters the size of the computed
+        estimate; a bound above it ends the iteration with an ``ArithmeticError``.
+    steps : number of steps. block : number of steps at a time; by default a cycle of the model.
     saved : file for the state of the run, written now and then. If it exists, the run continues from there; the
         arguments must be the same.
 
@@ -105,7 +105,7 @@ def bounds_in_blocks(
 
     Raises
     ------
-    ArithmeticError : a bound exceeds what was assumed; the filter stopped or lost definiteness.
+    ArithmeticError : a bound exceeds the assumed error; the filter stopped or a covariance became indefinite.
     """
     stored = model.rounded(fmt)
     n, m, cycle = stored.n, stored.m, stored.cycle
@@ -132,7 +132,10 @@ def bounds_in_blocks(
             filter_run.notes[NEXT_CHECKPOINT] = 0
             filter_run.take(z[:count])
             if filter_run.stopped or filter_run.indefinite:
-                raise ArithmeticError(f"{model.name} in {fmt}: it stopped or lost definiteness by step {done + count}")
+                raise ArithmeticError(
+                    f"{model.name} in {fmt}: the filter stopped or its covariance lost definiteness by "
+                    f"step {done + count}"
+                )
         rows = np.arange(count)
         at = (done + rows) % cycle
         program, packed = packed_coefficients(run, fmt, form, rows, done)
@@ -171,7 +174,7 @@ def bounds_in_blocks(
 
 
 def _save(file: Path, done: int, run: Run, true: BoundedRun, each: list[_Carried]) -> None:
-    """Write what the next block needs; a file that exists is replaced as a whole."""
+    """Write the state that the next block needs; an existing file is replaced as a whole."""
     draft = file.with_suffix(".draft")
     runs = [(given.x, given.P, given.notes) for given in (run, true)]
     draft.write_bytes(pickle.dumps((done, runs, true.bound, each)))
@@ -179,7 +182,7 @@ def _save(file: Path, done: int, run: Run, true: BoundedRun, each: list[_Carried
 
 
 def _restored(file: Path, run: Run, true: BoundedRun) -> tuple[int, list[_Carried]]:
-    """Put both runs into the state of a file that :func:`_save` wrote; return the rest of it."""
+    """Restore both runs from a file written by :func:`_save`; return the rest of it."""
     done, runs, true.bound, each = pickle.loads(file.read_bytes())
     for given, state in zip((run, true), runs, strict=True):
         for array, value in zip((given.x, given.P, given.notes), state, strict=True):
@@ -207,13 +210,13 @@ def _follow(one: _Carried, found: Disturbances, part: NDArray[np.int64], done: i
 # -- Gravity Probe B --------------------------------------------------------------------------------------------------
 
 ABSOLUTE = (7000.0, 500.0, 7000.0, 100.0, 200.0, 200.0, 200.0, 200.0, 200.0, 20.0)
-"""Limits of the states when they are the drift itself; units as in :data:`gpbnb.kalman.gravity_probe_b.STATES`."""
+"""Limits of the states if they are the drift itself; units as in :data:`gpbnb.kalman.gravity_probe_b.STATES`."""
 
 DEVIATION = (500.0, 500.0, 100.0, 100.0, 200.0, 200.0, 200.0, 200.0, 200.0, 20.0)
-"""The same when they are deviations from the predicted drift, which otherwise reaches 6606 mas in the year."""
+"""Limits of the states if they are deviations from the predicted drift, which reaches 6606 mas in the year."""
 
 INNOVATION = (1000.0, 200.0)
-"""Limits of the innovations in mas. They are 20 standard deviations of gyro and telescope noise, with some room."""
+"""Limits of the innovations in mas. They are 20 standard deviations of gyro and telescope noise, with some margin."""
 
 
 class Row(NamedTuple):
@@ -227,7 +230,7 @@ class Row(NamedTuple):
 
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
-    """The stored rows."""
+    """Return the stored rows."""
     return tuple(
         Row(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13])), tuple(map(float, line[13:])))
         for line in read(file, COLUMNS, COMMAND).rows
@@ -235,7 +238,7 @@ def load(file: Path = FILE) -> tuple[Row, ...]:
 
 
 def table() -> Table:
-    """Bounds of the drift and its rates for the longest time that was computed, for both choices of states."""
+    """Tabulate bounds of the drift and its rates for the longest time computed, for both choices of states."""
     header = (
         "states",
         "days",
@@ -255,7 +258,7 @@ def table() -> Table:
 
 
 def bits(row: Row, tolerance: float = 1.0) -> int:
-    """Bits for which the bound of each drift and rate, scaled with the unit roundoff, is within a tolerance.
+    """Return the bits for which the bound of each drift and rate, scaled with the unit roundoff, meets a tolerance.
 
     The bounds are nearly proportional to the unit roundoff, so this extrapolates; it is not a guarantee by itself.
     """
@@ -265,7 +268,7 @@ def bits(row: Row, tolerance: float = 1.0) -> int:
 def gravity_probe_b_bounds(
     precision: int, steps: int = YEAR, saved: Path | None = None
 ) -> Iterator[tuple[int, list[Bounds]]]:
-    """Bounds of a year of Gravity Probe B in a binary format, absolute states first, then deviations."""
+    """Yield bounds for a year of Gravity Probe B in a binary format, first for absolute states, then for deviations."""
     within = [limits(10, 2, state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
     assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
     fmt = FloatFormat(2, precision)
@@ -273,9 +276,9 @@ def gravity_probe_b_bounds(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Follow a year of Gravity Probe B in a format; two lines of the file for each 1 % of it."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Bounds for a year of Gravity Probe B.")
-    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the format")
+    """Follow a year of Gravity Probe B in a format; write two lines to the file after each 1 % of it."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Compute error bounds for a year of Gravity Probe B.")
+    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the significand")
     parser.add_argument("--steps", type=int, default=YEAR, help="steps of 10 s")
     parser.add_argument("--output", type=Path, default=Path(".cache/horizon"), help=f"folder for {FILE.name}")
     given = parser.parse_args(arguments)

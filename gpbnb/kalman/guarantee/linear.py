@@ -1,8 +1,8 @@
-r"""Linear filters and controllers with fixed coefficients: the case without a covariance.
+r"""Linear filters and controllers with fixed coefficients and without a covariance.
 
-A filter :math:`x_k = Ax_{k-1} + Bz_k,\ y_k = Cx_{k-1} + Dz_k` has its coefficients from the start, so that the
+A filter :math:`x_k = Ax_{k-1} + Bz_k,\ y_k = Cx_{k-1} + Dz_k` has known coefficients, so the
 guarantee needs no emulation of a gain. Its outputs become states that nothing else uses. The exact filter has the same
-stored coefficients: the bound is on what rounding in the computation does.
+stored coefficients, so the bound covers only rounding in the computation.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class LinearFilter:
     Parameters
     ----------
     program : operations of a step.
-    coefficients : (c,), as a designer gives them; a format stores each rounded.
-    name : what tables call it.
+    coefficients : (c,), exact design values; a format stores each rounded.
+    name : name in tables.
     """
 
     program: Program
@@ -44,7 +44,7 @@ class LinearFilter:
     name: str = "a linear filter"
 
     def schedule(self, fmt: FloatFormat) -> Schedule:
-        """The filter in a format, as :func:`gpbnb.kalman.guarantee.bound.from_schedule` takes it."""
+        """Return the filter in a format, for :func:`gpbnb.kalman.guarantee.bound.from_schedule`."""
         program, first = self.program, self.program.n + self.program.m
         packed = pack(fmt, self.coefficients.reshape(1, -1))
         coefficients = widened_array(packed)
@@ -71,7 +71,7 @@ class LinearFilter:
 
 
 def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
-    """A filter given by its matrices; with C and D, outputs follow the states.
+    """Return a filter from its matrices; with C and D, outputs follow the states.
 
     Raises
     ------
@@ -93,12 +93,12 @@ def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a sta
 
 
 def biquad(b0: Any, b1: Any, b2: Any, a1: Any, a2: Any, name: str = "a second-order section") -> LinearFilter:
-    """A second-order section (b0 + b1/z + b2/z²)/(1 + a1/z + a2/z²) in transposed direct form II; output is state 2."""
+    """Return a second-order section (b0 + b1/z + b2/z²)/(1 + a1/z + a2/z²), transposed form II; output is state 2."""
     return LinearFilter(biquad_program(), exact([b0, b1, b2, a1, a2]), name)
 
 
 def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any, name: str = "a PID controller") -> LinearFilter:
-    """A PID controller whose integral forgets by the factor `leak` a step; the input is the error, output is state 2.
+    """Return a PID controller whose integral decays by the factor `leak` per step; input is the error, output state 2.
 
     With leak = 1 the integral keeps every rounding error, and there is no bound for all time.
     """
@@ -113,10 +113,10 @@ class Enclosure(NamedTuple):
 
 
 def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
-    r"""Worst-case peak gain :math:`|D| + \sum_{l\ge0}|CA^lB|`, in ball arithmetic; (p, m).
+    r"""Return the worst-case peak gain :math:`|D| + \sum_{l\ge0}|CA^lB|`, in ball arithmetic; (p, m).
 
-    Balls grow at each product, by the norm of the sizes of A rather than by that of A. The bits are therefore doubled
-    until both ends agree to 2**-40.
+    Balls grow with each product by the norm of |A| instead of that of A. The bits are therefore doubled until both ends
+    agree to 2**-40.
 
     Raises
     ------
@@ -130,17 +130,15 @@ def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
             if (narrow | (found.high <= negligible)).all():
                 return found
         bits *= 2
-    raise ValueError("got a filter of which no power was proved to contract; needed a stable one")
+    raise ValueError("got a filter for which no power of its matrix was proved to contract; needed a stable filter")
 
 
 def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> tuple[Enclosure | None, float]:
-    r"""The sum in balls of some bits, until what is left is below 2**-50 of each entry, and what is negligible.
+    r"""Sum in balls until the rest is below 2**-50 of each entry or negligible; None if the balls grow too large.
 
-    There is none if the balls have grown too large.
-
-    :math:`\|A^N\|_\infty = q < 1` is proved for a power, and rows beyond sum up to at most
-    :math:`\|CA^L\|_1/(1-q)` times the largest entry of :math:`\sum_{j<N}|A^jB|`. Shares nothing with
-    :mod:`gpbnb.kalman.guarantee.envelope`, and is its oracle.
+    :math:`\|A^N\|_\infty = q < 1` is proved for a power, and later terms sum up to at most
+    :math:`\|CA^L\|_1/(1-q)` times the largest entry of :math:`\sum_{j<N}|A^jB|`. This shares no code with
+    :mod:`gpbnb.kalman.guarantee.envelope` and is its oracle.
     """
     before, ctx.prec = ctx.prec, bits
     try:
@@ -185,11 +183,11 @@ def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> tuple[Enclosure | N
 
 
 def error_coefficients(A: Any, B: Any, C: Any, D: Any, largest_input: float) -> NDArray[np.float64]:
-    r"""FixIF's coefficients: what one unit in the last place of each state and of the output may do to the output.
+    r"""Return FixIF's coefficients, the effect on the output of a unit in the last place of each state and output.
 
     .. math:: E_j = \mathrm{WCPG}(\text{error in } x_j \to y)\cdot 2^{\lceil\log_2\max|x_j|\rceil}
 
-    The output error is at most the sum of :math:`E_j 2^{-w_j}` up to factors of the rounding, w_j bits each.
+    The output error is at most the sum of :math:`E_j 2^{-w_j}` for w_j bits, up to factors due to the rounding.
 
     Returns
     -------
@@ -197,7 +195,7 @@ def error_coefficients(A: Any, B: Any, C: Any, D: Any, largest_input: float) -> 
 
     Raises
     ------
-    ArithmeticError : the enclosure of a largest state holds a power of two.
+    ArithmeticError : the enclosure of a largest state contains a power of two.
 
     References
     ----------
@@ -224,7 +222,7 @@ def _row_norm(X: Any) -> Any:
 
 
 def _largest(balls: Iterable[Any]) -> Any:
-    """The largest upper end of balls, which overlap: none of them may be the larger; infinite if one is unbounded."""
+    """Return the largest upper end of balls, which may overlap; infinite if a ball is unbounded."""
     largest = arb(0)
     for ball in balls:
         if not ball.is_finite():

@@ -1,9 +1,9 @@
-r"""The probable error beside the worst case: roundings as independent noise.
+r"""The probable error, for comparison with the worst case: rounding errors as independent noise.
 
-Each rounding error is taken as uniform within its limit, independent of all others. Their covariance goes on as
-:math:`\Sigma_k = \hat F_k\Sigma_{k-1}\hat F_k^T + \Gamma_k\operatorname{diag}(\sigma^2)\Gamma_k^T`, and settles at the
-solution of a Lyapunov equation. Errors of gain and stored closed loop are no noise, and are left out. This is an
-estimate, not a bound, and of chopped arithmetic, whose errors have a mean, it says too little.
+Each rounding error is assumed uniform within its limit and independent of all others. Their covariance evolves as
+:math:`\Sigma_k = \hat F_k\Sigma_{k-1}\hat F_k^T + \Gamma_k\operatorname{diag}(\sigma^2)\Gamma_k^T`, and converges to
+the solution of a Lyapunov equation. Errors of gain and stored closed loop are not noise and are omitted. The result is
+an estimate, not a bound. It is too small for chopped arithmetic, whose errors have a nonzero mean.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gpbnb.kalman.guarantee.envelope import Disturbances
 
 
 def separate_roundings(found: Guarantee) -> Disturbances:
-    """Disturbances with a column for each operation, also for those with the same effect.
+    """Return disturbances with a column for each operation, even if operations have the same effect.
 
     A bound adds up the limits of operations with the same effect. Their variances must be added one by one, because
     the largest of them usually outweighs the others.
@@ -31,17 +31,19 @@ def separate_roundings(found: Guarantee) -> Disturbances:
 
 
 def probable_error(found: Guarantee) -> NDArray[np.float64]:
-    """Standard deviation of the error of each state that roundings cause, the largest over a period; (n,).
+    """Return the standard deviation of each state's rounding error, the largest over a period; (n,).
 
-    Values are taken to be as large as their limits allow; smaller ones have smaller rounding errors.
+    Values are assumed to be as large as their limits allow; smaller values have smaller rounding errors.
 
     Raises
     ------
-    ValueError : the guarantee does not hold for ever.
+    ValueError : the guarantee does not hold forever.
     """
     given = found.schedule
     if not found.for_ever:
-        raise ValueError(f"got a filter without a steady state: {found.why}; needed one with a bound for ever")
+        raise ValueError(
+            f"got a filter without a steady state: {found.why}; needed a filter with a bound that holds for all steps"
+        )
     each = separate_roundings(found)
     count, first = len(given.program.operations), given.first
     F, G, variance = each.F[first:], each.G[first:, :, :count], each.limits[first:, :count] ** 2 / 3

@@ -1,15 +1,15 @@
-r"""One step of a linear filter as a list of rounded operations, in the order in which the compiled kernels do them.
+r"""One step of a linear filter as a list of rounded operations, in the order of the compiled kernels.
 
-Covariance and gain of a Kalman filter do not depend on the measurements. Once they are known, the estimate is computed
-by products with known coefficients, sums and differences only: a *linear program*. The same list of operations serves
+Covariance and gain of a Kalman filter do not depend on the measurements. Once they are known, the estimate needs only
+products with known coefficients, sums and differences: a *linear program*. The same list of operations serves
 three purposes, so that they cannot disagree:
 
-* :func:`execute` runs it in any format, digit for digit as the filter itself;
-* :func:`functionals` gives the exact linear function of (x, z) that each intermediate value approximates;
-* :func:`effects` gives what a rounding error in each operation does to the result of the step.
+* :func:`execute` runs it in any format, digit for digit like the filter itself;
+* :func:`functionals` computes the exact linear function of (x, z) that each intermediate value approximates;
+* :func:`effects` computes the effect of a rounding error in each operation on the result of the step.
 
-The coefficients are arguments, not part of the program: they change from step to step. A coefficient of zero makes a
-product exact, and so is a sum with it; the compiled kernels leave both out.
+The coefficients are arguments and not part of the program, because they change from step to step. A product with a zero
+coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, put, store, subtract
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
@@ -40,7 +39,7 @@ class Program:
     operations : (o, 3), code and two operands. Values are numbered: the n states, the m inputs, then the result of each
         operation. MULTIPLY takes a coefficient and a value; ADD and SUBTRACT take two values.
     outputs : (n,), the values that become the states.
-    coefficients : how many there are.
+    coefficients : number of coefficients.
     groups : (o,), operations whose rounding errors have the same effect on the result share a number.
     roots : for each group, an operation in it.
     """
@@ -55,12 +54,12 @@ class Program:
 
     @property
     def roundings(self) -> NDArray[np.int64]:
-        """How many operations share each effect, (groups,)."""
+        """Number of operations that share each effect, (groups,)."""
         return np.bincount(self.groups, minlength=len(self.roots))
 
 
 class Builder:
-    """Write a :class:`Program` down, one operation at a time; values are plain ints."""
+    """Build a :class:`Program`, one operation at a time; values are plain ints."""
 
     def __init__(self, n: int, m: int) -> None:
         self.n, self.m = n, m
@@ -85,14 +84,14 @@ class Builder:
         return self._append(SUBTRACT, a, b)
 
     def row(self, coefficients: Sequence[int], values: Sequence[int]) -> int:
-        """Sum of products, from left to right; the first product is not added to zero."""
+        """Add a sum of products, from left to right; the first product is not added to zero."""
         total = self.multiply(coefficients[0], values[0])
         for c, v in zip(coefficients[1:], values[1:], strict=True):
             total = self.add(total, self.multiply(c, v))
         return total
 
     def product(self, matrix: NDArray[np.int64], values: Sequence[int]) -> list[int]:
-        """Product of a matrix of coefficients and a column; each entry as :meth:`row`."""
+        """Add the product of a matrix of coefficients and a column; see :meth:`row` for each entry."""
         return [self.row([int(c) for c in row], values) for row in matrix]
 
     def finish(self, outputs: Sequence[int], coefficients: int) -> Program:
@@ -132,7 +131,7 @@ def _grouped(operations: NDArray[np.int64], outputs: list[int], first: int) -> t
 
 
 def coefficient_matrices(*shapes: tuple[int, int]) -> tuple[list[NDArray[np.int64]], int]:
-    """Number the entries of some matrices one after the other; their numbers, and how many there are."""
+    """Number the entries of some matrices consecutively; return their numbers and the total."""
     at, numbered = 0, list[NDArray[np.int64]]()
     for rows, columns in shapes:
         numbered.append(np.arange(at, at + rows * columns, dtype=np.int64).reshape(rows, columns))
@@ -141,7 +140,7 @@ def coefficient_matrices(*shapes: tuple[int, int]) -> tuple[list[NDArray[np.int6
 
 
 def loop_program(n: int, m: int) -> Program:
-    r"""Hung's form (1984), (111): :math:`\hat F x + \hat K z`; coefficients F (n, n), K (n, m)."""
+    r"""Program of Hung's form (1984), (111): :math:`\hat F x + \hat K z`; coefficients F (n, n), K (n, m)."""
     (F, K), count = coefficient_matrices((n, n), (n, m))
     build = Builder(n, m)
     u, v = build.product(F, build.states), build.product(K, build.inputs)
@@ -160,7 +159,7 @@ def innovation_program(n: int, m: int) -> Program:
 
 
 def sequential_program(n: int, m: int) -> Program:
-    """UD form: measurements decorrelated, then taken one by one.
+    """Program of the UD form, which decorrelates the measurements and takes them one by one.
 
     Coefficients Φ (n, n), the decorrelating factor U (m, m, its strict upper part), decorrelated H (m, n), and the gain
     of each measurement, K (n, m).
@@ -181,7 +180,7 @@ def sequential_program(n: int, m: int) -> Program:
 
 
 def state_space_program(n: int, m: int) -> Program:
-    """A linear filter :math:`Ax + Bz`, each row one sum from left to right; coefficients A (n, n), B (n, m)."""
+    """Program of a filter :math:`Ax + Bz`, each row one sum from left to right; coefficients A (n, n), B (n, m)."""
     (A, B), count = coefficient_matrices((n, n), (n, m))
     build = Builder(n, m)
     inputs = [*build.states, *build.inputs]
@@ -189,7 +188,7 @@ def state_space_program(n: int, m: int) -> Program:
 
 
 def biquad_program() -> Program:
-    """A second-order section in transposed direct form II; states s1, s2 and the output; b0, b1, b2, a1, a2."""
+    """Program of a second-order section, transposed direct form II; states s1, s2, output; b0, b1, b2, a1, a2."""
     build = Builder(3, 1)
     (s1, s2, _), (z,) = build.states, build.inputs
     y = build.add(build.multiply(0, z), s1)
@@ -199,9 +198,10 @@ def biquad_program() -> Program:
 
 
 def controller_program() -> Program:
-    """A PID controller whose integral forgets; states integral, last error, output; coefficients in this order.
+    """Program of a PID controller with a decaying integral; the states are integral, last error and output.
 
-    ``leak, Ki, Kp, Kd``: the integral becomes leak · integral + Ki e, the output Kp e + integral + Kd (e - last e).
+    The coefficients are ``leak, Ki, Kp, Kd``. The integral becomes leak · integral + Ki e, and the output
+    Kp e + integral + Kd (e - last e).
     """
     build = Builder(3, 1)
     (integral, last, _), (error,) = build.states, build.inputs
@@ -214,7 +214,7 @@ def controller_program() -> Program:
 # -- execution --------------------------------------------------------------------------------------------------------
 
 
-@njit(nogil=True)
+@inner
 def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, z: Any, values: Any) -> None:
     """Take one step in the arithmetic of a tag: x becomes the next state; `values` is a workspace."""
     n, m = x.shape[0], z.shape[0]
@@ -241,7 +241,7 @@ def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: A
 
     Parameters
     ----------
-    coefficients : (steps, c), one row a step; after the last, from the row `start` on again.
+    coefficients : (steps, c), one row for each step; after the last row, those from `start` on repeat.
     """
     values = np.empty((x.shape[0] + z.shape[1] + operations.shape[0], *x.shape[1:]), x.dtype)
     rows = coefficients.shape[0]
@@ -254,7 +254,7 @@ def advance(fmt: Any, operations: Any, outputs: Any, coefficients: Any, start: A
 def steps_in_python(
     program: Program, round_: Callable[[Any], Any], coefficients: Any, x: Sequence[Any], z: Sequence[Any]
 ) -> list[Any]:
-    """Take one step with any numbers that have operators, each result rounded by a function: slow and obvious."""
+    """Take one step with numbers of any type, each result rounded by a function; slow and obvious."""
     values = [*x, *z]
     for code, a, b in program.operations.tolist():
         left = coefficients[a] if code == MULTIPLY else values[a]
@@ -268,13 +268,13 @@ def steps_in_python(
 
 @compiled
 def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes: Any) -> None:
-    """Linear function of (x, z) that each value approximates.
+    """Compute the linear function of (x, z) that each value approximates.
 
     Parameters
     ----------
     coefficients : (c, 2), double-double. first : n + m.
     rows : (n + m + o, n + m, 2), to be filled, double-double; relative to `sizes`, errors are below 2**-90.
-    sizes : (n + m + o, n + m), to be filled: the same with all signs made positive.
+    sizes : (n + m + o, n + m), to be filled: the result with all signs made positive.
     """
     exactly = DoubleDouble()
     rows[:first] = 0.0
@@ -302,13 +302,13 @@ def functionals(operations: Any, coefficients: Any, first: int, rows: Any, sizes
 
 @compiled
 def effects(operations: Any, outputs: Any, coefficients: Any, first: int, G: Any, sizes: Any) -> None:
-    """What an error in each value does to the states after the step.
+    """Compute the effect of an error in each value on the states after the step.
 
     Parameters
     ----------
     coefficients : (c,), float64.
     G : (n + m + o, n), to be filled; relative to `sizes`, errors are below (3 o + 3) 2**-53.
-    sizes : (n + m + o, n), to be filled: the same with all signs made positive.
+    sizes : (n + m + o, n), to be filled: the result with all signs made positive.
     """
     n = outputs.shape[0]
     G[:] = 0.0

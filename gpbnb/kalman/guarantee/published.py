@@ -1,4 +1,4 @@
-"""Filters whose numbers others have published, as their programs and tests hold them."""
+"""Filters with published numbers, taken from the programs and tests of other projects."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _HERE = Path(__file__).parent
 def nile_local_level() -> LinearModel:
     """Yearly flow of the Nile at Aswan, in 10⁸ m³, as a random walk: StateSpaceModels.jl, test/models/locallevel.jl.
 
-    Its first covariance of 1e7 is before the first update, and this package predicts first.
+    Its first covariance of 1e7 holds before the first update, whereas this package predicts first.
     """
     return LinearModel(
         Phi=exact([["1"]]),
@@ -49,7 +49,7 @@ def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
 
     Parameters
     ----------
-    d : how far the measurements are from parallel. The shootout takes eps^(2/3) 10^(10 - k); the default is near
+    d : deviation of the measurements from parallel ones. The shootout takes eps^(2/3) 10^(10 - k); the default is near
         k = 8 of binary32.
     """
     e = Fraction(d)

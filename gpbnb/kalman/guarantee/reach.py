@@ -1,15 +1,17 @@
-r"""Sets that hold the error after each of the first steps, followed forward in time.
+r"""Sets that contain the error after each of the first steps, propagated forward in time.
 
-The certificate of :mod:`gpbnb.kalman.guarantee.envelope` goes back from one step, which costs as much as the steps
-before it. A filter that needs 30,000 steps to settle would cost a billion of them. Here one pass forward serves every
+The certificate of :mod:`gpbnb.kalman.guarantee.envelope` goes back from one step through all steps before it. For a
+filter that needs 30,000 steps to settle, this would take a billion of them. Here one forward pass serves every
 step. The error after a step lies in the Minkowski sum of
 
-* **segments**: the columns of the disturbances of the latest steps, each times its limit, moved on by the closed loops
+* **segments**: the columns of the disturbances of the latest steps, each times its limit, propagated by the closed
+loops
   of the steps since. They are exact, up to rounding in float64;
-* **ellipsoids** :math:`\{x: |a x| \le \sqrt{a M a^T}\ \text{for all}\ a\}`, one for each part of the bound. They take
+* **ellipsoids** :math:`\{x: |a x| \le \sqrt{a M a^T}\ \text{for all}\ a\}`, one for each part of the bound. They
+contain
   the segments of earlier steps.
 
-An ellipsoid takes in segments :math:`g_j` by the inequality of Cauchy and Schwarz: with any positive :math:`t, t_j` of
+An ellipsoid absorbs segments :math:`g_j` by the Cauchy-Schwarz inequality. For any positive :math:`t, t_j` of
 sum s,
 
 .. math:: \Big(\sqrt{aMa^T} + \sum_j|a g_j|\Big)^2 \le a\,s\Big(\frac Mt + \sum_j\frac{g_jg_j^T}{t_j}\Big)a^T.
@@ -38,22 +40,22 @@ from gpbnb.kalman.guarantee.envelope import ROUNDING, START
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
 _TINY = 1e-250
-"""Components below this are dropped, and 1e-240 is added to the slack for all that a step drops."""
+"""Components below this are dropped; 1e-240 is added to the slack for all components that a step drops."""
 
 
 class Reach(NamedTuple):
-    """The set that holds the error after one step: the sum of all segments and ellipsoids."""
+    """The set that contains the error after one step, the sum of all segments and ellipsoids."""
 
-    #: (window, columns, n), each -1 to 1 times a row.
+    #: (window, columns, n); each segment is a row times a number from -1 to 1.
     segments: NDArray[np.float64]
-    #: (columns,), the part of the bound that a segment belongs to.
+    #: (columns,), the part of the bound to which a segment belongs.
     kind: NDArray[np.int64]
     #: (3, n, n), one for each part.
     ellipsoids: NDArray[np.float64]
 
 
 def nothing(window: int, part: NDArray[np.int64], n: int) -> Reach:
-    """The set before the first step, which holds no error but zero; `part` is that of each column."""
+    """Return the set before the first step, which contains only zero; `part` is the part of each column."""
     kind = np.concatenate([part, np.full(n, ROUNDING, dtype=np.int64)])
     return Reach(np.zeros((window, len(kind), n)), kind, np.zeros((3, n, n)))
 
@@ -66,11 +68,12 @@ def forward(
 
     Parameters
     ----------
-    F, spread, G, limits, slack : fields of :class:`gpbnb.kalman.guarantee.envelope.Disturbances`, a row a step.
-    reach : the set after the steps before; it becomes that after the last step.
-    done : how many steps there were before.
+    F, spread, G, limits, slack : fields of :class:`gpbnb.kalman.guarantee.envelope.Disturbances`, one row for each
+        step.
+    reach : the set after the previous steps; it becomes the set after the last step.
+    done : number of previous steps.
     before : (n,), bound of the error before the first of these steps.
-    size : (n,), positive, scales of the states: the trace of an ellipsoid is taken in these units.
+    size : (n,), positive, scales of the states, which are the units of the trace of an ellipsoid.
     """
     n, g_count = F.shape[1], G.shape[2]
     segments, kind, ellipsoids = reach
@@ -119,7 +122,7 @@ def forward(
 
 @compiled
 def take_in(segments: Any, kind: Any, ellipsoids: Any, size: Any) -> None:
-    """Add segments, (w, columns, n), to the ellipsoid of their part."""
+    """Add segments (w, columns, n) to the ellipsoids, each to that of its part of the bound."""
     n = size.shape[0]
     for p in range(ellipsoids.shape[0]):
         M = ellipsoids[p]
@@ -158,7 +161,7 @@ def _length(segment: Any, size: Any) -> float:
 
 @compiled
 def _move_ellipsoid(loop: Any, M: Any) -> None:
-    """M becomes F M F^T, and no smaller."""
+    """Replace M by an upper bound of F M F^T."""
     n = M.shape[0]
     half, reached = np.zeros((n, n)), np.zeros(n)
     for i in range(n):
@@ -179,7 +182,7 @@ def _move_ellipsoid(loop: Any, M: Any) -> None:
 
 @compiled
 def support(reach: Any, a: Any, out: Any) -> None:
-    """Largest values of a x over the set, part by part, added to `out`, (4,)."""
+    """Add the largest values of a x over the set, part by part, to `out`, (4,)."""
     n = a.shape[0]
     for w in range(reach.segments.shape[0]):
         for c in range(reach.segments.shape[1]):
@@ -194,7 +197,7 @@ def support(reach: Any, a: Any, out: Any) -> None:
 
 @compiled
 def width(M: Any, a: Any) -> float:
-    """Largest value of a x over an ellipsoid, rounded up."""
+    """Return the largest value of a x over an ellipsoid, rounded up."""
     n = a.shape[0]
     s, reached = 0.0, 0.0
     for i in range(n):
@@ -226,8 +229,8 @@ def onward(
 
     Parameters
     ----------
-    lags : how many steps. reach : the set after step `first`. b : (n,), bound of the error before; the rows' rounding
-        errors meet it.
+    lags : number of steps. reach : the set after step `first`. b : (n,), bound of earlier errors, by which the
+        rounding errors of the rows are multiplied.
 
     Returns
     -------

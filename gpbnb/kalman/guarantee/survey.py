@@ -1,6 +1,6 @@
 """Emulated runs against guarantees: random stable filters in many formats, with random, constant and chosen inputs.
 
-``python -m gpbnb.kalman.guarantee.survey`` computes ``survey.csv`` anew; with ``--sample 20`` it recomputes that many
+``python -m gpbnb.kalman.guarantee.survey`` recomputes ``survey.csv``. With ``--sample 20`` it recomputes 20
 of its rows, chosen at random, and compares them.
 """
 
@@ -42,7 +42,7 @@ COLUMNS = (
 
 
 class Row(NamedTuple):
-    """A filter in a format, and the largest error over bound of any state, step and run of each kind."""
+    """A filter in a format, and the largest error / bound over states, steps and runs, for each kind of run."""
 
     seed: int
     n: int
@@ -58,7 +58,7 @@ class Row(NamedTuple):
 
 
 def compute(seed: int) -> Row:
-    """One row; everything is drawn from its seed."""
+    """Compute one row; its seed determines all random numbers."""
     rng = np.random.default_rng([19, seed])
     n, m = int(rng.integers(1, 5)), int(rng.integers(1, 3))
     A, B = rng.standard_normal((n, n)), rng.standard_normal((n, m))
@@ -89,7 +89,7 @@ def compute(seed: int) -> Row:
 
 
 def load(file: Path = FILE) -> tuple[Row, ...]:
-    """The stored rows."""
+    """Return the stored rows."""
     return tuple(
         Row(**{name: int(value) if name in _WHOLE else value for name, value in line.items()})  # type: ignore[arg-type]
         for line in read(file, COLUMNS, COMMAND).records()
@@ -97,7 +97,7 @@ def load(file: Path = FILE) -> tuple[Row, ...]:
 
 
 def sample(count: int, seed: int) -> list[tuple[Row, Row]]:
-    """Recompute some stored rows; pairs that differ."""
+    """Recompute some stored rows; return pairs that differ."""
     rows = load()
     chosen = np.random.default_rng(seed).choice(len(rows), min(count, len(rows)), replace=False)
     pairs = [(rows[i], compute(rows[i].seed)) for i in chosen]
@@ -105,11 +105,11 @@ def sample(count: int, seed: int) -> list[tuple[Row, Row]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the survey, or recompute a sample of it; non-zero if that differs."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Emulated runs against guarantees.")
-    parser.add_argument("--sample", type=int, default=0, help="rows to recompute and compare")
+    """Compute the survey, or recompute a sample; return a nonzero status if the sample differs."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Compare emulated runs with their guarantees.")
+    parser.add_argument("--sample", type=int, default=0, help="number of rows to recompute and compare")
     parser.add_argument("--seed", type=int, default=0, help="which rows")
-    parser.add_argument("--rows", type=int, default=ROWS, help="how many to compute")
+    parser.add_argument("--rows", type=int, default=ROWS, help="number of rows to compute")
     parser.add_argument("--output", type=Path, default=Path(".cache/guarantee"), help="folder for survey.csv")
     given = parser.parse_args(arguments)
     if given.sample:

@@ -1,4 +1,4 @@
-"""The checks of hung1982, ch. IV, and what they share."""
+"""The register of the checks of hung1982, ch. IV, and their common names."""
 
 from gpbnb.ledger.html import chapter
 from gpbnb.ledger.registry import Checks

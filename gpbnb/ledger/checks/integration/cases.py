@@ -1,7 +1,7 @@
 """Cases in which every symbol of savage2016 has its true value.
 
-The values come from the matrix exponential of (4), from direct integration and from the rule (2). None comes from a
-printed equation that it is to check.
+The values come from the matrix exponential of (4), from direct integration and from the rule (2), never from the
+printed equation that they check.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Case:
     drawn: tuple[sp.Rational, ...]
 
     def number(self, expression: sp.Expr) -> sp.Expr:
-        """An expression of the derivation with the values of this case."""
+        """Return an expression of the derivation with the values of this case."""
         return expression.subs({OMEGA: self.omega, T: self.period, P: self.steady})
 
     @property
@@ -58,7 +58,7 @@ class Case:
 
 @cache
 def cases() -> tuple[Case, ...]:
-    """Two cases with different numbers, none of them 0 or 1."""
+    """Return two cases with different numbers, none of them 0 or 1."""
     found = []
     for values, (states_before, noises) in zip(_VALUES, _BEFORE, strict=True):
         omega, period, variance = (sp.Rational(v) for v in values[:3])
@@ -69,20 +69,20 @@ def cases() -> tuple[Case, ...]:
 
 
 def at(now: Any, before: Any) -> Callable[[Any], Any]:
-    """Values of an indexed name at n and at n-1; other indices have none."""
+    """Return a function for an indexed name with values only at n and n-1."""
 
     def value(index: Any) -> Any:
         if index == N:
             return now
         if index == N - 1:
             return before
-        raise LookupError(f"this case has no value at the cycle {index}")
+        raise LookupError(f"got cycle {index}; needed a cycle at which this case has a value")
 
     return value
 
 
 def constants(case: Case) -> Names:
-    """Letters that every equation may use."""
+    """Return the letters that every equation may use."""
     phi = case.phi
     return {
         "omega_bw": case.omega,
@@ -99,7 +99,7 @@ def constants(case: Case) -> Names:
 
 @cache
 def states(case: Case) -> Names:
-    """The states of (10) before and after a cycle: true integral and trapezoidal rule."""
+    """Return the states of (10) before and after a cycle, with the true integral and the trapezoidal rule."""
     x1, x2, x3 = case.before
     q1, q2 = case.drawn
     phi = case.phi
@@ -116,7 +116,7 @@ def states(case: Case) -> Names:
 
 
 def extended(case: Case) -> tuple[sp.Matrix, sp.Matrix]:
-    """Transition matrix and noise covariance of (x_1, x_2, x_3), from (4) and the rule (2)."""
+    """Return transition matrix and noise covariance of (x_1, x_2, x_3), from (4) and the rule (2)."""
     half = case.period / 2
     phi = case.phi
     rule = sp.Matrix([[1, 0], [0, 1], [half, 0]])
@@ -125,7 +125,7 @@ def extended(case: Case) -> tuple[sp.Matrix, sp.Matrix]:
 
 
 def covariances(case: Case, before: sp.Matrix) -> Names:
-    """Covariances before and after a cycle, from those before it."""
+    """Return covariances before and after a cycle, from those before it."""
     step, added = extended(case)
     after = step * before * step.T + added
     names = constants(case)
@@ -141,14 +141,14 @@ def covariances(case: Case, before: sp.Matrix) -> Names:
 
 @cache
 def arbitrary(case: Case) -> Names:
-    """Covariances of a cycle that begins with an arbitrary covariance, which is not the steady one."""
+    """Return covariances of a cycle that starts with an arbitrary covariance, not the steady one."""
     x, y = sp.Rational(2, 3), sp.Rational(4, 7)
     return covariances(case, sp.Matrix([[x, 3 * y, 5 * x], [3 * y, 7 * y, x + y], [5 * x, x + y, 11 * x * y]]))
 
 
 @cache
 def from_zero(case: Case) -> Names:
-    """Covariances of cycle n when the input is steady at the start and the integrals are zero."""
+    """Return covariances of cycle n if the input starts in its steady state and the integrals start at zero."""
     step, added = extended(case)
     before = sp.diag(case.steady, 0, 0)
     for _ in range(case.cycle - 1):
@@ -158,7 +158,7 @@ def from_zero(case: Case) -> Names:
 
 @cache
 def steady(case: Case) -> Names:
-    """Covariances of a cycle in the steady state: P_11, P_12 and P_31 return to their values."""
+    """Return covariances of a cycle in the steady state, in which P_11, P_12 and P_31 do not change."""
     step, added = extended(case)
     c12, c13 = sp.symbols("c12 c13")
     before = sp.Matrix([[case.steady, c12, c13], [c12, 2, 3], [c13, 3, 5]])
@@ -169,9 +169,9 @@ def steady(case: Case) -> Names:
 
 
 def closed_form(case: Case, cycles: int) -> sp.Expr:
-    """Error variance after some cycles from the covariances of the errors of single cycles, without (10)-(34).
+    """Return the error variance after some cycles from the covariances of single cycles' errors, without (10)-(34).
 
-    The errors of single cycles have the variance r_0, and the covariance r_1 φ^(k-1) at a distance of k cycles.
+    The errors of single cycles have the variance r_0. Two errors k cycles apart have the covariance r_1 φ^(k-1).
     """
     r0, r1 = errors_of_cycles(case)
     phi = case.phi[0, 0]
@@ -181,7 +181,7 @@ def closed_form(case: Case, cycles: int) -> sp.Expr:
 
 @cache
 def errors_of_cycles(case: Case) -> tuple[sp.Expr, sp.Expr]:
-    """r_0 and r_1: variance of the error of a cycle, and covariance with that of the next."""
+    """Return r_0 and r_1, the variance of a cycle's error and its covariance with the error of the next cycle."""
     s, u = sp.symbols("s u", positive=True)
     w, period = case.omega, case.period
 
@@ -193,13 +193,13 @@ def errors_of_cycles(case: Case) -> tuple[sp.Expr, sp.Expr]:
     ends = 2 * half**2 * (kernel(sp.Integer(0)) + kernel(period))
     mixed = 2 * half * sp.integrate(kernel(s), (s, 0, period))
     r0 = ends + squared - 2 * mixed
-    # Trapezoid and integral of one cycle, times those of the next, which begins where the first ends.
+    # Trapezoid and integral of one cycle times those of the next cycle, which starts where the first ends.
     before = half * (1 + sp.exp(w * period)) - sp.integrate(sp.exp(w * u), (u, 0, period))
     after = half * (1 + sp.exp(-w * period)) - sp.integrate(sp.exp(-w * u), (u, 0, period))
     return r0, case.steady * sp.exp(-w * period) * before * after
 
 
 def walk_rate(case: Case) -> sp.Expr:
-    """Growth of the error variance per second after many cycles: (r_0 + 2 r_1/(1-φ))/T."""
+    """Return the growth of the error variance per second after many cycles, (r_0 + 2 r_1/(1-φ))/T."""
     r0, r1 = errors_of_cycles(case)
     return (r0 + 2 * r1 / (1 - case.phi[0, 0])) / case.period

@@ -9,5 +9,5 @@ MAIN = "savage2016.main."
 
 
 def eq(*numbers: str) -> tuple[str, ...]:
-    """Ids of equations."""
+    """Return the ids of equations."""
     return tuple(f"{MAIN}eq{number}" for number in numbers)

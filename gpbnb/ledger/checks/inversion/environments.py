@@ -1,7 +1,7 @@
-"""True values of the symbols of section 11: elimination and back substitution with all their roundings, exact.
+"""Exact values of the symbols of section 11, from elimination and back substitution with all their roundings.
 
-Each operation is rounded by a function: :func:`to_first_order` multiplies a result by 1 + ε and drops ε², as the
-documents do; a format rounds to its digits.
+A function rounds each operation. :func:`to_first_order` multiplies a result by 1 + ε and drops ε², as the documents do.
+A format rounds to its digits.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Round = Callable[[FirstOrder], FirstOrder]
 
 
 class Named(FirstOrder):
-    """A matrix with a name in the documents, whose entries, stages or blocks a function gives."""
+    """A matrix named in the documents, whose entries, stages or blocks a function returns."""
 
     def __init__(self, whole: FirstOrder, look: Callable[..., Any]) -> None:
         super().__init__(whole.value, whole.slope)
@@ -46,7 +46,7 @@ def rounded_to(fmt: FloatFormat) -> Round:
 
 
 def known(values: dict[tuple[int, ...], Any]) -> Callable[..., Any]:
-    """Look up a value by its indices; KeyError where there is none."""
+    """Return a function that looks up a value by its indices, or raises KeyError."""
     return lambda *where: values[tuple(map(int, where))]
 
 
@@ -57,7 +57,7 @@ class Elimination:
     Parameters
     ----------
     given : (n, n) and (n, p), Fractions: the matrix and the right-hand sides.
-    rounded : how each operation is rounded.
+    rounded : function that rounds each operation.
     """
 
     a: NDArray[Any]
@@ -71,7 +71,7 @@ class Elimination:
 
     @cached_property
     def stages(self) -> tuple[list[FirstOrder], list[FirstOrder], dict[tuple[int, ...], FirstOrder]]:
-        """Matrices (A, b) after each step: the exact step on computed numbers, the computed one; and multipliers."""
+        """(A, b) after each step: the exact step from computed numbers, the computed step, and the multipliers."""
         n, width, fl = self.n, self.n + self.b.shape[1], self.rounded
         first = FirstOrder(np.hstack([self.a, self.b]))
         exact, computed = [first], [first]
@@ -93,20 +93,20 @@ class Elimination:
 
     @cached_property
     def lower(self) -> FirstOrder:
-        """L, of the quotients of computed numbers."""
+        """L, made of the exact quotients of computed numbers."""
         low = [[FirstOrder(Fraction(i == j)) for j in range(self.n)] for i in range(self.n)]
         for (i, k), m in self.stages[2].items():
             low[i - 1][k - 1] = -m
         return matrix(low)
 
     def part(self, stage: FirstOrder, right: bool) -> FirstOrder:
-        """The matrix, or the right-hand sides, of a stage."""
+        """Return the matrix or the right-hand sides of a stage."""
         columns = slice(self.n, None) if right else slice(0, self.n)
         return FirstOrder(stage.value[:, columns], stage.slope[:, columns])
 
     @cached_property
     def solution(self) -> list[list[FirstOrder]]:
-        """The rows of x̂, a column for each right-hand side."""
+        """The rows of x̂, with a column for each right-hand side."""
         n, fl = self.n, self.rounded
         last = entries(self.stages[1][-1])
         found: list[list[FirstOrder]] = [[] for _ in range(n)]
@@ -119,7 +119,7 @@ class Elimination:
         return found
 
     def errors(self, right: bool) -> list[FirstOrder]:
-        """Ã(k) or b̃(k): what step k adds to the exact step on computed numbers."""
+        """Return Ã(k) or b̃(k), the error of step k compared with the exact step from computed numbers."""
         exact, computed, _ = self.stages
         return [
             self.part(computed[k], right) - self.part(exact[k], right) if k else self.part(exact[0], right) * 0
@@ -127,7 +127,7 @@ class Elimination:
         ]
 
     def sizes(self, right: bool) -> NDArray[Any]:
-        """The sum over k of 3|Â_k(k)| + 2|Â_k(k-1)|, without β."""
+        """Return the sum over k of 3|Â_k(k)| + 2|Â_k(k-1)|, without β."""
         total = 0 * abs(self.part(self.stages[1][0], right).value)
         for k in range(1, self.n):
             new, old = (abs(block(self.part(self.stages[1][i], right), k).value) for i in (k, k - 1))
@@ -135,7 +135,7 @@ class Elimination:
         return np.asarray(total)
 
     def names(self) -> dict[str, Any]:
-        """The symbols of section 11.1; of the right-hand sides, the first."""
+        """Return the symbols of section 11.1, with the first right-hand side."""
         exact, computed, multipliers = self.stages
 
         def staged(stages: list[FirstOrder], right: bool, errors: bool = False) -> Named:
@@ -152,7 +152,10 @@ class Elimination:
                 i, *rest = map(int, where)
                 j, k = (self.n + 1, *rest) if right and rest else (self.n + 1, 0) if right else (*rest, 0)[:2]
                 if not 1 <= i <= self.n or not (right or 1 <= j <= self.n) or not 0 <= k < min(i, j):
-                    raise KeyError(f"no entry {where}: the documents name an entry by the last step that changed it")
+                    raise KeyError(
+                        f"got the entry {where}; needed the last step that changed the entry, by which "
+                        "the documents name it"
+                    )
                 return FirstOrder(stages[k].value[i - 1, j - 1], stages[k].slope[i - 1, j - 1])
 
             return look
@@ -168,7 +171,9 @@ class Elimination:
                     for t, c in zip(true, new, strict=True):
                         if t.value and t == value:
                             return c
-            raise LookupError("no quantity of the elimination has this exact value")
+            raise LookupError(
+                "got a value that no quantity of the elimination has; needed the exact value of one of them"
+            )
 
         return {
             "n": Fraction(self.n),
@@ -195,24 +200,24 @@ class Elimination:
 
 
 def entries(x: FirstOrder) -> list[list[FirstOrder]]:
-    """The rows of a matrix, entry by entry."""
+    """Return the entries of a matrix by row and column."""
     return [[FirstOrder(v, s) for v, s in zip(*rows, strict=True)] for rows in zip(x.value, x.slope, strict=True)]
 
 
 def column(x: FirstOrder, j: int = 1) -> FirstOrder:
-    """The jth column."""
+    """Return the jth column."""
     return FirstOrder(x.value[:, j - 1 : j], x.slope[:, j - 1 : j])
 
 
 def block(x: FirstOrder, k: int = 0) -> FirstOrder:
-    """Zeros in the first k rows and, of a square matrix, in the first k columns: (58)."""
+    """Set the first k rows and, for a square matrix, the first k columns to zero, as in (58)."""
     kept = np.array([[Fraction(i >= k and (x.value.shape[1] == 1 or j >= k)) for j in range(x.value.shape[1])]
                      for i in range(len(x.value))], dtype=object)  # fmt: skip
     return FirstOrder(x.value * kept, x.slope * kept)
 
 
 def random_matrix(rng: random.Random, rows: int, columns: int, fractions: bool = True) -> NDArray[Any]:
-    """Fractions of sizes up to 9, or whole numbers of up to three digits; never zero and never one."""
+    """Draw Fractions of sizes up to 9, or whole numbers of up to three digits, never zero or one."""
 
     def entry() -> Fraction:
         if fractions:
@@ -224,7 +229,7 @@ def random_matrix(rng: random.Random, rows: int, columns: int, fractions: bool =
 
 @cache
 def eliminations(n: int) -> tuple[Names, ...]:
-    """Symbols of random systems of n rows, to first order; i and j, or k, are the indices of some entry."""
+    """Return symbols of random systems of n rows, to first order; i and j, or k, are the indices of some entry."""
     found = []
     for seed, (i, j, k) in enumerate(((2, 3, n - 1), (3, 2, n))):
         rng = random.Random(100 * n + seed)
@@ -237,7 +242,7 @@ FORMATS = (FloatFormat(10, 4), FloatFormat(10, 7), FloatFormat(2, 11, Rounding.C
 
 
 def cancelling(system: NDArray[Any], fmt: FloatFormat) -> NDArray[Any]:
-    """Change entries of (A, b) so that 3a(1) and 2a(0) nearly cancel in steps 1 and 2: then the product is a(0)/3."""
+    """Change entries of (A, b) so that 3a(1) and 2a(0) nearly cancel in steps 1 and 2; the product is then a(0)/3."""
     system = system.copy()
     n = len(system)
     for j in (1, n):  # entry (2, 2) and the right side of row 2, in step 1
@@ -251,7 +256,7 @@ def cancelling(system: NDArray[Any], fmt: FloatFormat) -> NDArray[Any]:
 
 @cache
 def runs(n: int) -> tuple[tuple[Elimination, Names, Fraction], ...]:
-    """Eliminations with the digits of a format: with their symbols, β for ε, and with β."""
+    """Return eliminations in the digits of a format, with their symbols, where β replaces ε, and with β."""
     found = []
     for fmt in FORMATS:
         for seed in range(8):
@@ -270,7 +275,7 @@ def runs(n: int) -> tuple[tuple[Elimination, Names, Fraction], ...]:
 
 @cache
 def roundings(n: int) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
-    """How often each a_kj and each b_k is rounded, counted with an error of its own for each operation."""
+    """Count how often each a_kj and each b_k is rounded, with a separate error for each operation."""
     rows, rights = [], []
     for k in range(1, n + 1):
         right, products = derivation.back_row_weights(n - k)
@@ -280,7 +285,7 @@ def roundings(n: int) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
 
 
 def weights(n: int) -> tuple[FirstOrder, FirstOrder]:
-    """The same as a matrix (n, n) and a diagonal matrix (n, n)."""
+    """Return the counts of :func:`roundings` as a matrix (n, n) and a diagonal matrix (n, n)."""
     rows, rights = roundings(n)
     return (
         FirstOrder(np.array([[Fraction(x) for x in row] for row in rows], dtype=object)),
@@ -289,7 +294,7 @@ def weights(n: int) -> tuple[FirstOrder, FirstOrder]:
 
 
 def diagonal(numbers: list[Fraction]) -> FirstOrder:
-    """A diagonal matrix."""
+    """Return a diagonal matrix."""
     n = len(numbers)
     return FirstOrder(
         np.array([[numbers[i] if i == j else Fraction(0) for j in range(n)] for i in range(n)], dtype=object)
@@ -297,23 +302,23 @@ def diagonal(numbers: list[Fraction]) -> FirstOrder:
 
 
 def on_diagonal(x: FirstOrder) -> Named:
-    """A diagonal matrix whose entries have one index."""
+    """Return a diagonal matrix whose entries have one index."""
     return Named(x, known({(k + 1,): row[k] for k, row in enumerate(entries(x))}))
 
 
 def vector(x: FirstOrder) -> Named:
-    """A column with its entries."""
+    """Return a column with its entries."""
     return Named(x, known({(i + 1,): row[0] for i, row in enumerate(entries(x))}))
 
 
 def square(x: FirstOrder) -> Named:
-    """A matrix with its entries."""
+    """Return a matrix with its entries."""
     return Named(x, known({(i + 1, j + 1): c for i, row in enumerate(entries(x)) for j, c in enumerate(row)}))
 
 
 @cache
 def substitutions(n: int) -> tuple[Names, ...]:
-    """Symbols of section 11.2 for random triangular systems of n rows; k and j are the indices of some entry."""
+    """Return symbols of section 11.2 for random triangular systems of n rows; k and j are the indices of some entry."""
     found = []
     for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1))):
         rng = random.Random(7000 + 10 * n + seed)
@@ -355,7 +360,7 @@ def substitutions(n: int) -> tuple[Names, ...]:
 
 @cache
 def inverses(n: int = 3) -> tuple[Names, ...]:
-    """Symbols of section 11.3: the inverse of a random matrix, by elimination and back substitution."""
+    """Return symbols of section 11.3 for the inverse of a random matrix by elimination and back substitution."""
     found = []
     for seed, j in enumerate((1, 2, n)):
         rng = random.Random(9000 + seed)
@@ -404,7 +409,7 @@ def inverses(n: int = 3) -> tuple[Names, ...]:
 
 @cache
 def factored_errors() -> tuple[Names, ...]:
-    """Symbols of (96) and (97): errors of first order that are a computed inverse times a matrix E, or D."""
+    """Return symbols of (96) and (97) for first-order errors that are a computed inverse times a matrix E or D."""
     found = []
     for seed in range(3):
         rng = random.Random(9600 + seed)
@@ -426,12 +431,12 @@ def factored_errors() -> tuple[Names, ...]:
 
 @cache
 def residues(changed: bool, sharp: bool = False) -> tuple[Names, ...]:
-    """Symbols of section 10: computed inverses of A, or of A + ΔA, and their residues.
+    """Return symbols of section 10: computed inverses of A or of A + ΔA, and their residues.
 
     Parameters
     ----------
-    changed : whether there is a ΔA. Residue and ΔA are then of first order, else the residue is of any size.
-    sharp : add a multiple of the identity, for which the norms of the documents are attained.
+    changed : whether there is a ΔA. If so, residue and ΔA are of first order; otherwise the residue has any size.
+    sharp : whether to add a multiple of the identity, for which the documents' norms are attained.
     """
     found = []
     for seed in range(3):

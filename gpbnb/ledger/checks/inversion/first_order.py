@@ -11,7 +11,7 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
 
 
 class FirstOrder:
-    """A number, or a matrix, and the coefficient of ε in it; ``*`` of two matrices is their matrix product.
+    """A number or a matrix, and the coefficient of ε in it; ``*`` of two matrices is their matrix product.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class FirstOrder:
 
     def __pow__(self, exponent: Any) -> FirstOrder:
         if exponent != int(exponent) or exponent < 1:
-            raise ValueError(f"got the exponent {exponent}; needed a whole number from 1")
+            raise ValueError(f"got exponent {exponent}; needed an integer of at least 1")
         return self if exponent == 1 else self * self ** (exponent - 1)
 
     __radd__ = __add__
@@ -73,7 +73,7 @@ class FirstOrder:
 
     def __abs__(self) -> FirstOrder:
         if np.any(self.slope) and np.any(self.value):
-            raise ValueError("got a quantity with a rounding error; needed an exact one, or an error alone")
+            raise ValueError("got a quantity with a rounding error; needed an exact quantity or a pure error")
         return FirstOrder(abs(self.value), abs(self.slope))
 
     def __eq__(self, other: object) -> bool:
@@ -85,20 +85,20 @@ class FirstOrder:
         )
 
     def __le__(self, other: Any) -> bool:
-        """Whether no entry is larger: first the values count, then the slopes, as for a small positive ε."""
+        """Whether no entry is larger for small positive ε: values are compared first, then slopes."""
         found = quantity(other)
         equal = self.value == found.value
         return bool(np.all((self.value < found.value) | (equal & (self.slope <= found.slope))))
 
     def norm(self) -> FirstOrder:
-        """Largest column sum of sizes, (22), and of a column its largest entry, (21)."""
+        """Return the largest column sum of sizes, (22), or the largest entry of a column, (21)."""
         sizes = abs(self)
         largest = (lambda x: x.max()) if sizes.value.shape[1] == 1 else column_sum_norm
         return FirstOrder(largest(sizes.value), largest(sizes.slope))
 
 
 def quantity(x: Any) -> FirstOrder:
-    """A number or matrix, given in any form, with its rounding error."""
+    """Convert a number or a matrix of any type to a quantity with its rounding error."""
     if isinstance(x, FirstOrder):
         return x
     if isinstance(x, np.ndarray):
@@ -107,7 +107,7 @@ def quantity(x: Any) -> FirstOrder:
 
 
 def matrix(rows: list[Any]) -> FirstOrder:
-    """The matrix with these rows of numbers; a flat list is a row."""
+    """Return the matrix with these rows of numbers; a flat list gives one row."""
     table = [[quantity(cell) for cell in (row if isinstance(row, list) else rows)] for row in rows]
     table = table if isinstance(rows[0], list) else table[:1]
     return FirstOrder(
@@ -117,7 +117,7 @@ def matrix(rows: list[Any]) -> FirstOrder:
 
 
 def joined(columns: list[FirstOrder]) -> FirstOrder:
-    """The matrix with these columns."""
+    """Return the matrix with these columns."""
     return FirstOrder(np.hstack([c.value for c in columns]), np.hstack([c.slope for c in columns]))
 
 

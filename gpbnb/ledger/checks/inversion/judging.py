@@ -35,7 +35,7 @@ def holds(printed: Statement, environments: Iterable[Names], sharp: bool = True)
     ----------
     printed : the statement.
     environments : the true values of its symbols, one mapping per instance.
-    sharp : whether an inequality must be an equality in at least one environment, so that its coefficients count.
+    sharp : whether an inequality must be an equality in some environment, so that larger coefficients are detected.
     """
     attained: dict[int, bool] = {}
     for names in environments:
@@ -52,14 +52,14 @@ def says(printed: Statement, **expected: str) -> bool:
 
 
 def corrected(printed: Statement, form: str) -> Statement:
-    """The statement with the form it was meant to have."""
+    """Return the statement with its intended form."""
     return replace(printed, form=form)
 
 
 def slip(
     printed: Statement, environments: Iterable[Names], meant: str, recomputed: str, note: str, sharp: bool = True
 ) -> Finding:
-    """Judge a statement with a slip: a misprint if the form that is meant holds, wrong if not."""
+    """Judge a statement that fails: it has a misprint if the intended form holds, otherwise it is wrong."""
     environments = tuple(environments)
     return compare(
         holds(printed, environments),

@@ -1,4 +1,4 @@
-"""Inverses computed in formats of a few digits, with everything that was computed on the way, exact."""
+"""Inverses computed in formats of a few digits, with all intermediate results, exact."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Sample:
 
     @cached_property
     def inverse(self) -> Matrix:
-        """The true inverse of the given matrix, its rows in the order of elimination."""
+        """The true inverse of the given matrix with its rows in the order of elimination."""
         return inverse_of(self.reduction.stages[0])
 
     @cached_property
@@ -52,7 +52,7 @@ class Sample:
 
 @cache
 def samples() -> tuple[Sample, ...]:
-    """Random matrices of two to four rows in three formats, with and without pivoting, and the matrix of 11.4."""
+    """Return random matrices of two to four rows in three formats, with or without pivoting, and that of 11.4."""
     rng = np.random.default_rng(1984)
     found = [Sample(FOUR.array(example.MATRIX), False)]
     for fmt in (FOUR, FloatFormat(10, 7), FloatFormat(2, 11, Rounding.CHOP)):
@@ -63,6 +63,6 @@ def samples() -> tuple[Sample, ...]:
 
 
 def of_example(norm: Callable[[Matrix], Any] = column_sum_norm) -> tuple[Sample, float]:
-    """The example of 11.4 in four digits, and the norm of its error."""
+    """Return the example of 11.4 in four digits, and the norm of its error."""
     sample = samples()[0]
     return sample, float(norm(sample.error))

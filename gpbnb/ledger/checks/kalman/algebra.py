@@ -1,7 +1,7 @@
-"""The report's own error algebra, derived again: what each letter of (102)-(125) stands for, to first order.
+"""Derive the report's own error algebra again, with the meaning of each letter of (102)-(125) to first order.
 
 The report gives every matrix one ε, so matrices become plain symbols. Each function returns the derived values of the
-letters of a group of equations; a printed chain is right if its sides agree to first order in ε.
+letters in a group of equations. A printed chain is right if its sides agree to first order in ε.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ COMMON: dict[str, Any] = {
 
 
 def _at(index: sp.Expr, value: sp.Expr, name: str) -> Callable[[Any], Any]:
-    """A letter that is known at one index only."""
+    """Return a letter that is known only at one index."""
     return lambda i: value if sp.expand(i - index) == 0 else sp.Symbol(f"{name}[{i}]")
 
 
 @cache
 def prediction() -> dict[str, Any]:
-    """Letters of (102) and (103); the product in (100) is what Q leaves of P_kp."""
+    """Return the letters of (102) and (103); the product in (100) is P_kp - Q."""
     error, phi = d.prediction_error(), sp.Symbol("phi", positive=True)
     return COMMON | {
         "phi": _at(d.K - 1, phi, "phi"), "P": _at(d.K - 1, (d.PP - d.Q) / phi**2, "P"), "Q": _at(d.K - 1, d.Q, "Q"),
@@ -40,7 +40,7 @@ def prediction() -> dict[str, Any]:
 
 @cache
 def covariance() -> dict[str, Any]:
-    """Letters of (104), (105) and the line before (107), with K H P_kp = P_kp - P_k."""
+    """Return the letters of (104), (105) and the line before (107), with K H P_kp = P_kp - P_k."""
     predicted = d.prediction_error().subs(d.Q, d.CQ * d.PP / d.P)
     error = d.covariance_error()
     return COMMON | {
@@ -51,7 +51,7 @@ def covariance() -> dict[str, Any]:
 
 @cache
 def gain() -> dict[str, Any]:
-    """Letters of (106)-(108), with K = P H' R^-1 and the covariance of the line before (107)."""
+    """Return the letters of (106)-(108), with K = P H' R^-1 and the covariance of the line before (107)."""
     P, PP = d.KZ * R / H, d.KREST * R / H
     rounded = P + d.EPS * d.covariance_error().subs({d.P: P, d.PP: PP, d.CQ: 0}, simultaneous=True)
     error = d.gain_error()
@@ -63,7 +63,7 @@ def gain() -> dict[str, Any]:
 
 @cache
 def loop() -> dict[str, Any]:
-    """Letters of (112)-(116), with K H Phi = Phi - F and the gain of (108)."""
+    """Return the letters of (112)-(116), with K H Phi = Phi - F and the gain of (108)."""
     K = (d.PHI - d.FK) / (d.PHI * H)
     F_hat, u_hat = d.FK + d.EPS * d.transition_error(), d.U + d.EPS * d.input_error()
     state = F_hat * d.X * (1 + (d.N + 1) * d.EPS) + u_hat * (1 + d.EPS)
@@ -76,7 +76,7 @@ def loop() -> dict[str, Any]:
 
 @cache
 def restated() -> dict[str, Any]:
-    """Letters of (117): the closed loop and the input with the counts of (114)."""
+    """Return the letters of (117): the closed loop and the input with the counts of (114)."""
     once = d.ONCE
     return loop() | {
         "F_hat_k": d.FK * (1 + once[0] * d.EPS),
@@ -87,7 +87,7 @@ def restated() -> dict[str, Any]:
 
 @cache
 def three_steps(twice: bool) -> dict[str, Any]:
-    """Letters of three steps of (117); with the roundings counted once, or twice as (119) does."""
+    """Return the letters of three steps of (117), with roundings counted once, or twice as in (119)."""
     found = dict(COMMON)
     loops, inputs = d.TWICE if twice else d.ONCE
     exact = rounded = sp.Symbol("x_0")
@@ -103,7 +103,7 @@ def three_steps(twice: bool) -> dict[str, Any]:
 
 @cache
 def norms() -> dict[str, Any]:
-    """Letters of (122), (124) and (125): each norm of an error is the bound that the report's algebra gives it."""
+    """Return the letters of (122), (124) and (125); each norm of an error is its bound by the report's algebra."""
     first, second = d.count_start(d.TWICE[0]), d.second_coefficient(*d.TWICE)
     values = {sp.Symbol(f"x_{k}"): NORM_X for k in "34k"}
     for k, number in (("3", 3), ("4", 4), ("k", d.K)):
@@ -118,8 +118,8 @@ def norms() -> dict[str, Any]:
 def holds(printed: Statement, names: dict[str, Any]) -> bool:
     """Whether a printed chain holds to first order in ε.
 
-    Both sides of an equation agree. The right side of an inequality may in addition lack terms of the left that are
-    negative for positive ε, as the report drops them; any other difference is an error.
+    Both sides of an equation must agree. The right side of an inequality may omit terms of the left side that are
+    negative for positive ε, because the report drops them. Any other difference is an error.
     """
     links = printed.links(names)
     return bool(links) and all(_agree(link.left, link.symbol, link.right) for link in links)
@@ -137,7 +137,7 @@ def _agree(left: Any, symbol: str, right: Any) -> bool:
 
 
 def _dropped(left: Any, change: Any) -> bool:
-    """Whether the change takes away whole terms of the left side that are negative."""
+    """Whether the change only removes whole negative terms of the left side."""
     terms = sp.Poly(sp.cancel(left), *_BASIS).as_dict()
     for powers, coefficient in sp.Poly(sp.cancel(change), *_BASIS).as_dict().items():
         before = terms.get(powers, sp.Integer(0))

@@ -1,4 +1,4 @@
-"""How far a rounded filter in four digits exceeds what the report allows it."""
+"""How far a filter in four digits exceeds the report's bounds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gpbnb.ledger.finding import Finding, Verdict, compare
 
 @cache
 def excess(statement: str) -> float:
-    """How many times a rounded filter in four digits exceeds what a printed statement allows it; see the code."""
+    """Return error / bound for a printed statement and a filter in four digits; see the code."""
     scalar, beta = smallest.scalar(FOUR), FOUR.unit_roundoff
     fl = FOUR.round
     if statement in ("(105)", "(108)", "(125)"):
@@ -52,21 +52,21 @@ def excess(statement: str) -> float:
 
 
 def exceeded(place: str, algebra: bool, note: str, root: str, name: str = "") -> Finding:
-    """Judge a printed step by the report's own algebra and by what a rounded filter does.
+    """Judge a printed step by the report's own algebra and by a rounded filter.
 
     Parameters
     ----------
     place : the equation whose bound is compared with the filter.
     algebra : whether the printed terms follow by the report's own algebra.
     note, root : why it is wrong.
-    name : of the statement, where it is another.
+    name : name of the statement, if it differs.
     """
     times = excess(place)
     right = "follow" if algebra else "do not follow"
     return compare(
         algebra and times <= 1,
-        f"the printed terms {right} from the report's own algebra; in four digits, the error of a filter is "
-        f"{times:.3g} times what {name or place} allows",
+        f"the printed terms {right} from the report's own algebra; in four digits, the error of an "
+        f"example filter is {times:.3g} times what {name or place} allows",
         Verdict.WRONG,
         otherwise_note=note,
         root=root,

@@ -1,4 +1,4 @@
-"""An exact filter run by weighted least squares, against which the printed equations of the filter are evaluated."""
+"""An exact filter run by weighted least squares, for evaluating the printed equations of the filter."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _LETTERS = ("Phi", "H", "Q", "R", "z", "x", "P", "prior", "K", "F", "u")
 
 @cache
 def least_squares_run() -> dict[str, dict[int, sp.Matrix]]:
-    """Five steps of a random filter, each matrix by its letter and index.
+    """Return five steps of a random filter, with each matrix by letter and index.
 
     Estimates, covariances, gains and closed loops come from the weighted least squares of prediction and measurement,
     solved through the information matrix, and not from the filter's equations. All matrices change from step to step.
@@ -53,12 +53,12 @@ def _by_index(values: Mapping[int, sp.Matrix]) -> Callable[[Any], sp.Matrix]:
 
 
 def names(k: int) -> dict[str, Any]:
-    """What the letters of section 12 stand for in step k of the run; KeyError for an index beyond it."""
+    """Return the values of the letters of section 12 in step k of the run; KeyError for an index outside it."""
     run = least_squares_run()
     found: dict[str, Any] = {letter: _by_index(run[letter]) for letter in ("Phi", "H", "Q", "R", "z", "x", "P", "K")}
     found |= {"phi": found["Phi"], "x_star": found["x"], "F": _by_index(run["F"]), "u": _by_index(run["u"])}
     found |= {"k": sp.Integer(k), "P_kp": run["prior"][k], "I": sp.eye(STATES), "x_0": run["x"][0]}
-    return found | {"K_p": 2 * run["K"][k]}  # (101) prints it, and no equation says what it is
+    return found | {"K_p": 2 * run["K"][k]}  # (101) contains this letter, which no equation defines
 
 
 def holds_exactly(printed: Statement) -> bool:

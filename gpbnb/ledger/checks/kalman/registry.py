@@ -1,4 +1,4 @@
-"""The checks of hung1984, ch. II, and hung1982, ch. III, sections 12 and 13, and what they share."""
+"""The checks of hung1984, ch. II, and hung1982, ch. III, sections 12 and 13, and their common names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Simulated records on which several checks of hung1984, ch. III, rest."""
+"""Simulated records for several checks of hung1984, ch. III."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gpbnb.rolling.theory import DRIFTS, FLOWN_DENSITY, LEVEL, PERIOD
 
 @cache
 def spectra() -> experiment.Spectra:
-    """A short record, 600 turns, of a drift that is as strong beside its noise as that of a year."""
+    """Return a short record, 600 turns, with the signal-to-noise ratio of a year."""
     samples = 36000
     return experiment.spectra(DRIFTS[1] * YEAR / (10.0 * samples), np.random.default_rng(3), 4, samples=samples)
 
@@ -27,7 +27,7 @@ def noise_spectrum() -> tuple[experiment.Spectrum, experiment.Slope]:
 
 @cache
 def stages() -> dict[str, np.ndarray]:
-    """A drift through (5)-(7) with noise, 20 turns of 600 s."""
+    """Return a drift with noise passed through (5)-(7), for 20 turns of 600 s."""
     return experiment.derolled_record((2e6, 1e6), 400.0, PERIOD, np.random.default_rng(2), 1200)
 
 
@@ -40,7 +40,7 @@ def filter_study() -> experiment.FilterStudy:
 
 @cache
 def walk_errors() -> np.ndarray:
-    """Drift errors, never reset and reset every 100 steps of 600 s, of 200 random walks of the roll rate."""
+    """Return drift errors for 200 random walks of the roll rate, without resets and with one per 100 steps of 600 s."""
     walks = experiment.rate_walks(WALK, 200, 52560, 600.0, np.random.default_rng(9))
     return experiment.roll_rate_errors(DRIFTS[0], walks, 600.0, [None, 100])
 
@@ -50,12 +50,12 @@ WALK = 3e-6 / YEAR**3
 
 
 def deviation(found: float, expected: float, error: float) -> float:
-    """Difference in standard errors."""
+    """Return the difference in standard errors."""
     return (found - expected) / error
 
 
 def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16) -> np.ndarray:
-    """Lag and exact noise of the filters of a study; noise at the time where its logarithm has its mean."""
+    """Return lag and exact noise of a study's filters; the noise is taken where its logarithm has its mean."""
     middle = round(duration / theory.INTERVAL / math.e)
     expected = []
     for name, lag, width in zip(study.names, study.lag, study.bandwidth, strict=True):
@@ -69,5 +69,5 @@ def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16)
 
 
 def lag_constant(lag: float, interval: float = theory.INTERVAL) -> float:
-    """Time constant of the single pole of a given lag."""
+    """Return the time constant of a single pole with a given lag."""
     return interval / math.log1p(interval / lag)

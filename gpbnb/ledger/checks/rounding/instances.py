@@ -1,7 +1,7 @@
 """Instances in which printed relations are evaluated, and the judgement of relations over many instances.
 
-Every name of a relation gets a value that is computed without the relation: by exact arithmetic, by an emulated format,
-or from independent rounding errors. A bound is judged right if it holds in all instances and one of them attains it.
+Every name in a relation gets a value that is computed without the relation: by exact arithmetic, in an emulated format,
+or from independent rounding errors. A bound is judged right if it holds in all instances and some instance attains it.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from gpbnb.rounding import experiment
 Names = Mapping[str, Any]
 
 BETA = Fraction(1, 10**40)
-"""Unit roundoff of the instances for first-order statements: so small that its square counts for nothing."""
+"""Unit roundoff of the instances for first-order statements, so small that its square is negligible."""
 SECOND_ORDER = Fraction(1, 10**60)
-"""Differences below this are of second order in :data:`BETA`; the data are of order one."""
+"""Differences below this value are of second order in :data:`BETA`, because the data are of order one."""
 ATTAINED = Fraction(99, 100)
-"""A bound is attained where the value reaches this share of it."""
+"""A bound counts as attained if the value reaches this share of it."""
 
 
 # -- judging relations over instances -------------------------------------------------------------
@@ -35,12 +35,12 @@ ATTAINED = Fraction(99, 100)
 
 @dataclass(frozen=True)
 class Judgement:
-    """How some relations fare in all instances.
+    """The outcome of some relations in all instances.
 
     Parameters
     ----------
-    instances : how many there are.
-    violated : in how many of them a comparison fails.
+    instances : number of instances.
+    violated : number of instances in which a comparison fails.
     loose : printed inequalities that no instance attains.
     """
 
@@ -55,12 +55,12 @@ class Judgement:
 
     @property
     def right(self) -> bool:
-        """Whether the relations hold and every bound among them is attained, so that none can be tightened."""
+        """Whether the relations hold and every bound is attained, so that no bound can be tightened."""
         return self.holds and not self.loose
 
     @property
     def count(self) -> str:
-        """In how many instances the relations hold."""
+        """Number of instances in which the relations hold."""
         if self.holds:
             return f"holds in all {self.instances} instances"
         return f"holds in {self.instances - self.violated} of {self.instances} instances"
@@ -68,11 +68,12 @@ class Judgement:
     def __str__(self) -> str:
         if not self.loose:
             return self.count
-        return f"{self.count}, none of which attains {'the bound' if len(self.loose) == 1 else 'the bounds'}"
+        never = f"{'the bound is' if len(self.loose) == 1 else 'the bounds are'} never attained"
+        return f"{self.count}, {'but' if self.holds else 'and'} {never}"
 
 
 def relations(printed: Statement) -> tuple[Relation, ...]:
-    """The relations of a statement that can be evaluated: those without dots."""
+    """Return the relations of a statement without dots, which can be evaluated."""
     return tuple(part for part in printed.parts if isinstance(part, Relation) and "..." not in part.text)
 
 
@@ -119,7 +120,7 @@ def _attains(link: Link) -> bool:
     a, b = _entries(smaller), _entries(larger)
     if a.shape != b.shape:
         return False
-    zero = link.symbol == ">="  # a bound of zero is attained by zero; a vanishing instance attains no other bound
+    zero = link.symbol == ">="  # zero attains a bound of zero, but no other bound
     return any((y > 0 and x >= ATTAINED * y) or (zero and x == y) for x, y in zip(a.ravel(), b.ravel(), strict=True))
 
 
@@ -128,7 +129,7 @@ def _entries(value: Any) -> Any:
 
 
 class Matrix:
-    """A matrix of exact numbers, whose product is written ``*``; relations between matrices hold entry by entry."""
+    """A matrix of exact numbers with ``*`` as matrix product; relations between matrices hold entry by entry."""
 
     def __init__(self, entries: Any) -> None:
         self.entries = exact(entries)
@@ -152,7 +153,7 @@ class Matrix:
 
 
 class Column(dict[int, Fraction]):
-    """A vector by its indices from 1; ``a.T*b`` is the inner product."""
+    """A vector with indices from 1; ``a.T*b`` is the inner product."""
 
     @property
     def T(self) -> _Row:
@@ -168,18 +169,18 @@ class _Row:
 
 
 def numbered(values: Sequence[Fraction]) -> Column:
-    """Values by their indices from 1."""
+    """Return values by their indices from 1."""
     return Column(enumerate(values, start=1))
 
 
 def fractions(rng: np.random.Generator, count: int) -> list[Fraction]:
-    """Random numbers of either sign between 1 and 10, with three decimals."""
+    """Draw random numbers of either sign between 1 and 10 in size, with three decimals."""
     numerators = rng.integers(1001, 9999, count) * rng.choice([-1, 1], count)
     return [Fraction(int(numerator), 1000) for numerator in numerators]
 
 
 def small(rng: np.random.Generator, count: int) -> list[Fraction]:
-    """Random rounding errors of at most :data:`BETA`."""
+    """Draw random rounding errors of at most :data:`BETA`."""
     return [BETA * Fraction(int(k), 1000) for k in rng.integers(-1000, 1001, count)]
 
 
@@ -192,7 +193,7 @@ FORMATS = ((10, 4), (2, 11), (3, 7), (16, 4))
 
 @cache
 def samples(base: int = 10, precision: int = 4) -> tuple[Fraction, ...]:
-    """Numbers of either sign whose tails v are random, zero, a half, and nearly one."""
+    """Return numbers of either sign whose tails v are random, zero, a half, and nearly one."""
     rng = np.random.default_rng(1982)
     smallest, unit = base ** (precision - 1), Fraction(1, base**5)
     heads = [smallest, smallest + 1, base * smallest - 1, *map(int, rng.integers(smallest, base * smallest, 5))]
@@ -205,7 +206,7 @@ def samples(base: int = 10, precision: int = 4) -> tuple[Fraction, ...]:
 
 @cache
 def gap(base: int, precision: int) -> Fraction:
-    """Distance from 1 to the next number of a format, found by trying."""
+    """Find the distance from 1 to the next number of a format by trying."""
     fmt = FloatFormat(base, precision)
     step = Fraction(1, base ** (precision + 1))
     tried = (k * step for k in range(1, base**3 + 1))
@@ -213,7 +214,7 @@ def gap(base: int, precision: int) -> Fraction:
 
 
 def number_names(x: Fraction, base: int = 10, precision: int = 4) -> dict[str, Any]:
-    """Everything that sections 2 to 4 say of a number: its split, its rounded and chopped values, their errors."""
+    """Return all quantities of sections 2 to 4 for a number: its split, rounded and chopped values, their errors."""
     fmt, chopping = FloatFormat(base, precision), FloatFormat(base, precision, Rounding.CHOP)
     u, v, e = fmt.split(x)
     rounded, chopped = fmt.round(x), chopping.round(x)
@@ -227,7 +228,7 @@ def number_names(x: Fraction, base: int = 10, precision: int = 4) -> dict[str, A
 
 @cache
 def all_numbers() -> tuple[dict[str, Any], ...]:
-    """The names of :func:`number_names` for all samples of all formats."""
+    """Return the names of :func:`number_names` for all samples of all formats."""
     return tuple(number_names(x, b, t) for b, t in FORMATS for x in samples(b, t))
 
 
@@ -236,15 +237,16 @@ def all_numbers() -> tuple[dict[str, Any], ...]:
 
 @cache
 def surveyed_bounds(trial: str) -> dict[str, experiment.BoundStatistics]:
-    """The statistics of each bound over the survey of one sort of computation."""
+    """Return the statistics of each bound over the survey of one kind of computation."""
     return {each.bound: each for each in experiment.bound_statistics(experiment.survey(trial))}
 
 
 def surveyed(trial: str, bound: str) -> tuple[bool, str]:
-    """Whether a survey found no violation of a bound, and what it found."""
+    """Whether a survey found no violation of a bound, and its result."""
     found = surveyed_bounds(trial)[bound]
     return found.violations == 0, (
-        f"{found.violations} violations in {found.trials} random trials, largest error over bound {found.largest:.3g}"
+        f"{found.violations} violations in {found.trials} random trials, with a largest ratio of "
+        f"error to bound of {found.largest:.3g}"
     )
 
 
@@ -252,12 +254,12 @@ def surveyed(trial: str, bound: str) -> tuple[bool, str]:
 
 
 def power(x: Fraction, digits: int = 4) -> str:
-    r"""A number as the reports write it, ``$.7655\times10^{3}$``."""
+    r"""Format a number as the reports do, ``$.7655\times10^{3}$``."""
     u, _, e = FloatFormat(10, digits).split(x)
     return rf"${'-' if u < 0 else ''}.{int(abs(u) * 10**digits):0{digits}d}\times10^{{{e}}}$"
 
 
 def split_text(x: Fraction) -> str:
-    """The split (2) of a decimal number, as the reports write it."""
+    """Format the split (2) of a decimal number as the reports do."""
     u, v, e = FOUR.split(x)
     return rf"$u={float(u):g}$, $v={float(v):g}$, $e={e}$"

@@ -21,11 +21,11 @@ from gpbnb.rounding import derivation, experiment, theory
 
 @CHECKS.add(*both("eq17"), *both("s6.order-of-4-terms"), *both("eq19"))
 def defined() -> Finding:
-    return given("the definition of the quantity, and of the order in which it is computed: from left to right")
+    return given("defines the quantity and the order in which it is computed: from left to right")
 
 
 def _sum_names(x: list[Fraction], epsilon: list[Fraction]) -> dict[str, Any]:
-    """A sum and its computed value, where the k-th addition has the relative error ``epsilon[k]``."""
+    """Return a sum and its computed value, where the k-th addition has the relative error ``epsilon[k]``."""
     computed = x[0]
     for term, e in zip(x[1:], epsilon, strict=True):
         computed = (computed + term) * (1 + e)
@@ -38,7 +38,7 @@ def _sum_names(x: list[Fraction], epsilon: list[Fraction]) -> dict[str, Any]:
 
 @cache
 def sums(n: int | None = None) -> tuple[dict[str, Any], ...]:
-    """Sums of n terms, or of 3, 4 and 6: random ones, and sums that attain the bounds (18)."""
+    """Return sums of n terms, or of 3, 4 and 6 terms: random ones, and sums that attain the bounds (18)."""
     rng = np.random.default_rng(18)
     instances = []
     for count in (n,) if n else (3, 4, 6):
@@ -57,7 +57,7 @@ def four_terms(printed: Statement) -> Finding:
     found = judge(relations(printed), instances, first_order=printed.id.endswith("unnumbered-s"))
     return compare(
         found.right,
-        f"{found} of terms and rounding errors, against the sum computed step by step",
+        f"{found} of terms and rounding errors, compared with the sum computed step by step",
         note="to first order" if printed.id.endswith("unnumbered-s") else "",
     )
 
@@ -70,7 +70,7 @@ def derived() -> bool:
 
 @cache
 def _coarse_is_wider() -> bool:
-    """Whether the last member of (18), with the largest term for each, is never smaller than the one before it."""
+    """Whether the last member of (18), which uses the largest term for all, is never smaller than the one before."""
     return all(
         theory.printed_sum_bound_coarse(trial.inputs[0], trial.fmt.unit_roundoff) >= trial.bounds["1984 (18)"]
         for trial in experiment.survey("sum")
@@ -79,7 +79,7 @@ def _coarse_is_wider() -> bool:
 
 @cache
 def _tie() -> float:
-    """Error over (18) of a sum of 100 terms in four digits whose additions are all ties."""
+    """Return error / (18) of a sum of 100 terms in four digits whose additions are all ties."""
     return experiment.tie_sum(FOUR, 100).ratio("1984 (18)")
 
 
@@ -91,14 +91,14 @@ def sum_bound_1984(printed: Statement) -> Finding:
     return compare(
         found.right and holds and wider and derived(),
         f"{found}, derived to first order for every $n$; {text}",
-        note="to first order, not strict: 100 terms in four digits, "
-        f"$1, \\beta, -\\beta, \\dots, -\\beta$, exceed it by {tie - 1:.1%}",
+        note="the bound holds to first order but is not strict: for 100 terms in four digits, $1, \\beta, "
+        f"-\\beta, \\dots, -\\beta$, the error exceeds it by {tie - 1:.1%}",
     )
 
 
 @cache
 def _like_signs() -> tuple[int, int]:
-    """Violations of (18) of 1982 by sums of terms of one sign, and how many sums."""
+    """Count the violations of (18) of 1982 by sums of terms of one sign, and the sums."""
     like = [
         experiment.sum_trial(experiment.random_numbers(np.random.default_rng(seed), fmt, (5,), "like signs"))
         for fmt in experiment.SURVEYED
@@ -114,11 +114,13 @@ def sum_bound_1982(printed: Statement) -> Finding:
     violations, count = _like_signs()
     return compare(
         found.right,
-        f"{found}; $(n-1)\\beta$ has {random.violations} violations in {random.trials} random sums, by a factor of up "
-        f"to {random.largest:.2g}, and {violations or 'none'} in {count} sums of terms of one sign",
+        f"{found}; the bound $(n-1)\\beta$ fails in {random.violations} of {random.trials} random "
+        f"sums, by a factor of up to {random.largest:.2g}, and in {violations or 'none'} of {count} "
+        "sums whose terms all have the same sign",
         Verdict.WRONG,
-        otherwise_note="drops $-x_3\\epsilon_1-x_4(\\epsilon_1+\\epsilon_2)$ as if it could only help, which is true "
-        "only of terms of one sign; corrected in hung1984 (18)",
+        otherwise_note="the step drops $-x_3\\epsilon_1-x_4(\\epsilon_1+\\epsilon_2)$ as if this term could only "
+        "reduce the error, which is true only if all terms have the same sign; hung1984 (18) "
+        "corrects it",
         root="sum-bound-ignores-cancellation",
     )
 
@@ -126,7 +128,7 @@ def sum_bound_1982(printed: Statement) -> Finding:
 def _quotient_names(
     x: list[Fraction], y: list[Fraction], epsilon: list[Fraction], eta: list[Fraction]
 ) -> dict[str, Any]:
-    """A product over a product, computed from left to right, with the error of each operation."""
+    """Return a product divided by a product, computed from left to right, with the error of each operation."""
     true = computed = x[0]
     for factor, e in zip(x[1:], epsilon, strict=True):
         true, computed = true * factor, computed * factor * (1 + e)
@@ -141,7 +143,7 @@ def _quotient_names(
 
 @cache
 def quotients(sizes: tuple[tuple[int, int], ...]) -> tuple[dict[str, Any], ...]:
-    """Quotients of n factors and m divisors, with random errors and with errors that are all β."""
+    """Return quotients of n factors and m divisors, with random errors and with errors that are all β."""
     rng = np.random.default_rng(20)
     instances = []
     for n, m in sizes:
@@ -160,13 +162,13 @@ def quotient_example(printed: Statement) -> Finding:
     return compare(
         found.right and bool(sp.expand(error - sum(eps)) == 0),
         f"{found}; the relative error is ${sp.latex(error)}$, at most $2\\beta$",
-        note="to first order" if printed.document == "hung1984" else "of what is legible",
+        note="to first order" if printed.document == "hung1984" else "applies to what is legible",
     )
 
 
 @cache
 def worst_twenty() -> experiment.Trial:
-    """Twenty factors of two digits whose product has the largest relative error."""
+    """Return the twenty factors of two digits whose product has the largest relative error."""
     return experiment.worst_product(FloatFormat(10, 2), 20)
 
 
@@ -179,14 +181,18 @@ def product_bound(printed: Statement) -> Finding:
     holds, text = surveyed("product", "1982 (20)")
     counted = all(len(derivation.quotient_error(n, m)[1]) == n + m - 1 for n, m in SIZES)
     worst = worst_twenty()
-    exceeded = ", ".join(f"{worst.ratio(f'{year} (20)'):.2f} times for {year}" for year in (1982, 1984))
+    exceeded = ", ".join(f"{worst.ratio(f'{year} (20)'):.2f} times the bound of {year}" for year in (1982, 1984))
     return compare(
         found.right and holds and counted,
-        f"${sp.latex(derivation.product_operations())}$ roundings, so 2 for $x_1x_2/y_1$; the printed bound {found}; "
-        f"of $(n+m-1)\\beta$ {text}",
+        f"there are ${sp.latex(derivation.product_operations())}$ roundings, so 2 for $x_1x_2/y_1$; "
+        f"the printed bound {found}; for $(n+m-1)\\beta$, {text}",
         Verdict.INCONSISTENT if found.holds else Verdict.WRONG,
-        note=f"to first order, not strict: 20 factors of two digits can exceed it ({exceeded})",
-        otherwise_note="too large by 2β: contradicts its own example, $2\\beta$ for $x_1x_2/y_1$, and hung1982 (20); "
-        f"still no strict bound, for 20 factors of two digits can exceed it ({exceeded})",
+        note=(
+            "the bound holds to first order but is not strict: the error for 20 factors of two digits "
+            f"can be {exceeded}"
+        ),
+        otherwise_note="the bound is too large by 2β and contradicts the report's own example, $2\\beta$ for "
+        "$x_1x_2/y_1$, and hung1982 (20); even so it is not strict: the error for 20 factors of two "
+        f"digits can be {exceeded}",
         root="product-roundings-overcounted",
     )

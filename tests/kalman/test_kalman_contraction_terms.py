@@ -1,0 +1,198 @@
+"""Every term of the contraction bound, of one state, in exact fractions: none can be dropped unseen.
+
+The bound's allowance for its own roundings is some 1e-14. Here it is 1/64 in its place, so that every term that has it
+as a factor is seen. All numbers are such that the weights are rational.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction as F
+
+import numpy as np
+import pytest
+
+from gpbnb.kalman import contraction
+from gpbnb.kalman.kernels import contraction as kernels
+from gpbnb.kalman.kernels.contraction import Contraction
+
+SHARE = F(1, 64)
+NAMES = ("_many", "_times", "_norm", "_norm2", "_is_positive", "_weights", "_inverse", "_inverse_general")
+
+
+def plain(function):
+    """The function as Python runs it."""
+    return getattr(function, "py_func", function)
+
+
+@pytest.fixture
+def kernel(monkeypatch):
+    for name in NAMES:
+        monkeypatch.setattr(kernels, name, plain(getattr(kernels, name)))
+    monkeypatch.setattr(kernels, "_many", lambda n, m: float(SHARE))
+    return kernels
+
+
+def one(value):
+    return np.full((1, 1), float(value))
+
+
+def array(value):
+    return np.full(1, float(value))
+
+
+def same(found, expected):
+    assert float(np.asarray(found).ravel()[0]) == pytest.approx(float(expected), rel=1e-13, abs=0)
+
+
+def test_start(kernel):
+    found = plain(kernel.contraction_start)(one(F(9, 4)), array(F(1, 3)), one(F(1, 5)))
+    delta = SHARE  # of 1/L times L, whose distance from 1 is zero
+    weight = F(2, 3)
+    same(found.L, F(3, 2))
+    same(found.eta, weight * F(1, 3) / (1 - delta) * (1 + SHARE))
+    same(found.zeta, weight**2 * F(1, 5) / (1 - delta) ** 2 * (1 + SHARE))
+
+
+# A = Φ − KHΦ = 3/8, and AL = 3/16; C = 1 − KH = 1/4, K²R + C²Q = 1/16 of 3 · 3/16 + 1/4 …: W = (5/16)² below.
+PHI, H, K, L = F(3, 2), F(3, 4), F(1), F(1, 2)
+R = F(1, 32)
+Q = 16 * (F(5, 16) ** 2 - F(3, 16) ** 2 - R)
+S, NU, Q1, T = F(7, 2), F(-5, 3), F(-1, 7), F(1, 11)
+DQ, DT, DK, DNU = F(1, 13), F(1, 17), F(1, 19), F(1, 23)
+ETA, ZETA = F(1, 3), F(1, 5)
+
+
+def expected():
+    M, up, delta = SHARE, 1 + SHARE, SHARE
+    A, Y = PHI - K * H * PHI, F(16, 5)
+    spread = (PHI + K * H * PHI) * L * M + DK * H * PHI * L
+    spectral = F(plain(kernels._norm2)(one(Y * A * L)))
+    alpha = (spectral + Y * spread) / (1 - delta)
+    inverse, dinverse = 1 / S, 2 * M / S
+    HL = H * PHI * L
+    N, dN = HL * inverse, HL * (dinverse + M * inverse)
+    g = N * HL + dN * HL + M * N * HL
+    dnu = DNU + M * abs(NU)
+    y = abs(N * NU) + dN * (abs(NU) + dnu) + N * dnu
+    size_q = (Y * abs(Q1) + Y * (DQ + M * abs(Q1))) / (1 - delta)
+    size_T = (Y**2 * T + Y**2 * (DT + M * T)) / (1 - delta) ** 2
+    known = 1 - g * ZETA * up
+    return {
+        "L": F(5, 16),
+        "alpha": alpha,
+        "eta": (size_q + alpha * (ETA + y * ZETA) / known) * up,
+        "zeta": (size_T + alpha**2 * ZETA / known) * up,
+        "gain": (N + dN) * alpha * ZETA / known * up,
+    }
+
+
+def test_step(kernel):
+    assert F(3, 8) == PHI - K * H * PHI
+    before = Contraction(one(L), float(ETA), float(ZETA), 1.0, np.zeros(1))
+    found = plain(kernel.contraction_step)(
+        before,
+        one(PHI),
+        one(H),
+        one(Q),
+        one(R),
+        one(K),
+        one(S),
+        array(NU),
+        array(Q1),
+        one(T),
+        array(DQ),
+        one(DT),
+        one(DK),
+        array(DNU),
+    )
+    for name, value in expected().items():
+        same(getattr(found, name), value)
+    # The estimate of the spectral norm is from above.
+    assert expected()["alpha"] > F(16, 5) * F(3, 16)
+
+
+@pytest.mark.parametrize(("zeta", "lost"), [(F(3, 2), False), (F(19, 10), True)])
+def test_the_gain_is_known_as_long_as_the_roundings_allow(kernel, zeta, lost):
+    """Without its roundings, g ζ is below 1 with both: only with them the second bound is lost."""
+    before = Contraction(one(L), float(ETA), float(zeta), 1.0, np.zeros(1))
+    zero, nothing = array(0), one(0)
+    S = 2 * (H * PHI * L) ** 2
+    model, step = (one(PHI), one(H), one(Q), one(R)), (one(K), one(S), array(NU))
+    found = plain(kernel.contraction_step)(before, *model, *step, zero, nothing, zero, nothing, nothing, zero)
+    exact = (H * PHI * L) ** 2 / S * zeta
+    assert exact < 1
+    assert (exact * (1 + 4 * SHARE) * (1 + SHARE) >= 1) is lost
+    assert (found.eta == np.inf) is lost
+
+
+def test_evaluation_errors(kernel):
+    unit = F(1, 4096)
+    x, P, z = F(-3, 5), F(2, 7), F(4, 9)
+    found = plain(kernel.evaluation_errors)(
+        one(-PHI), one(-H), one(Q), one(R), array(x), one(P), array(z), one(-K), one(S), float(unit)
+    )
+    many = (16 * 2 + 64) * unit * (1 + SHARE)
+    predicted = PHI * P * PHI + Q
+    PH = predicted * H
+    size = H * PH + R
+    aS = (1 + 2 * SHARE) / S
+    dK = many * (PH + PH * aS * size) * aS
+    left = 1 + K * H
+    dT = many * (left * predicted * left + K * R * K) + 2 * dK * PH * left + 2 * left * PH * dK
+    seen = abs(z) + H * PHI * abs(x)
+    dq = many * (PHI * abs(x) + K * seen) + dK * seen
+    for value, exact in zip(found, (dq, dT, dK, many * seen), strict=True):
+        same(value, exact)
+
+
+def test_errors_in_units(kernel):
+    bound = Contraction(one(L), float(ETA), float(ZETA), 1.0, array(F(1, 7)))
+    same(plain(kernel.state_error_bound)(bound), L * ETA * (1 + SHARE))
+    same(plain(kernel.covariance_error_bound)(bound), ZETA * (L * (1 + SHARE)) ** 2)
+
+
+def test_error_of_the_gain(kernel, monkeypatch):
+    monkeypatch.setattr(kernels, "_U", 1 / 32)
+    bound = Contraction(one(L), float(ETA), float(ZETA), 1.0, array(F(1, 7)))
+    used = F(4, 3)
+    found = plain(kernel.gain_error_bound)(bound, one(K), one(used), one(DK))
+    same(found, (abs(used - K) + DK + F(1, 32) * (used + K) + L * F(1, 7)) * (1 + SHARE))
+
+
+def test_allowance_for_roundings():
+    assert kernels._many(3, 2) == (16 * 5 + 64) * 2.0**-53
+    assert kernels._U == 2.0**-53
+
+
+def test_inverses(kernel):
+    Y, delta = kernel._inverse(one(F(3, 2)))
+    same(Y, F(2, 3))
+    # The product is 1 to a rounding; what is left is the allowance times |Y| |L|.
+    assert delta == pytest.approx(float(SHARE), rel=1e-12)
+    lower = np.array([[2.0, 0.0], [6.0, 4.0]])
+    Y, delta = kernel._inverse(lower)
+    assert np.array_equal(Y, [[0.5, 0.0], [-0.75, 0.25]])
+    assert delta == pytest.approx(float(SHARE) * np.linalg.norm([[1.0, 0.0], [3.0, 1.0]]), rel=1e-13)
+    S = np.array([[0.5, 4.0], [2.0, 0.0]])  # rows are exchanged
+    Y, error = kernel._inverse_general(S)
+    assert np.array_equal(Y, [[0.0, 0.5], [0.25, -0.0625]])
+    # |Y| |S| is 1 and 0, 0.25 and 1: the largest row sum times the allowance, twice.
+    assert error == pytest.approx(2 * 1.25 * float(SHARE) * np.abs(Y).sum(axis=0) * np.ones((2, 2)), rel=1e-13)
+
+
+def test_the_spectral_norm_allows_for_its_elimination(monkeypatch):
+    monkeypatch.setattr(kernels, "_U", 1e-6)
+    for name in ("_times", "_is_positive"):
+        monkeypatch.setattr(kernels, name, plain(getattr(kernels, name)))
+    found = plain(kernels._norm2)(np.diag([1.0, 0.25]))
+    high = 1 + 1e-11
+    least = np.sqrt(1 * (1 + 4 * 2 * 4 * 1e-6) + 4 * 4 * 1e-6 * 1.0625) * (1 + 4e-6)
+    most = np.sqrt(high * (1 + 4 * 2 * 4 * 1e-6) + 4 * 4 * 1e-6 * 1.0625) * (1 + 4e-6)
+    assert least <= found <= most * (1 + 1e-12)
+
+
+def test_a_companion_takes_its_roundings_in(monkeypatch):
+    found = contraction.companion_bound([1.0], [2.0**-53])[0]
+    assert F(found) > 1 + F(1, 2**53)  # 1 + 2**-53 rounds to 1
+    monkeypatch.setattr(contraction, "_U", 1 / 64)
+    same(contraction.companion_bound([-3.0], [0.25]), F(13, 4) * (1 + F(4, 64)))
