@@ -281,8 +281,12 @@ def bits_table() -> Table:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compute the rows whose names contain one of the words, or all, and write them to a folder."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Guarantees of some filters, as a table.")
-    parser.add_argument("words", nargs="*", help="only filters whose names contain one of them; the rest as stored")
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Compute a table of guarantees for some filters.")
+    parser.add_argument(
+        "words",
+        nargs="*",
+        help="recompute only the filters whose names contain one of these words; keep the other stored rows",
+    )
     parser.add_argument("--output", type=Path, default=Path(".cache/guarantees"), help="folder for guarantees.csv")
     given = parser.parse_args(arguments)
     words, file = given.words, given.output / FILE.name

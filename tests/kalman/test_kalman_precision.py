@@ -236,8 +236,11 @@ def test_its_own_measurements_are_seeded():
         ({"steps": 0}, "got 0 steps; needed a whole number, at least 1"),
         ({"steps": 2.5}, "got 2.5 steps; needed a whole number"),
         ({"z": np.where(np.arange(60) == 7, np.inf, 1.0)[:, None]}, "got inf for measurement 0 of step 8; .*or NaN"),
-        ({"z": 3.0}, "got 3.0; needed one for each of the 60 steps"),
-        ({"z": Z[:5]}, r"got 5 measurements of shape \(1,\); needed one for each of the 60 steps, of shape \(1,\)"),
+        ({"z": 3.0}, "got a single number; needed one measurement for each of the 60 steps"),
+        (
+            {"z": Z[:5]},
+            r"got 5 measurements of shape \(1,\); needed one measurement for each of the 60 steps, of shape \(1,\)",
+        ),
         ({"z": Z[:, 0], "basis": "bound"}, r"got 60 measurements of shape \(\); .*write z.reshape\(-1, 1\)"),
     ],
 )

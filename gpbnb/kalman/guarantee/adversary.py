@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
@@ -54,14 +53,14 @@ def number(fmt: Any, x: Any) -> Any:
     raise TypeError("got a call of number from Python; needed one from a function compiled by numba")
 
 
-@overload(number, strict=False, jit_options={"forceinline": True})
+@overload(number, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_number(fmt: Any, x: Any) -> Any:
     if getattr(fmt, "instance_class", None) in (Decimal, ShortDecimal):
         return lambda fmt, x: round_(fmt, _scaled(x))
     return lambda fmt, x: round_(fmt, x)
 
 
-@njit
+@inner
 def _scaled(x: float) -> Any:
     e = 0
     while x != 0.0 and abs(x) < 1e15:
@@ -73,7 +72,7 @@ def _scaled(x: float) -> Any:
     return np.int64(x), np.int64(e)
 
 
-@njit(nogil=True)
+@inner
 def _times(a: Any, x: Any, c: Any) -> None:
     """Compute c = a x for a matrix and a column in double-double."""
     exactly = DoubleDouble()
@@ -85,7 +84,7 @@ def _times(a: Any, x: Any, c: Any) -> None:
         put(exactly, c, i, s)
 
 
-@njit(nogil=True)
+@inner
 def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
     """Return the weighted error of an estimate."""
     exactly, total = DoubleDouble(), 0.0
