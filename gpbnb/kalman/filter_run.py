@@ -46,12 +46,12 @@ class Run:
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
     compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
         a step over to the next; only for the innovation form and Joseph's.
-    order, block : of the additions in matrix products, as of :func:`gpbnb.linalg.matmul`; any but "left" in bases 2 and
-        16, and not in the UD form, which has few matrix products.
+    order, block : order of the additions in matrix products, as for :func:`gpbnb.linalg.matmul`. Orders other than
+        "left" need base 2 or 16, and a form other than UD, which has few matrix products.
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation or another order of
+    ValueError : a format without compiled loops; checkpoint steps that do not ascend; compensation or another order of
         additions in a form that does not have it.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
@@ -175,7 +175,7 @@ class Run:
             advance(self.tag, int(self.form), self.matrices, z, self.steps, self.x, self.P, repeated, kept, notes)
 
     def stopped_by(self, error: ArithmeticError) -> str:
-        """Name what ended the last step: "overflow in the gain at step 812"."""
+        """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
