@@ -29,11 +29,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb",
         description="Rounding errors in recursive filters, integrators and matrix computations.",
-        epilog=f"commands:\n{lines}\n\npython -m gpbnb COMMAND --help explains one of them.",
+        epilog=f"commands:\n{lines}\n\npython -m gpbnb COMMAND --help explains a command.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("command", nargs="?", help="one of the commands below")
-    parser.add_argument("arguments", nargs=argparse.REMAINDER, help="of that command")
+    parser.add_argument(
+        "arguments", nargs=argparse.REMAINDER, help="arguments of the command; COMMAND --help lists them"
+    )
     given = parser.parse_args(arguments)
     if given.command is None:
         parser.print_help()

@@ -377,7 +377,7 @@ def measurement_rows(
     if unknown or not states or len(set(states)) != len(states):
         raise ValueError(
             f"got states {tuple(states)}; needed different names from {', '.join(STATES)}"
-            + (f"; {', '.join(map(repr, unknown))} is none of them" if unknown else "")
+            + (f"; unknown: {', '.join(map(repr, unknown))}" if unknown else "")
         )
     if signal not in ("gyro", "telescope", "difference"):
         raise ValueError(f"got signal {signal!r}; needed 'gyro', 'telescope' or 'difference'")
@@ -451,7 +451,7 @@ def _quarter(pair: NDArray[Any]) -> NDArray[Any]:
 def _finite(name: str, values: ArrayLike) -> Floats:
     given = np.asarray(values, dtype=np.float64)
     if not np.all(np.isfinite(given)):
-        raise ValueError(f"got {name} with NaN or infinity; needed finite numbers; leave out samples that are missing")
+        raise ValueError(f"got {name} with NaN or infinity; needed finite numbers; omit missing samples")
     return given
 
 

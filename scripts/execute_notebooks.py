@@ -232,7 +232,9 @@ def _compared(cell: Any) -> list[str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n\n")[0])
     parser.add_argument("notebooks", nargs="*", type=Path, help="default: all of the book")
-    parser.add_argument("--jobs", type=int, help="how many at a time; default: one more than processors")
+    parser.add_argument(
+        "--jobs", type=int, help="number of notebooks to run at a time; default: one more than the number of processors"
+    )
     parser.add_argument("--worker", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--check", action="store_true", help="compare with the stored outputs and change nothing")
     given = parser.parse_args(arguments)

@@ -133,7 +133,7 @@ def main() -> int:
     parser.add_argument(
         "settings", nargs="*", choices=[[], *every], metavar="SETTING", help=f"default: all of {', '.join(every)}"
     )
-    parser.add_argument("--jobs", type=int, default=2, help="how many processes; default: 2")
+    parser.add_argument("--jobs", type=int, default=2, help="number of processes; default: 2")
     parser.add_argument("--only", nargs="+", choices=["notebooks", "tests"], default=(), help="default: both")
     parser.add_argument("--quick", action="store_true", help="only some notebooks and tests, in about two minutes")
     given = parser.parse_args()
@@ -141,7 +141,7 @@ def main() -> int:
     for name in given.settings or every:
         environment = every[name]
         if environment is None:
-            print(f"{name:10} not run: this machine cannot be set so", flush=True)
+            print(f"{name:10} not run: this machine does not support this setting", flush=True)
         else:
             passed = run(name, environment, given.jobs, given.only, given.quick) and passed
     return 0 if passed else 1

@@ -169,7 +169,7 @@ class FloatArray(NumPyProtocols):
 
     def __len__(self) -> int:
         if not self.ndim:
-            raise TypeError("got a FloatArray of a single number; needed one with a length")
+            raise TypeError("got a FloatArray of a single number, which has no length; needed at least one axis")
         return len(self.components[0])
 
     def __getitem__(self, index: Any) -> FloatArray:
@@ -180,8 +180,8 @@ class FloatArray(NumPyProtocols):
 
     def __delitem__(self, index: Any) -> None:
         raise TypeError(
-            "got a change of an entry; needed none, a FloatArray does not change; "
-            "build a new one with fmt.array, np.where or np.concatenate"
+            "got an assignment to an entry; a FloatArray cannot be changed; build a new one with "
+            "fmt.array, np.where or np.concatenate"
         )
 
     def __iter__(self) -> Iterator[FloatArray]:
@@ -288,7 +288,7 @@ class FloatArray(NumPyProtocols):
         return power(self, other)
 
     def __rpow__(self, other: Any) -> FloatArray:
-        raise TypeError("got x ** y of a FloatArray as exponent; needed a whole number; see np.exp and np.log")
+        raise TypeError("got a FloatArray as the exponent of x ** y; needed a whole number; see np.exp and np.log")
 
     def __neg__(self) -> FloatArray:
         return self._unary("negative")
@@ -333,7 +333,7 @@ class FloatArray(NumPyProtocols):
         try:
             axis = None if axis is None else operator.index(axis)
         except TypeError:
-            raise TypeError(f"axis: got {axis!r}; needed an int or None; reduce one axis after the other") from None
+            raise TypeError(f"axis: got {axis!r}; needed an int or None; reduce one axis at a time") from None
         lines = self.reshape(-1) if axis is None else self.moved(lambda a: np.moveaxis(a, axis, 0))
         if not len(lines):
             return self._zeros(lines.shape[1:]) + of_none
@@ -460,8 +460,8 @@ def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:
     n = rows.shape[-1]
     if n != columns.shape[-2]:
         raise ValueError(
-            f"matmul: got shapes {a.shape} and {b.shape}, so {n} columns against "
-            f"{columns.shape[-2]} rows; needed as many; transpose or reshape one of them"
+            f"matmul: got shapes {a.shape} and {b.shape}, so {n} columns against {columns.shape[-2]} "
+            "rows; needed equal numbers; transpose or reshape one of them"
         )
     broadcast("matmul", rows.shape[:-2], columns.shape[:-2])
     if n == 0:

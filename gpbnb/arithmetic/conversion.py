@@ -114,7 +114,7 @@ def _not_finite(value: object) -> str:
 def entries(values: Any) -> NDArray[Any]:
     """Return an object array of the numbers in `values`, a container of any type."""
     if isinstance(values, np.ma.MaskedArray):
-        raise TypeError("got a masked array; needed every entry; fill it first: a.filled(...)")
+        raise TypeError("got a masked array; needed an array without masked entries; fill them first: a.filled(...)")
     if hasattr(values, "to_fractions"):  # an array of a format
         return single(values.to_fractions()) if not values.ndim else np.asarray(values.to_fractions(), dtype=object)
     if isinstance(values, (str, bytes, bytearray, np.generic)):
@@ -132,8 +132,8 @@ def entries(values: Any) -> NDArray[Any]:
         shapes = {part.shape for part in components}
         if len(shapes) > 1:
             raise ValueError(
-                f"got nested lists with parts of shapes {', '.join(map(str, sorted(shapes)))}; "
-                "needed parts of one shape; fill or cut the lists"
+                f"got nested lists with parts of shapes {', '.join(map(str, sorted(shapes)))}; needed "
+                "parts of equal shape; pad or shorten the lists"
             )
         array = np.empty((len(components), *(shapes.pop() if components else ())), object)
         for i, part in enumerate(components):

@@ -176,7 +176,7 @@ def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overf
         raise ValueError(f"bits: got {bits}; needed at least 2, one of them the sign")
     largest = max(abs(exact(values)).ravel(), default=Fraction(0))
     if not largest:
-        raise ValueError("got values that are all zero; needed one that is not; leave the variable out")
+        raise ValueError("got values that are all zero; needed at least one nonzero value; omit the variable")
     integer_bits = math.frexp(float(largest))[1]  # largest < 2**integer_bits, apart from the last rounding
     while True:
         fmt = FixedFormat(integer_bits, bits - 1 - integer_bits, rounding, overflow)

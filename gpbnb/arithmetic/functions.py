@@ -53,7 +53,7 @@ def _rounded(name: str, value: Fraction, fmt: Any) -> Fraction:
             bits *= 2
     finally:
         ctx.prec = before
-    raise ValueError(f"got np.{name} of {float(value)!r}; needed a number at which it is finite and real")
+    raise ValueError(f"got np.{name} of {float(value)!r}; needed an argument for which the result is finite and real")
 
 
 def _exactly(end: Any) -> Fraction:
@@ -93,7 +93,7 @@ def smallest(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
 def _chosen(x: Any, axis: int | None, better: Callable[[Any, Any], Any]) -> Any:
     lines = x.reshape(-1) if axis is None else x.moved(lambda a: np.moveaxis(a, axis, 0))
     if not len(lines):
-        raise ValueError("got no entries to choose from; needed at least one")
+        raise ValueError("got an empty array for min or max; needed at least one entry")
     while len(lines) > 1:
         half = len(lines) // 2
         first, second, rest = lines[:half], lines[half : 2 * half], lines[2 * half :]
@@ -160,7 +160,7 @@ def power(x: Any, exponent: Any) -> Any:
             f"got the exponent {exponent!r}; needed a whole number; for a root see np.sqrt, for others exp and log"
         ) from None
     if abs(count) > 1000:
-        raise ValueError(f"got the exponent {count}; needed one from -1000 to 1000")
+        raise ValueError(f"got the exponent {count}; needed a whole number from -1000 to 1000")
     if count == 0:
         return x * 0 + 1
     result = x
@@ -211,8 +211,8 @@ def einsum(x: Any, subscripts: Any, *operands: Any) -> Any:
     )
     if not fits or len(set(result)) != len(result) or not set(result) <= set(left):
         raise ValueError(
-            f"einsum: got {subscripts!r} and shapes {[array.shape for array in arrays]}; needed one letter for each "
-            "axis, none twice in an operand"
+            f"einsum: got {subscripts!r} and shapes {[array.shape for array in arrays]}; needed one "
+            "letter for each axis and no letter twice in an operand"
         )
     summed = [c for c in dict.fromkeys(left) if c not in {*result, ","}]
     order = [*result, *summed]

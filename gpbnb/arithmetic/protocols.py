@@ -172,7 +172,7 @@ class NumPyProtocols:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         if copy is False:
             raise ValueError(
-                f"got copy=False; needed True or None: a {type(self).__name__} becomes an array by conversion only"
+                f"got copy=False; needed True or None; converting a {type(self).__name__} always copies it"
             )
         if dtype is None or np.dtype(dtype) == np.float64:
             return self._exact_float("an array")
@@ -227,8 +227,8 @@ class NumPyProtocols:
             return self.joined(lambda components: func(components, *rest, **kwargs), list(map(self.operand, first)))
         if not isinstance(first, NumPyProtocols) or any(isinstance(value, NumPyProtocols) for value in rest):
             raise TypeError(
-                f"got np.{func.__name__} with a {type(self).__name__} in an unexpected place; needed it as the first "
-                "argument, or in a list that is the first"
+                f"got np.{func.__name__} with a {type(self).__name__} in an unexpected place; needed "
+                "it as the first argument, or in a list that is the first argument"
             )
         return first.moved(lambda a: func(a, *rest, **kwargs))
 
@@ -304,7 +304,7 @@ def _array_equal(x: NumPyProtocols, a1: Any, a2: Any) -> bool:
 
 def _where(x: NumPyProtocols, condition: Any, a: Any, b: Any) -> Any:
     if isinstance(condition, NumPyProtocols):
-        raise TypeError(f"where: got a {type(x).__name__} as condition; needed booleans; compare it with something")
+        raise TypeError(f"where: got a {type(x).__name__} as condition; needed a boolean array, such as x > 0")
     condition = np.asarray(condition, dtype=bool)
     a, b = x.operand(a), x.operand(b)
     broadcast("where", condition.shape, a.shape)
@@ -323,7 +323,7 @@ def _exponent(value: Any) -> Any:
     """Return a plain exponent, which NumPy passes as an array of a format."""
     if not value.ndim and (exact := value.to_fractions()).denominator == 1:
         return int(exact)
-    raise TypeError("got an exponent that is no single whole number; needed one, as in np.power(x, 3)")
+    raise TypeError("got an exponent that is not a single whole number; needed one, as in np.power(x, 3)")
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

@@ -72,7 +72,7 @@ def true_inverse(a: Any) -> Any:
         return rationals(a).inv()
     except ZeroDivisionError:
         raise np.linalg.LinAlgError(
-            "the matrix is singular: it has no inverse in any precision; change an entry"
+            "got a singular matrix, which has no inverse in any precision; change an entry"
         ) from None
 
 

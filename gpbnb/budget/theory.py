@@ -91,7 +91,10 @@ class Source:
         for name in ("name", "group", "note"):
             text = getattr(self, name)
             if text != text.strip() or (name == "name" and not text):
-                raise ValueError(f"got {name} {text!r}; remove blanks at its ends, and give every source a name")
+                raise ValueError(
+                    f"got {name} {text!r}; needed a text without leading or trailing blanks, and a name "
+                    "for every source"
+                )
         if not isinstance(self.kind, Kind) or not isinstance(self.form, ErrorForm):
             raise ValueError(f"got kind {self.kind!r} and form {self.form!r}; needed a Kind and an ErrorForm")
         if not math.isfinite(self.error):
@@ -381,7 +384,9 @@ def _unguarded(text: str) -> str:
 
 def _source(header: tuple[str, ...], cells: list[str]) -> Source:
     if len(cells) != len(header):
-        raise ValueError(f"{len(cells)} cells instead of {len(header)}; put quotes around a cell that contains a comma")
+        raise ValueError(
+            f"got {len(cells)} cells; needed {len(header)}; put quotes around a cell that contains a comma"
+        )
     row = {field.name: "" for field in fields(Source)} | dict(
         zip(header, (cell.strip() for cell in cells), strict=True)
     )
@@ -401,7 +406,7 @@ def _number(column: str, text: str) -> float:
     try:
         return plain_number(text)
     except ValueError:
-        raise ValueError(f"{column} is {text!r}; enter a number, or leave the row out until it is known") from None
+        raise ValueError(f"{column} is {text!r}; enter a number, or omit the row until it is known") from None
 
 
 def _member(enum: type[_E], column: str, text: str) -> _E:

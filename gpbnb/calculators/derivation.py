@@ -30,7 +30,9 @@ def step(derivation: Derivation, begins: str) -> Step:
     """
     found = [each for each in derivation.steps if each.name.startswith(begins)]
     if len(found) != 1:
-        raise ValueError(f"got {len(found)} steps that begin with {begins!r}; needed one; name more of it")
+        raise ValueError(
+            f"got {len(found)} steps that begin with {begins!r}; needed exactly one; give more of its beginning"
+        )
     return found[0]
 
 

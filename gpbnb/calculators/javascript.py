@@ -90,8 +90,8 @@ def print_function(inputs: Sequence[str], definitions: Iterable[Definition]) -> 
         free = {s.name for s in each.expression.free_symbols} - ({each.smallest.name} if each.smallest else set())
         if each.name in known or not free <= set(known):
             raise ValueError(
-                f"got {each.name} of {', '.join(sorted(free)) or 'nothing'} after {', '.join(known)}; needed a new "
-                "name, made of names before it; reorder or rename"
+                f"got {each.name} of {', '.join(sorted(free)) or 'nothing'} after {', '.join(known)}; "
+                "needed a new name whose expression uses only earlier names; reorder or rename"
             )
         if each.smallest is None:
             lines.append(f"const {each.name} = {print_expression(each.expression)};")
@@ -147,7 +147,8 @@ def _coefficients(expression: sp.Expr, x: sp.Symbol, order: int) -> list[Fractio
                 rate, cycle = Fraction(inner.p, inner.q), _CYCLES[part.func]
             else:
                 raise ValueError(
-                    f"got {part} in {expression}; needed powers of {x} and exp, sin or cos of a rational multiple of it"
+                    f"got {part} in {expression}; needed powers of {x} and exp, sin or cos of a "
+                    f"rational multiple of {x}"
                 )
         size = factor
         for k in range(order - power):
@@ -168,7 +169,9 @@ def fraction_coefficients(series: Sequence[Fraction]) -> list[Fraction]:
     while rest:
         first = rest[0]
         if not first:
-            raise ValueError(f"got a series whose fraction ends after {len(result)} terms; needed one that goes on")
+            raise ValueError(
+                f"got a series whose continued fraction ends after {len(result)} terms; needed one that does not end"
+            )
         result.append(first)
         # The series of g in first / (1 + z g).
         inverse = [Fraction(1)]
@@ -195,7 +198,9 @@ def stable(expression: sp.Expr, x: sp.Symbol, up_to: int) -> sp.Expr:
             tail = 1 + a * up_to**2 / tail
         if abs(first * up_to / tail / exact - 1) < Fraction(1, 10**18):
             return sp.Piecewise((_fraction(first, others[:terms], x), x <= up_to), (expression, True))
-    raise ValueError(f"got {expression} up to {up_to}, where its fraction converges too slowly; needed a smaller point")
+    raise ValueError(
+        f"got {expression} up to {up_to}, where its continued fraction converges too slowly; needed a smaller up_to"
+    )
 
 
 def _fraction(first: Fraction, others: Sequence[Fraction], x: sp.Expr) -> sp.Expr:

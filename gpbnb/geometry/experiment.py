@@ -233,21 +233,19 @@ def _slope(time: Floats, values: Floats) -> Floats:
 
 def _block(roll_period: float | None, step: float) -> int:
     if not step > 0 or (roll_period is not None and not roll_period > 0):
-        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; both must be positive")
+        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed both above 0")
     if step > YEAR / 100:
-        raise ValueError(f"got a step of {step} s; take at least a hundred samples per year")
+        raise ValueError(f"got a step of {step} s; needed at least a hundred samples per year")
     if roll_period is None:
         return 10
     period, between = round(10 * roll_period), round(10 * step)
     if period != 10 * roll_period or between != 10 * step:
-        raise ValueError(
-            f"got a roll period of {roll_period} s and a step of {step} s; both must be multiples of 0.1 s"
-        )
+        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed multiples of 0.1 s")
     block = math.lcm(period, between) // between
     if block < 3:
         raise ValueError(
-            f"got {block} samples in whole rolls of {roll_period} s; needed 3 or more: take a step that is no multiple "
-            "of half the roll period"
+            f"got {block} samples in whole rolls of {roll_period} s; needed 3 or more; use a step "
+            "that is not a multiple of half the roll period"
         )
     return block
 

@@ -206,7 +206,9 @@ def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) 
     leak : length of the vector of both drift errors, in the unit of `amplitude` per length of the record.
     """
     if not rolls > 0 or (samples is not None and samples < 2):
-        raise ValueError(f"got {rolls} rolls with {samples} samples each; needed above 0, and 2 or more")
+        raise ValueError(
+            f"got {rolls} rolls with {samples} samples each; needed more than 0 rolls, and 2 or more samples"
+        )
     spread = math.pi if samples is None else samples * math.sin(math.pi / samples)
     return 6 / (rolls * spread) * abs(amplitude)
 
@@ -224,7 +226,10 @@ def ramp_leak(rate: float, roll_period: float, samples: int | None = None) -> fl
     samples : n, samples per roll, at least 2; infinitely many by default.
     """
     if not roll_period > 0 or (samples is not None and samples < 2):
-        raise ValueError(f"got a roll period of {roll_period} s with {samples} samples; needed above 0, and 2 or more")
+        raise ValueError(
+            f"got a roll period of {roll_period} s with {samples} samples; needed a period above 0 s, and "
+            "2 or more samples"
+        )
     whole = abs(rate) * roll_period
     return whole / (2 * math.pi) if samples is None else whole / (2 * samples * math.sin(math.pi / samples))
 
@@ -276,7 +281,9 @@ def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (G
 def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
     """Return the size of an angle whose :func:`small_angle_loss` equals `allowed`, in radians, at most half a turn."""
     if not 0 < allowed < small_angle_loss(name, math.pi, drift):
-        raise ValueError(f"got allowed = {allowed}; needed an angle above 0 that half a turn of {name} exceeds")
+        raise ValueError(
+            f"got allowed = {allowed}; needed an angle above 0 and below the error that half a turn of {name} causes"
+        )
     low, high = 0.0, math.pi
     for _ in range(80):
         middle = (low + high) / 2

@@ -31,7 +31,7 @@ def bandwidth_ratio(omega_bw: float, f_c: float) -> float:
     """Return μ, bandwidth in rad/s over iteration rate in Hz; raise ValueError if it leaves the range of float64."""
     mu = positive_number("omega_bw", omega_bw) / positive_number("f_c", f_c)
     if not 0 < mu < math.inf:
-        raise ValueError(f"got omega_bw / f_c = {mu}; the ratio must lie within the range of float64; check the units")
+        raise ValueError(f"got omega_bw / f_c = {mu}; needed a ratio within the range of float64; check the units")
     return mu
 
 

@@ -13,13 +13,15 @@ from gpbnb.inversion import experiment, stored
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
     parser = argparse.ArgumentParser(prog="python -m gpbnb.inversion", description=__doc__)
-    parser.add_argument("sweeps", nargs="*", default=list(experiment.SWEEPS), help="variants, random; both by default")
-    parser.add_argument("--folder", type=Path, default=Path(".cache/inversion"), help="where to write")
-    parser.add_argument("--first", type=int, help="compute only so many cells")
-    parser.add_argument("--directory", type=Path, default=Path(".cache/inversion"), help="where progress is saved")
+    parser.add_argument(
+        "sweeps", nargs="*", default=list(experiment.SWEEPS), help="sweeps to compute: variants, random; default: both"
+    )
+    parser.add_argument("--folder", type=Path, default=Path(".cache/inversion"), help="folder for the results")
+    parser.add_argument("--first", type=int, help="compute only this many cells")
+    parser.add_argument("--directory", type=Path, default=Path(".cache/inversion"), help="folder for saved progress")
     given = parser.parse_args(arguments)
     if unknown := set(given.sweeps) - set(experiment.SWEEPS):
-        parser.error(f"got {', '.join(sorted(unknown))}; needed one of {', '.join(experiment.SWEEPS)}")
+        parser.error(f"got sweeps {', '.join(sorted(unknown))}; needed one of {', '.join(experiment.SWEEPS)}")
     for name in given.sweeps:
         sweep = stored.sweep(name)
         results = sweep.run(given.directory / name, cells=sweep.cells()[: given.first])

@@ -106,7 +106,7 @@ def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> f
     """
     if x.format.rounding is not Rounding.NEAREST:
         raise ValueError(
-            f"this bound needs rounding to nearest, whose errors can average out; got {x.format}. Use higham."
+            f"got {x.format}; this bound needs rounding to nearest, whose errors can average out. Use higham."
         )
     n = len(x)
     one = gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3))
@@ -172,7 +172,7 @@ def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None =
             inverse = _balls(a).solve(_identity(len(x)), algorithm="precond" if preconditioned else "lu")
         except ZeroDivisionError:
             raise ValueError(
-                f"in {precision} bits, the matrix cannot be distinguished from a singular one; use more bits"
+                f"got a matrix that {precision} bits cannot distinguish from a singular one; use more bits"
             ) from None
     with _working(precision + 64):
         return _upper(_column_sum(_balls(x) - inverse))
@@ -326,8 +326,8 @@ def smallest_precision(
     best = min((each.bound for each in tried.values()), default=math.inf)
     reached = f"the best proved bound is {best:.3g}" if best < math.inf else "no precision gives a bound at all"
     raise ValueError(
-        f"no inverse in at most {largest} base-{base} digits is proved to have a relative error of "
-        f"{float(tolerance):.3g}; {reached}. Raise largest or the tolerance."
+        f"got no inverse in at most {largest} base-{base} digits with a proved relative error of at "
+        f"most {float(tolerance):.3g}; {reached}. Increase largest or the tolerance."
     )
 
 

@@ -143,7 +143,9 @@ def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fracti
     if wordlength.kind == "fixed point":
         return y + step * Fraction(1, 10**places)
     if y == 0:
-        raise ValueError("got zero, which has no neighbour without a smallest exponent")
+        raise ValueError(
+            "got zero; needed a nonzero number, because zero has no neighbour when the exponent is unlimited"
+        )
     fmt = wordlength.format(places)
     _, _, e = fmt.split(y)
     unit = Fraction(10) ** (e - fmt.precision)

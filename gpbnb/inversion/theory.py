@@ -365,7 +365,7 @@ def _gammas(weights: NDArray[Any], beta: Any, like: NDArray[Any]) -> NDArray[Any
 
 def _pivot(matrix: NDArray[Any], k: int) -> Any:
     if matrix[k, k] == 0:
-        raise ValueError(f"got a zero pivot in stage {k}; needed one other than zero; interchange rows")
+        raise ValueError(f"got a zero pivot in stage {k}; needed a nonzero pivot; interchange rows")
     return matrix[k, k]
 
 

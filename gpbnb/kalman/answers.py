@@ -58,7 +58,8 @@ def find_answers(tolerance: float = 1.0) -> Answers:
         enough = [decimal_digits(fmt) for run in runs if (fmt := _good(run, rounding, tolerance)) is not None]
         if not enough:
             raise ValueError(
-                f"got a tolerance of {tolerance}; needed one that some year meets: the best rounds to {_best(runs):.2g}"
+                f"got a tolerance of {tolerance}; needed one that at least one run of a year meets: "
+                f"the smallest error is {_best(runs):.2g}"
             )
         observed[rounding] = min(enough)
     corrected = report_bounds.coefficients(*report_bounds.EXAMPLE, **report_bounds.ALL_CORRECTED)

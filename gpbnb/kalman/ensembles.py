@@ -252,8 +252,9 @@ def _gather(batches: Sequence[tuple[Task, ...]], executor: Executor, attempts: i
                     raise
                 if tries[number] >= attempts:
                     raise RuntimeError(
-                        f"got {attempts} workers that died under one batch of {len(batches[number])} trials; needed "
-                        "one that lives; give workers more memory, or send smaller batches"
+                        f"got {attempts} workers that died under one batch of {len(batches[number])} "
+                        "trials; needed workers that survive; give them more memory, or send smaller "
+                        "batches"
                     ) from error
                 tries[number] += 1
                 pending[executor.submit(_some, batches[number])] = number
@@ -390,9 +391,9 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Random filters by thousands.")
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="trials of each kind, format and form")
-    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="where the two files go")
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Survey thousands of random filters.")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="number of trials for each kind, format and form")
+    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="folder for the two files")
     given = parser.parse_args(arguments)
     todo, start = tasks(given.repeats), time.perf_counter()
     outcomes = sweep(todo, progress=True)

@@ -64,7 +64,9 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
         if values.ndim > 1:
             values = values.max(axis=1)
         if run.case.fmt is None:
-            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+            raise ValueError(
+                "got the reference among the runs; needed only rounded runs, because the reference has no error"
+            )
         seen = values > 0
         artists += ax.plot(
             run.steps[seen], values[seen], marker=_MARKERS[run.case.form], color=colour, lw=0.8, label=_name(run)

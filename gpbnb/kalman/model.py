@@ -99,11 +99,12 @@ class LinearModel:
             entries.flags.writeable = False
             object.__setattr__(self, letter, entries)
         if self.x0.ndim != 1 or not self.x0.size:
-            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number a state")
+            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number per state")
         n = self.x0.size
         if self.H.ndim != 3 or 0 in self.H.shape or self.H.shape[2] != n:
             raise ValueError(
-                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), a row a measurement and a column a state of x0"
+                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), one row per measurement and "
+                "one column per state of x0"
             )
         m = self.H.shape[1]
         for letter, size in (("Phi", n), ("Q", n), ("R", m)):
@@ -177,7 +178,8 @@ class LinearModel:
             object.__setattr__(self, letter, entries)
         if self.B is not None and self.B.shape[2] != self.u.shape[-1]:
             raise ValueError(
-                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers a step; needed as many"
+                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers per "
+                "step; needed equal numbers"
             )
 
     @property

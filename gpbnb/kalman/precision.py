@@ -108,8 +108,9 @@ def required_precision(
             )
     if z is None and steps > MOST_SIMULATED:
         raise ValueError(
-            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: they take hours; try fewer, and see "
-            "how the answer grows: gpbnb.wordlength.study.required_precision_by_steps"
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; "
+            "try fewer, and see how the answer grows with "
+            "gpbnb.wordlength.study.required_precision_by_steps"
         )
     if z is None:
         z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
@@ -179,7 +180,7 @@ def survey(
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
-        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound": the others do not depend on a run')
+        raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
     formats = _formats(base, precisions, rounding)
     checkpoint_steps = log_spaced(len(measured), 16)
     true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
@@ -212,7 +213,7 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
         count = f"{steps} steps" if steps else "steps, at least one"
         column = "; write z.reshape(-1, 1)" if measured.ndim == model.m == 1 else ""
         length = f"{len(measured)} measurements of shape {measured.shape[1:]}" if measured.ndim else "a single number"
-        raise ValueError(f"got {length}; needed one for each of the {count}, of shape ({model.m},){column}")
+        raise ValueError(f"got {length}; needed one measurement for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
         raise ValueError(

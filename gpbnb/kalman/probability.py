@@ -154,7 +154,7 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
     """
     kinds = {(each.setting, each.states, each.form, each.fmt.base, each.fmt.rounding) for each in found}
     if len(kinds) != 1:
-        raise ValueError(f"got formats of {len(kinds)} kinds; needed those of one")
+        raise ValueError(f"got formats of {len(kinds)} kinds; needed formats of one kind")
 
     def first(meets: Sequence[bool]) -> int | None:
         enough = None

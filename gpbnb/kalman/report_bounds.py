@@ -133,7 +133,9 @@ def printed_input_bound(transitions: Sequence[Any], inputs: Sequence[Any]) -> Fr
     ValueError : no steps, or different numbers of transitions and inputs.
     """
     if not transitions or len(transitions) != len(inputs):
-        raise ValueError(f"got {len(transitions)} transitions and {len(inputs)} inputs; needed as many, at least one")
+        raise ValueError(
+            f"got {len(transitions)} transitions and {len(inputs)} inputs; needed equal numbers, at least one of each"
+        )
     F, u = max(map(column_sum_norm, transitions)), max(map(max_norm, inputs))
     return u * max(Fraction(1), F ** (len(inputs) - 1))
 
@@ -170,7 +172,7 @@ def precision_for_coefficient(
         raise ValueError(f"got coefficient {coefficient} and tolerance {tolerance}; needed both positive")
     found = smallest_precision(lambda fmt: coefficient * fmt.unit_roundoff <= tolerance, base, rounding, monotone=True)
     if found is None:
-        raise ArithmeticError("the unit roundoff falls without limit: some precision must be enough")
+        raise ArithmeticError("got no sufficient precision, although the unit roundoff can be arbitrarily small")
     return found.precision
 
 

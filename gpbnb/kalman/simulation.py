@@ -42,11 +42,11 @@ class Simulation:
     def __post_init__(self) -> None:
         self.model.refuse_inputs("a simulation")
         if len(self.start) != self.model.n:
-            raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one a state")
+            raise ValueError(f"got a start of {len(self.start)} numbers; needed {self.model.n}, one per state")
         given = np.asarray(self.resolution, dtype=np.float64)
         if given.shape not in ((), (self.model.m,)) or not ((given > 0) & (given < math.inf)).all():
             raise ValueError(
-                f"got resolution {self.resolution}; needed a number above 0, or {self.model.m}, one a measurement"
+                f"got resolution {self.resolution}; needed a number above 0, or {self.model.m}, one per measurement"
             )
 
     @cached_property

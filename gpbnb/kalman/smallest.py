@@ -79,7 +79,7 @@ def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[ND
     """
     Phi, H, Q, R, x, P, z = case
     if len(H) != 1:
-        raise ValueError(f"got {len(H)} measurements; needed one; take them one after another")
+        raise ValueError(f"got {len(H)} measurements; needed one; process several one after another")
     fl = np.vectorize(fmt.round, otypes=[object])
 
     def product(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:

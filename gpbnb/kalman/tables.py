@@ -170,7 +170,9 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
     body = []
     for run in runs:
         if run.case.fmt is None:
-            raise ValueError("got the reference among the runs; needed rounded runs: it has no error")
+            raise ValueError(
+                "got the reference among the runs; needed only rounded runs, because the reference has no error"
+            )
         found = (np.abs(run.drift[-1]).max(), np.abs(run.rate[-1]).max(), run.gain[-1], run.covariance[-1])
         cells = [arithmetic(run.case.fmt), str(run.case.form), *(short(float(each)) for each in found)]
         lost = f"; first non-positive variance at step {run.indefinite:,}" if run.indefinite else ""
@@ -200,7 +202,9 @@ def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms
     for run, reference in zip(runs, bounds, strict=True):
         fmt, k = run.case.fmt, int(run.steps[-1])
         if fmt is None or reference.steps[-1] != k:
-            raise ValueError(f"got {run.case.name} with a bound to step {reference.steps[-1]}; needed one to step {k}")
+            raise ValueError(
+                f"got {run.case.name} with a bound up to step {reference.steps[-1]}; needed one up to step {k}"
+            )
         at = int(np.abs(run.rate[-1]).argmax())
         error = abs(float(run.rate[-1, at]))
         companion = float(contraction.companion_bound(run.rate[-1, at], reference.rate[-1, at]))

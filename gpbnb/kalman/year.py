@@ -75,7 +75,7 @@ def rows(case: Case, found: History) -> list[tuple[str, ...]]:
 class Bounds:
     """The contraction bound of a run, in the same units and norms as the errors of :class:`Year`.
 
-    The errors of a run that has none of its own are at most those against its reference, and the reference's bound:
+    The errors of a run without its own bound are at most its distance from the reference plus the reference's bound:
     :func:`gpbnb.kalman.contraction.companion_bound`.
     """
 
@@ -237,16 +237,19 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog=_COMMAND, description="A year in many formats and forms.")
-    parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="where runs are saved on the way")
-    parser.add_argument("--steps", type=int, default=YEAR, help="fewer, for a trial")
-    parser.add_argument("--cases", type=int, default=len(CASES), help="only so many of the cases")
-    parser.add_argument("--output", type=Path, default=Path(".cache/year"), help="where year.csv and year.json go")
+    parser = argparse.ArgumentParser(prog=_COMMAND, description="Run the filters for a year in many formats and forms.")
+    parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="folder for saved progress")
+    parser.add_argument("--steps", type=int, default=YEAR, help="number of steps; use fewer for a trial")
+    parser.add_argument("--cases", type=int, default=len(CASES), help="compute only this many cases")
+    parser.add_argument("--output", type=Path, default=Path(".cache/year"), help="folder for year.csv and year.json")
     given = parser.parse_args(arguments)
     try:
         run_cases(CASES[: given.cases], given.directory, given.steps)
     except KeyboardInterrupt:
-        print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
+        print(
+            f"interrupted; run the same command again to continue from the progress saved in {given.directory}",
+            file=sys.stderr,
+        )
         return 130
     given.output.mkdir(parents=True, exist_ok=True)
     write(CASES[: given.cases], given.directory, given.steps, given.output)

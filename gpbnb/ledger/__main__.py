@@ -16,8 +16,9 @@ from gpbnb.ledger.statements import Statement, load_statements, select
 
 COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # argparse uses 2 for wrong arguments
 _EPILOG = (
-    "exit status: 0, every entry of the selection has its finding; 1, some lack their check; 2, bad arguments, or the "
-    "ledger or the output file cannot be used; 3, a check raised an exception (the other rows are written all the same)"
+    "exit status: 0, every selected entry has a finding; 1, some entries have no check; 2, the "
+    "arguments are invalid, or the ledger or the output file cannot be used; 3, a check raised an "
+    "exception (the other rows are still written)"
 )
 
 
@@ -30,15 +31,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb.ledger",
-        description="Check everything printed in the three documents, and write what became of it.",
+        description="Check every statement of the three documents and write the findings.",
         epilog=_EPILOG,
     )
     parser.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
     parser.add_argument("--document", help="hung1984, hung1982 or savage2016; default: all")
-    parser.add_argument("--chapter", help="as numbered in the document, as in II; default: all")
-    parser.add_argument("--section", nargs="+", metavar="S", help="one or more; 9 takes 9.1 and 9.2 too; default: all")
-    parser.add_argument("--output", type=Path, metavar="FILE", help="a file, replaced as a whole; default: stdout")
-    parser.add_argument("--fresh", action="store_true", help="run every check, also where nothing has changed since")
+    parser.add_argument("--chapter", help="chapter number as in the document, such as II; default: all")
+    parser.add_argument(
+        "--section", nargs="+", metavar="S", help="one or more section numbers; 9 includes 9.1 and 9.2; default: all"
+    )
+    parser.add_argument(
+        "--output", type=Path, metavar="FILE", help="file to write, replacing any existing file; default: stdout"
+    )
+    parser.add_argument("--fresh", action="store_true", help="run every check again instead of using stored findings")
     arguments = parser.parse_args(argv)
     try:
         inventory = load_statements()
@@ -84,16 +89,16 @@ def _report(rows: Sequence[Row]) -> None:
             print(f"the check of {row.statement.id} failed: {cause} ({frame.filename}:{frame.lineno})", file=sys.stderr)
     outcomes = counts(rows)
     print(f"{len(rows)} entries: {describe(outcomes)}", file=sys.stderr)
-    print(f"{outcomes.get(MISSING, 0)} lack their check", file=sys.stderr)
+    print(f"{outcomes.get(MISSING, 0)} entries have no check", file=sys.stderr)
 
 
 def _check_output(path: Path | None) -> None:
     if path is None:
         return
     if path.exists() and not path.is_file():
-        raise ValueError(f"--output {path} is not a regular file; name a file, or leave --output out for stdout")
+        raise ValueError(f"got --output {path}; needed a regular file; name one, or omit --output for stdout")
     if not path.parent.is_dir():
-        raise ValueError(f"--output {path}: there is no directory {path.parent}; make it first")
+        raise ValueError(f"got --output {path}; needed an existing directory {path.parent}; create it first")
 
 
 def _replace(path: Path, content: bytes) -> None:

@@ -55,10 +55,13 @@ def owners(statements: Iterable[Statement], topics: Mapping[str, Checks] = TOPIC
     for topic, checks in topics.items():
         for key in checks:
             if key not in known:
-                raise ValueError(f"{topic} checks {key!r}, which is not in statements.csv; correct the id or add it")
+                raise ValueError(
+                    f"got a check of {key!r} in {topic}; needed an id from statements.csv; correct the id "
+                    "or add the statement"
+                )
             if key in found:
                 raise ValueError(
-                    f"{key!r} is checked by {found[key]} and by {topic}; a statement has one check: drop one"
+                    f"got checks of {key!r} in {found[key]} and in {topic}; needed one check per statement; remove one"
                 )
             found[key] = topic
     return found
@@ -193,7 +196,7 @@ def counts(rows: Iterable[Row]) -> dict[str, int]:
 
 
 def in_reading_order(rows: Iterable[Row]) -> tuple[Row, ...]:
-    """Sort by document and chapter in order of appearance, then by section number; sections keep their order."""
+    """Sort by document and chapter in order of appearance, then by section; rows of a section keep their order."""
     rows = tuple(rows)
     documents = list(dict.fromkeys(row.statement.document for row in rows))
     chapters = list(dict.fromkeys((row.statement.document, row.statement.chapter) for row in rows))

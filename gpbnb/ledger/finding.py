@@ -52,7 +52,7 @@ _AGREES: dict[Verdict, tuple[bool | None, ...]] = {
 DISAGREEMENTS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.NOT_REPRODUCED, Verdict.MISPRINT, Verdict.OCR)
 """Verdicts on statements that do not agree with the recomputation, the most serious first."""
 _NEEDS_NOTE = {
-    Verdict.UNVERIFIABLE: "which data is missing",
+    Verdict.UNVERIFIABLE: "which data are missing",
     Verdict.GIVEN: "what it defines or gives",
     Verdict.ANSWERED: "where it is answered",
 }
@@ -85,28 +85,36 @@ class Finding:
     def __post_init__(self) -> None:
         for name, text in (("recomputed", self.recomputed), ("note", self.note)):
             if not isinstance(text, str):
-                raise TypeError(f"{name}={text!r} is a {type(text).__name__}; a str is needed: format it")
+                raise TypeError(f"got {name}={text!r} of type {type(text).__name__}; needed a str; format the value")
             if text.count("$") % 2 or "$$" in text:
-                raise ValueError(f"{name}={text!r} has an unpaired or doubled dollar sign; write math as $...$")
+                raise ValueError(f"got {name}={text!r} with an unpaired or doubled dollar sign; needed math as $...$")
         if not isinstance(self.verdict, Verdict):
-            raise TypeError(f"verdict={self.verdict!r} is a {type(self.verdict).__name__}; take one of {list(Verdict)}")
+            raise TypeError(
+                f"got verdict={self.verdict!r} of type {type(self.verdict).__name__}; needed one of {list(Verdict)}"
+            )
         if self.agrees is not None and not isinstance(self.agrees, bool):
             raise TypeError(
-                f"agrees={self.agrees!r} is a {type(self.agrees).__name__}; a bool or None is needed: use bool(...)"
+                f"got agrees={self.agrees!r} of type {type(self.agrees).__name__}; needed a bool or None; use bool(...)"
             )
         if self.agrees not in _AGREES[self.verdict]:
             needed = " or ".join(str(value) for value in _AGREES[self.verdict])
             raise ValueError(
-                f"verdict {self.verdict.value!r} came with agrees={self.agrees}; it needs {needed}: "
-                "let compare(), answer() or unverifiable() choose the verdict"
+                f"got verdict {self.verdict.value!r} with agrees={self.agrees}; needed {needed}; let "
+                "compare(), answer() or unverifiable() choose the verdict"
             )
         if self.root and self.verdict not in DISAGREEMENTS:
-            raise ValueError(f"verdict {self.verdict.value!r} came with the root error {self.root!r}; it has none")
+            raise ValueError(
+                f"got verdict {self.verdict.value!r} with the root error {self.root!r}; needed no root "
+                "error for this verdict; omit root"
+            )
         if self.agrees is not None and not self.recomputed.strip():
-            raise ValueError(f"agrees={self.agrees} came with a blank recomputed; say what was computed")
+            raise ValueError(
+                f"got agrees={self.agrees} with a blank recomputed text; needed a text that says what was computed"
+            )
         if self.verdict in _NEEDS_NOTE and not self.note.strip():
             raise ValueError(
-                f"verdict {self.verdict.value!r} came without a note; say there {_NEEDS_NOTE[self.verdict]}"
+                f"got verdict {self.verdict.value!r} without a note; needed a note that says "
+                f"{_NEEDS_NOTE[self.verdict]}"
             )
 
 
@@ -140,7 +148,7 @@ def compare(
     """
     if otherwise not in DISAGREEMENTS:
         came = otherwise.value if isinstance(otherwise, Verdict) else otherwise
-        raise ValueError(f"otherwise={came!r}; a disagreement is one of {', '.join(v.value for v in DISAGREEMENTS)}")
+        raise ValueError(f"got otherwise={came!r}; needed one of {', '.join(v.value for v in DISAGREEMENTS)}")
     _require_bool("agrees", agrees)
     if agrees:
         return Finding(recomputed, True, Verdict.VERIFIED, note)
@@ -201,4 +209,4 @@ def given(note: str) -> Finding:
 
 def _require_bool(name: str, value: object) -> None:
     if not isinstance(value, bool):
-        raise TypeError(f"{name}={value!r} is a {type(value).__name__}; a bool is needed: use bool(...)")
+        raise TypeError(f"got {name}={value!r} of type {type(value).__name__}; needed a bool; use bool(...)")

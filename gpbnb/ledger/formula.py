@@ -75,7 +75,9 @@ class Link:
         ValueError : the symbol is ``≈``; the check must say how close is close enough.
         """
         if self.symbol == "≈":
-            raise ValueError(f"{self.left} ≈ {self.right}: compare the two sides of ≈ in the check")
+            raise ValueError(
+                f"got {self.left} ≈ {self.right}; needed a relation without ≈; compare the two sides in the check"
+            )
         left, right = self.left, self.right
         if self.symbol == "==" and isinstance(left, sp.Basic | sp.MatrixBase):
             difference = left - right
@@ -238,20 +240,20 @@ def _part(text: str) -> Part:
     if labelled and "|" in labelled[2]:
         first, *others = (phrase.strip() for phrase in labelled[2].split("|"))
         if not first or not others or not all(others) or len({first, *others}) <= len(others):
-            raise ValueError(f"{text!r} needs different phrases on both sides of |")
+            raise ValueError(f"got {text!r}; needed different phrases on the two sides of |")
         return Words(labelled[1], first, tuple(others))
     if labelled:
         number = _NUMBER.fullmatch(labelled[2])
         if not number:
             raise ValueError(
-                f"{text!r}: {labelled[2]!r} is not a number with a unit; write words as 'label: this | that'"
+                f"got {labelled[2]!r} in {text!r}; needed a number with a unit, or words as 'label: this | that'"
             )
         return Number(labelled[1], number[1], number[2] or "")
     try:
         relation = Relation(text)
         typeset(relation.tree, 0)
     except (SyntaxError, KeyError, TypeError) as error:
-        raise ValueError(f"{text!r} is not a relation ({error})") from error
+        raise ValueError(f"got {text!r}; needed a relation ({error})") from error
     return relation
 
 
@@ -300,7 +302,7 @@ class _Evaluation:
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
                 found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
                 return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
-        raise ValueError(f"{ast.unparse(node)} cannot be evaluated")
+        raise ValueError(f"got {ast.unparse(node)}; needed an expression that can be evaluated")
 
     def _indices(self, index: ast.expr) -> list[Any]:
         return [self(i) for i in (index.elts if isinstance(index, ast.Tuple) else [index])]
@@ -317,7 +319,7 @@ class _Evaluation:
     def _repeated(self, name: str, arguments: list[ast.expr]) -> Any:
         term, bounds = arguments
         if not isinstance(bounds, ast.Tuple) or not isinstance(bounds.elts[0], ast.Name):
-            raise ValueError(f"{name} needs (index, first, last)")
+            raise ValueError(f"got {name} without a range; needed (index, first, last)")
         index, (first, last) = bounds.elts[0].id, map(self, bounds.elts[1:])
         if name != "Int" and getattr(first, "is_Integer", True) and getattr(last, "is_Integer", True):
             terms = [
@@ -331,7 +333,7 @@ class _Evaluation:
                 total = total + each if name == "Sum" else total * each
             return total
         if name in ("Max", "Largest"):
-            raise ValueError(f"{name} needs a range of numbers, got {first} to {last}")
+            raise ValueError(f"got {name} from {first} to {last}; needed whole numbers")
         inner = _Evaluation({**self.names, index: sp.Symbol(index, integer=name != "Int")}, self.number)(term)
         operation = {"Sum": sp.summation, "Prod": sp.product, "Int": sp.integrate}[name]
         return operation(inner, (sp.Symbol(index, integer=name != "Int"), first, last))
@@ -344,7 +346,7 @@ class _Evaluation:
             if isinstance(argument, ast.Tuple) and self(argument.elts[1])
         ]
         if len(values) != 1:
-            raise Undefined(f"{len(values)} cases hold; exactly one is needed")
+            raise Undefined(f"got {len(values)} cases that hold; needed exactly one")
         return values[0]
 
 
@@ -352,7 +354,7 @@ def _apply(node: ast.expr, operation: Callable[..., Any], *operands: Any) -> Any
     try:
         return operation(*operands)
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        raise Undefined(f"{ast.unparse(node)} has no value here: {error}") from error
+        raise Undefined(f"got {ast.unparse(node)}, which has no value here: {error}") from error
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {

@@ -69,7 +69,7 @@ CLAIMS = {
     "hung1982.IV.eq8": "Deroll of the first drift",
     "hung1982.IV.eq9": "Deroll of the second drift",
     "savage2016.main.eq35": "Random walk of a trapezoidal integrator",
-    "savage2016.main.eq39": "The same for fast sampling",
+    "savage2016.main.eq39": "Random walk for fast sampling",
 }
 """The principal claims of the documents, by statement id."""
 
@@ -107,7 +107,7 @@ def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[R
     ValueError : no such topic.
     """
     if topic not in TOPICS:
-        raise ValueError(f"no topic {topic!r}; the topics are {', '.join(TOPICS)}")
+        raise ValueError(f"got topic {topic!r}; needed one of {', '.join(TOPICS)}")
     return tuple(
         row
         for row in rows
@@ -135,7 +135,7 @@ def count_table(rows: Iterable[Row], by: str) -> Table:
         "kind": lambda row: row.statement.kind,
     }
     if by not in groups:
-        raise ValueError(f"by={by!r}; take one of {', '.join(groups)}")
+        raise ValueError(f"got by={by!r}; needed one of {', '.join(groups)}")
     total = counts(rows)
     inside: dict[str, list[Row]] = {}
     for row in rows:
@@ -219,7 +219,8 @@ def root_table(rows: Iterable[Row]) -> Html:
             f'<td><p>{typeset(roots[key].explanation)}</p><p class="spoils">{places}</p></td></tr>'
         )
     return Html(
-        f"{len(found)} root errors", _wrapped(("Root error", "Statements", "Why, and where"), lines, "ledger-roots")
+        f"{len(found)} root errors",
+        _wrapped(("Root error", "Statements", "Explanation and affected statements"), lines, "ledger-roots"),
     )
 
 
@@ -236,7 +237,10 @@ def claim_table(rows: Iterable[Row]) -> Html:
             f'<tr><th scope="row">{escape(claim)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
             f"<td><p>{text}</p><p>{chapter_link(owner[key])}</p></td></tr>"
         )
-    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "As printed, and where it is examined"), lines))
+    return Html(
+        f"{len(lines)} claims",
+        _wrapped(("Claim", "Outcome", "Printed statement, and the chapter that examines it"), lines),
+    )
 
 
 def _link(row: Row) -> str:

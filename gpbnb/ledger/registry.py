@@ -49,22 +49,25 @@ class Checks(Mapping[str, Check]):
         ValueError : an id is blank or has its check already.
         """
         if not ids:
-            raise TypeError('add() came without an id; write @CHECKS.add("document.chapter.item")')
+            raise TypeError("got add() without an id; needed @CHECKS.add('document.chapter.item')")
         for key in ids:
             if not isinstance(key, str):
-                raise TypeError(f'{key!r} is not an id; write @CHECKS.add("document.chapter.item")')
+                raise TypeError(f"got {key!r}; needed an id, as in @CHECKS.add('document.chapter.item')")
             if not key.strip():
-                raise ValueError("an id is blank; give the id of a ledger entry")
+                raise ValueError("got a blank id; needed the id of a ledger entry")
 
         def register(check: _C) -> _C:
             if len(inspect.signature(check).parameters) > 1:
-                raise TypeError(f"{_name(check)} takes several arguments; a check takes the printed statement alone")
+                raise TypeError(
+                    f"got {_name(check)} with several arguments; needed a check that takes only the printed statement"
+                )
             new: dict[str, Check] = {}
             for key in ids:
                 other = new.get(key) or self._checks.get(key)
                 if other is not None:
                     raise ValueError(
-                        f"{key!r} is checked by {_name(other)} and by {_name(check)}; an entry has one check: drop one"
+                        f"got two checks of {key!r}, {_name(other)} and {_name(check)}; needed one "
+                        "check per entry; remove one"
                     )
                 new[key] = check
             self._checks.update(new)
@@ -84,8 +87,8 @@ class Checks(Mapping[str, Check]):
         finding = check(statement) if takes_statement(check) else check()
         if not isinstance(finding, Finding):
             raise TypeError(
-                f"the check of {statement.id!r}, {_name(check)}, returned {finding!r}; a Finding is needed: "
-                "return compare(...), answer(...), unverifiable(...) or given(...)"
+                f"got {finding!r} from the check of {statement.id!r}, {_name(check)}; needed a "
+                "Finding: return compare(...), answer(...), unverifiable(...) or given(...)"
             )
         return finding
 
@@ -93,7 +96,9 @@ class Checks(Mapping[str, Check]):
         try:
             return self._checks[key]
         except KeyError:
-            raise KeyError(f"no check of {key!r} here; list(checks) gives the {len(self)} ids that have one") from None
+            raise KeyError(
+                f"got {key!r}, which has no check here; needed one of the {len(self)} ids in list(checks)"
+            ) from None
 
     def __contains__(self, key: object) -> bool:
         return key in self._checks

@@ -66,7 +66,7 @@ class Statement:
         """
         relations = [part for part in self.parts if isinstance(part, Relation)]
         if not 1 <= number <= len(relations):
-            raise LookupError(f"{self.id} has {len(relations)} relations; got number {number}")
+            raise LookupError(f"got relation number {number} of {self.id}; needed a number from 1 to {len(relations)}")
         return relations[number - 1]
 
     def links(
@@ -112,7 +112,7 @@ class Statement:
             if isinstance(part, sort) and part.label == label:
                 return part
         labels = ", ".join(part.label for part in self.parts if isinstance(part, sort)) or "none"
-        raise LookupError(f"{self.id} has no {sort.__name__.lower()} {label!r}; it has: {labels}")
+        raise LookupError(f"got {sort.__name__.lower()} {label!r} of {self.id}; needed one of {labels}")
 
 
 _PLACE = re.compile(r"\{\{(\d+)\}\}")
@@ -139,19 +139,19 @@ def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
     try:
         text = source.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{source.name} is not UTF-8 ({error}); save it as UTF-8") from error
+        raise ValueError(f"got {source.name}, which is not UTF-8 ({error}); save it as UTF-8") from error
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     entries: list[Statement] = []
     seen: dict[str, int] = {}
     try:
         header = next(reader, [])
         if tuple(header) != HEADER:
-            raise ValueError(f"the header is {','.join(header)!r}; {','.join(HEADER)!r} is needed")
+            raise ValueError(f"got the header {','.join(header)!r}; needed {','.join(HEADER)!r}")
         for record in reader:
             entry = _entry(record)
             if entry.id in seen:
                 raise ValueError(
-                    f"id {entry.id!r} is that of line {seen[entry.id]} already; ids are unique: rename one"
+                    f"got id {entry.id!r}, which line {seen[entry.id]} has already; needed a unique id; rename one"
                 )
             seen[entry.id] = reader.line_num
             entries.append(entry)
@@ -173,7 +173,7 @@ def statement(key: str) -> Statement:
     KeyError : there is no statement with this id.
     """
     if key not in _by_id():
-        raise KeyError(f"no statement {key!r} in statements.csv; correct the id")
+        raise KeyError(f"got {key!r}; needed the id of a statement in statements.csv")
     return _by_id()[key]
 
 
@@ -184,22 +184,27 @@ def quote(key: str) -> str:
 
 def _entry(record: list[str]) -> Statement:
     if len(record) != len(HEADER):
-        raise ValueError(f"{len(record)} fields; {len(HEADER)} are needed: quote a field that holds a comma")
+        raise ValueError(f"got {len(record)} fields; needed {len(HEADER)}; quote a field that contains a comma")
     entry = Statement(*record)
     for name, value in zip(HEADER, record, strict=True):
         if (not value and name != "form") or value != value.strip():
-            raise ValueError(f"{name}={value!r} is blank or has blanks at an end; fill it in, '-' where there is none")
+            raise ValueError(
+                f"got {name}={value!r}; needed a text without leading or trailing blanks; write '-' where there is none"
+            )
     if entry.document not in DOCUMENTS:
-        raise ValueError(f"unknown document {entry.document!r}; take one of {', '.join(DOCUMENTS)}")
+        raise ValueError(f"got document {entry.document!r}; needed one of {', '.join(DOCUMENTS)}")
     if entry.kind not in KINDS:
-        raise ValueError(f"unknown kind {entry.kind!r}; take one of {', '.join(KINDS)}")
+        raise ValueError(f"got kind {entry.kind!r}; needed one of {', '.join(KINDS)}")
     if not entry.id.startswith(f"{entry.document}."):
-        raise ValueError(f"id {entry.id!r} does not begin with its document; write '{entry.document}.…'")
+        raise ValueError(f"got id {entry.id!r}; needed an id that begins with its document: '{entry.document}.…'")
     if entry.text.count("$") % 2 or "$$" in entry.text:
-        raise ValueError(f"text={entry.text!r} has an unpaired or doubled dollar sign; write math as $...$")
+        raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
     for place in _PLACE.findall(entry.text):
         if not 1 <= int(place) <= len(entry.parts):
-            raise ValueError(f"text has the place {{{{{place}}}}}, but the form has {len(entry.parts)} parts")
+            raise ValueError(
+                f"got the place {{{{{place}}}}} in text; needed a number up to {len(entry.parts)}, the "
+                "number of parts of the form"
+            )
     _ = entry.parts, entry.printed
     return entry
 
@@ -230,7 +235,7 @@ def select(
     if sections is not None:
         wanted = [sections] if isinstance(sections, str) else [str(section) for section in sections]
         if not wanted:
-            raise ValueError("sections is empty; name at least one, or None for all")
+            raise ValueError("got an empty sections; needed at least one section, or None for all")
         within = {entry.id for section in wanted for entry in _keep(found, "section", section)}
         found = tuple(entry for entry in found if entry.id in within)
     return found
@@ -244,5 +249,5 @@ def _keep(entries: tuple[Statement, ...], field: str, value: str) -> tuple[State
     )
     if not kept:
         there = ", ".join(dict.fromkeys(getattr(entry, field) for entry in entries))
-        raise ValueError(f"no entry of {field} {value!r}; here are: {there}")
+        raise ValueError(f"got {field} {value!r}, which no entry has; needed one of {there}")
     return kept

@@ -104,7 +104,7 @@ def typeset(node: ast.expr, level: int) -> str:
             return r"\begin{bmatrix}" + r" \\ ".join(lines) + r"\end{bmatrix}"
         case ast.List(elts=cells) | ast.Tuple(elts=cells):
             return rf"\left[{', '.join(typeset(cell, 0) for cell in cells)}\right]"
-    raise TypeError(f"{ast.unparse(node)} cannot be typeset")
+    raise TypeError(f"got {ast.unparse(node)}; needed an expression that can be typeset")
 
 
 def _without_minus(node: ast.expr) -> ast.expr | None:

@@ -16,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog=SWEEP.command, description="Simulate the drift rates of all gyros, about 40 s of processor time."
     )
     parser.add_argument(
-        "--output", type=Path, default=Path(".cache/drift_rates"), help="folder for drift_rates.csv and for progress"
+        "--output", type=Path, default=Path(".cache/drift_rates"), help="folder for drift_rates.csv and saved progress"
     )
     given = parser.parse_args(arguments)
     file = given.output / SWEEP.file.name

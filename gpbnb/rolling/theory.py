@@ -108,7 +108,7 @@ def fitted_drift(
 def roll_rate(period: float) -> Fraction:
     """ω_r = 2π/T in rad/s, to 60 digits, from the exact binary value of the period."""
     if not (period > 0 and math.isfinite(period)):
-        raise ValueError(f"got a roll period of {period} s; needed a positive number; leave rolling out for none")
+        raise ValueError(f"got a roll period of {period} s; needed a positive number; omit rolling if there is no roll")
     with mpmath.workdps(80):
         digits = mpmath.nstr(2 * mpmath.pi, 60)
     return Fraction(digits) / Fraction(period)
@@ -231,7 +231,7 @@ def variance_of_sum(weights: Any, level: float) -> float:
     """
     a = np.asarray(weights, dtype=np.float64)
     if a.ndim != 1 or not len(a):
-        raise ValueError(f"got weights of shape {a.shape}; needed (n,), one a sample")
+        raise ValueError(f"got weights of shape {a.shape}; needed (n,), one per sample")
     size = fft.next_fast_len(2 * len(a), real=True)
     on_white = fft.irfft(fft.rfft(a, size) * np.conj(_response_transform(len(a), size)), size)[: len(a)]
     return float(np.pi * level * np.sum(on_white**2))

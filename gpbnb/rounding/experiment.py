@@ -91,7 +91,7 @@ def product_trial(x: FloatArray, y: FloatArray) -> Trial:
     """
     fmt, n, m = x.format, len(x), len(y)
     if not n or np.any(x == 0):
-        raise ValueError(f"got the factors {x}; needed at least one, none of them zero: the error is relative")
+        raise ValueError(f"got the factors {x}; needed at least one, none of them zero, because the error is relative")
     computed = x.prod()
     for divisor in y:
         computed = computed / divisor
@@ -324,7 +324,9 @@ def growth(fmt: FloatFormat, kind: str, lengths: Sequence[int], repeats: int, rn
     """
     longest = max(lengths, default=0)
     if min(lengths, default=0) < 2 or repeats < 1:
-        raise ValueError(f"got lengths {tuple(lengths)}, {repeats} repeats; needed lengths of at least 2, and 1 repeat")
+        raise ValueError(
+            f"got lengths {tuple(lengths)}, {repeats} repeats; needed lengths of at least 2, and at least 1 repeat"
+        )
     if kind == "constant":
         once: Any = random_numbers(rng, fmt, (repeats, 1), "like signs")
         x = cast(FloatArray, np.repeat(once, longest, axis=1))
@@ -373,7 +375,7 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
         raise ValueError(f"got {factors} factors; needed at least 2")
     base, t = fmt.base, fmt.precision
     if base**t - base ** (t - 1) > 1000:
-        raise ValueError(f"got {fmt}; needed at most 1000 numbers from one power of the base on")
+        raise ValueError(f"got {fmt}; needed a format with at most 1000 numbers between two powers of the base")
     start = np.arange(base ** (t - 1), base**t)
     products = np.frompyfunc(lambda i, j: fmt.kernel.multiply(int(i), 0, int(j), 0), 2, 2)
     significand, exponent = (a.astype(np.int64) for a in products.outer(start, start))
@@ -407,7 +409,7 @@ def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: 
     ValueError : fewer than 2 terms; no exponents.
     """
     if terms < 2 or not len(exponents):
-        raise ValueError(f"got {terms} terms, {len(exponents)} exponents; needed at least 2 and 1")
+        raise ValueError(f"got {terms} terms, {len(exponents)} exponents; needed at least 2 terms and 1 exponent")
     factors = exact_terms(fmt, exponents, products)
     exact = np.array(list(factors), dtype=object)
     choices = fmt.array(exact)

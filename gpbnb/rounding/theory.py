@@ -164,7 +164,9 @@ def strict_product_bound(n: int, m: int, beta: Fraction) -> Fraction:
 
 def _operations(n: int, m: int) -> int:
     if n < 1 or m < 0:
-        raise ValueError(f"got {n} factors and {m} divisors; needed at least 1 and 0; write 1/y with the factor 1")
+        raise ValueError(
+            f"got {n} factors and {m} divisors; needed at least 1 factor and 0 divisors; write 1/y with the factor 1"
+        )
     return n + m - 1
 
 
@@ -206,7 +208,7 @@ def relative_dot_bound(a: Any, b: Any, beta: Fraction) -> Fraction:
     """
     value = abs(_total(_products(a, b)))
     if value == 0:
-        raise ZeroDivisionError("got an inner product of zero; needed another; use strict_dot_bound")
+        raise ZeroDivisionError("got an inner product of zero; needed a nonzero one; use strict_dot_bound")
     return strict_dot_bound(a, b, beta) / value
 
 
@@ -323,7 +325,7 @@ def _vector(x: Any) -> NDArray[Any]:
 def _products(a: Any, b: Any) -> NDArray[Any]:
     left, right = _vector(a), _vector(b)
     if len(left) != len(right):
-        raise ValueError(f"got vectors of {len(left)} and {len(right)}; needed equal lengths")
+        raise ValueError(f"got vectors of lengths {len(left)} and {len(right)}; needed equal lengths")
     return np.asarray(left * right)
 
 

@@ -25,16 +25,19 @@ def run_command(sweep: Sweep[Any], description: str, directory: Path, arguments:
     """
     cells = sweep.cells()
     parser = argparse.ArgumentParser(prog=sweep.command, description=description)
-    parser.add_argument("--directory", type=Path, default=directory, help="where progress is saved")
-    parser.add_argument("--cells", type=int, default=len(cells), help="only so many of the cells")
-    parser.add_argument("--store", action="store_true", help="write the finished cells, and compute nothing")
-    parser.add_argument("--output", type=Path, help="folder for the table; by default where progress is saved")
+    parser.add_argument("--directory", type=Path, default=directory, help="folder for saved progress")
+    parser.add_argument("--cells", type=int, default=len(cells), help="compute only this many cells")
+    parser.add_argument("--store", action="store_true", help="write the finished cells without computing more")
+    parser.add_argument("--output", type=Path, help="folder for the table; default: the folder for saved progress")
     given = parser.parse_args(arguments)
     if not given.store:
         try:
             sweep.run(given.directory, cells=cells[: given.cells])
         except KeyboardInterrupt:
-            print(f"interrupted; the same command goes on from what is saved in {given.directory}", file=sys.stderr)
+            print(
+                (f"interrupted; run the same command again to continue from the progress saved in {given.directory}"),
+                file=sys.stderr,
+            )
             return INTERRUPTED
     folder = given.output or given.directory
     folder.mkdir(parents=True, exist_ok=True)

@@ -26,13 +26,15 @@ def verify(sweeps: Sequence[Sweep[Any]], count: int, seed: int, progress: bool =
 
 def run(sweeps: Sequence[Sweep[Any]], arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status, 1 if a file is damaged or a value differs."""
-    parser = argparse.ArgumentParser(prog="python -m gpbnb.sweeps", description="The stored sweeps of the package.")
+    parser = argparse.ArgumentParser(
+        prog="python -m gpbnb.sweeps", description="List or check the sweeps stored in the package."
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="name, command and provenance of each stored sweep")
     check = commands.add_parser("verify", help="compute a sample of each stored sweep again and compare")
-    check.add_argument("names", nargs="*", help="such as kalman/year; all by default")
-    check.add_argument("--sample", type=int, default=1, help="cells of each sweep; 1 by default")
-    check.add_argument("--seed", type=int, default=1, help="chooses the cells; 1 by default")
+    check.add_argument("names", nargs="*", help="names of sweeps, such as kalman/year; default: all")
+    check.add_argument("--sample", type=int, default=1, help="number of cells to compute for each sweep; default: 1")
+    check.add_argument("--seed", type=int, default=1, help="seed that selects the cells; default: 1")
     given = parser.parse_args(arguments)
     known = {sweep.name: sweep for sweep in sweeps}
     try:
@@ -43,7 +45,7 @@ def run(sweeps: Sequence[Sweep[Any]], arguments: Sequence[str] | None = None) ->
                 print(f"{sweep.name}: {about}")
             return 0
         if unknown := set(given.names) - set(known):
-            parser.error(f"got {', '.join(sorted(unknown))}; needed some of {', '.join(known)}")
+            parser.error(f"got sweeps {', '.join(sorted(unknown))}; needed some of {', '.join(known)}")
         if given.sample < 1:
             parser.error(f"got --sample {given.sample}; needed at least 1")
         chosen = [known[name] for name in given.names] or list(sweeps)

@@ -164,7 +164,7 @@ class Sweep(Generic[C]):
         """
         stored = {row[: self.key]: row for row in self.load().rows}
         if len(stored) < len(self.load().rows):
-            raise ValueError(f"{self.name}: got rows with one key; needed a key that identifies each row")
+            raise ValueError(f"{self.name}: got several rows with the same key; needed a key that identifies each row")
         rng = np.random.default_rng([seed, int.from_bytes(hashlib.sha256(self.name.encode()).digest()[:4])])
         cells = [cell for cell in self.cells() if self._is_stored(cell, stored)]
         chosen = [cells[i] for i in sorted(rng.choice(len(cells), min(count, len(cells)), replace=False))]
@@ -228,8 +228,9 @@ class Sweep(Generic[C]):
                         raise
                     if tries[number] >= ATTEMPTS:
                         raise RuntimeError(
-                            f"{self.name}: got {ATTEMPTS} workers that died under one chunk of {len(chunks[number])} "
-                            "cells; needed one that lives; give workers more memory, or send smaller chunks"
+                            f"{self.name}: got {ATTEMPTS} workers that died under one chunk of "
+                            f"{len(chunks[number])} cells; needed workers that survive; give them "
+                            "more memory, or send smaller chunks"
                         ) from error
                     tries[number] += 1
                     pending[executor.submit(_some, self.compute, chunks[number], directory)] = number

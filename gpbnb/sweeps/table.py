@@ -146,13 +146,13 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
         got = lines[start] if start < len(lines) else ""
         raise damaged(start + 1, f"got the columns {got!r}; needed {','.join((*header, CHECK))!r}")
     if not provenance["rows"].isdigit():
-        raise damaged(start, f"got {provenance['rows']!r} rows; needed a number")
+        raise damaged(start, f"got {provenance['rows']!r} rows; needed a whole number")
     rows, expected = [], int(provenance["rows"])
     for index, line in enumerate(lines[start + 1 :]):
         number = start + 2 + index
         if index == expected:
             if line or number != len(lines):
-                raise damaged(number, f"the file has more than the {expected} rows that it announces")
+                raise damaged(number, f"the file has more than the {expected} rows that its first lines announce")
             break
         if number == len(lines):
             raise damaged(number, f"the file ends after {index} of {expected} rows")

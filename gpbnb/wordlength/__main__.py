@@ -28,14 +28,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("model", type=Path, help="TOML file")
-    parser.add_argument("--tolerance", required=True, help="largest error: one number, or one for each state: 0.01,inf")
-    parser.add_argument("--measurements", type=Path, help="CSV file, a row a step; by default simulated")
-    parser.add_argument("--inputs", type=Path, help="CSV file of a filter's known inputs u, a row a step")
-    parser.add_argument("--steps", type=int, help="how many steps to simulate; 1000 by default")
-    parser.add_argument("--base", type=int, default=2, help="2, 10 or 16; 2 by default")
-    parser.add_argument("--rounding", default="nearest", help='such as "nearest" or "chop"')
-    parser.add_argument("--form", default="innovation", help='such as "innovation", "Joseph", "UD" or "Cholesky"')
-    parser.add_argument("--basis", action="append", choices=("emulation", "bound"), help="both by default")
+    parser.add_argument(
+        "--tolerance", required=True, help="largest allowed error: one number, or one per state, such as 0.01,inf"
+    )
+    parser.add_argument(
+        "--measurements", type=Path, help="CSV file with one row per step; default: simulated measurements"
+    )
+    parser.add_argument("--inputs", type=Path, help="CSV file with the known inputs u of the filter, one row per step")
+    parser.add_argument("--steps", type=int, help="number of steps to simulate; default: 1000")
+    parser.add_argument("--base", type=int, default=2, help="2, 10 or 16; default: 2")
+    parser.add_argument("--rounding", default="nearest", help='rounding rule, such as "nearest" or "chop"')
+    parser.add_argument(
+        "--form",
+        default="innovation",
+        help='form of the covariance update, such as "innovation", "Joseph", "UD" or "Cholesky"',
+    )
+    parser.add_argument(
+        "--basis",
+        action="append",
+        choices=("emulation", "bound"),
+        help="how to find the precision; may be given twice; default: both",
+    )
     parser.add_argument("--report", type=Path, help="HTML file to write, with a JSON file of the same name beside it")
     given = parser.parse_args(arguments)
     command = shlex.join(["python", "-m", "gpbnb.wordlength", *map(str, arguments or sys.argv[1:])])

@@ -65,8 +65,9 @@ def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
     if all(hasattr(source, letter) for letter in ("A", "B", "C", "D")):
         if not getattr(source, "dt", None):
             raise ValueError(
-                f"got a {type(source).__name__} without a time step, that is a continuous system; needed a discrete "
-                "one; discretize it first, as with its to_discrete(dt) or scipy.signal.cont2discrete"
+                f"got a {type(source).__name__} without a time step, so a continuous system; needed a "
+                "discrete system; discretize it first, for example with its to_discrete(dt) or "
+                "scipy.signal.cont2discrete"
             )
         A, B, C, D = (np.asarray(getattr(source, letter), dtype=np.float64) for letter in ("A", "B", "C", "D"))
         return LinearSystem(A, B, C, D, name=type(source).__name__)
@@ -95,8 +96,8 @@ def _from_mapping(given: Mapping[str, Any], where: str, u: Any) -> LinearModel |
         problems = [f"{', '.join(missing)} missing"] if missing else []
         problems += [f"{', '.join(unknown)} unknown"] if unknown else []
         raise ValueError(
-            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter, or {', '.join(SYSTEM)} "
-            "and perhaps C, D, x0 for a linear system"
+            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter, or "
+            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system"
         )
     arguments: dict[str, Any] = {"repair": True} if kalman else {}
     arguments |= {"name": where.removesuffix(".toml")} | dict(given)

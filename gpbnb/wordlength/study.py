@@ -49,7 +49,7 @@ def printed_precision(
 
     found = search.smallest_precision(meets, base, Rounding.NEAREST, monotone=True)
     if found is None:
-        raise ArithmeticError("the unit roundoff falls without limit: some precision must be enough")
+        raise ArithmeticError("got no sufficient precision, although the unit roundoff can be arbitrarily small")
     return found.precision
 
 
@@ -89,7 +89,7 @@ def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int
     """
     kinds = {(run.case.model, run.case.base, run.case.rounding, run.case.form) for run in runs}
     if len(kinds) != 1:
-        raise ValueError(f"got runs of {len(kinds)} kinds; needed one model, base, rounding and form")
+        raise ValueError(f"got runs of {len(kinds)} kinds; needed runs of one model, base, rounding and form")
     found: dict[int, int] = {}
     for run in runs:
         errors = np.maximum.accumulate(np.abs(np.hstack([run.drift, run.rate])).max(axis=1))
@@ -157,7 +157,7 @@ def update_stagnation(
     """
     _check_state(model, state)
     if not 0 < last < len(z):
-        raise ValueError(f"got {last} steps to watch of {len(z)}; needed at least 1, and one less than all")
+        raise ValueError(f"got {last} steps to watch of {len(z)}; needed at least 1, and at most all but one")
     checkpoint_steps = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
     true, found = reference(model, z, checkpoint_steps), []
     for fmt in formats:
@@ -355,7 +355,7 @@ def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
     """
     given = exact(sizes)
     if given.shape != (model.n,) or not (given > 0).all():
-        raise ValueError(f"got sizes {list(sizes)}; needed {model.n} positive numbers, one a state")
+        raise ValueError(f"got sizes {list(sizes)}; needed {model.n} positive numbers, one per state")
     square = np.multiply.outer(given, given)
     return replace(
         model,

@@ -26,7 +26,9 @@ def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
     """
     questions = {tuple(question for question, _ in line) for line in found.values()}
     if len(questions) != 1:
-        raise ValueError(f"got lines of {len(questions)} kinds; needed the same questions in each")
+        raise ValueError(
+            f"got rows with {len(questions)} different sets of questions; needed the same questions in each row"
+        )
     body = tuple((name, *(bits(answer) for _, answer in line)) for name, line in found.items())
     return Table(f"{len(body)} lines of answers", ("form", *questions.pop()), body)
 

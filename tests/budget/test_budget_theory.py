@@ -223,9 +223,9 @@ def test_columns_in_any_order_and_only_those_that_are_needed():
         ("b,random constant,bias,1,nan,,,,", "got roll nan; needed a factor"),
         ("b,random,bias,1,,,,,", "kind is 'random'; needed one of deterministic, random constant, random process"),
         ("b,random constant,biased,1,,,,,", "form is 'biased'; needed one of bias, drift"),
-        (",random constant,bias,1,,,,,", "got name ''; remove blanks"),
-        ("b,random constant,bias,1", "4 cells instead of 9"),
-        ("b,random constant,bias,1,,,,,,more", "10 cells instead of 9"),
+        (",random constant,bias,1,,,,,", "got name ''; needed a text without"),
+        ("b,random constant,bias,1", "got 4 cells; needed 9"),
+        ("b,random constant,bias,1,,,,,,more", "got 10 cells; needed 9"),
         ("a,random constant,bias,1,,,,,", "name 'a' is already used in line 2"),
     ],
 )
@@ -264,7 +264,7 @@ def test_a_bad_header_is_refused(header, message):
     ("call", "message"),
     [
         (lambda: Budget(made(1).sources * 2), "got 's0' more than once"),
-        (lambda: Source(" a", Kind.CONSTANT, ErrorForm.BIAS, 1), "got name ' a'; remove blanks"),
+        (lambda: Source(" a", Kind.CONSTANT, ErrorForm.BIAS, 1), "got name ' a'; needed a text without"),
         (lambda: Source("a", "random constant", ErrorForm.BIAS, 1), "needed a Kind and an ErrorForm"),
         (lambda: theory.equal_error(-1, 3), "got a total of -1 over 3 sources"),
         (lambda: theory.equal_error(1, 0), "over 0 sources"),

@@ -497,7 +497,7 @@ BAD = [
     (lambda: theory.random_walk(-1.0, 1.0, 1.0), "got sigma_x = -1.0"),
     (lambda: theory.random_walk(1.0, 0.0, 1.0), "got omega_bw = 0.0"),
     (lambda: theory.random_walk(1.0, 1.0, math.inf), "got f_c = inf"),
-    (lambda: theory.random_walk(1.0, 1e-300, 1e300), "the ratio must lie within the range of float64; check the units"),
+    (lambda: theory.random_walk(1.0, 1e-300, 1e300), "needed a ratio within the range of float64; check the units"),
     (lambda: theory.random_walk([1.0, 2.0], 1.0, 1.0), r"got sigma_x of shape \(2,\); needed one number"),
     (lambda: theory.required_rate(1.0, 1.0, -0.1), "got limit = -0.1"),
     (lambda: theory.validity(0.0), "got excess = 0.0; needed 1e-9 to 1e3"),

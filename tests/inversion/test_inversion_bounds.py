@@ -236,7 +236,7 @@ class TestNothingProved:
     def test_balls_that_hold_a_singular_matrix(self, preconditioned):
         fmt = FloatFormat(10, 8)
         a = fmt.array([[1, 2], [2, 4]])
-        with pytest.raises(ValueError, match="cannot be distinguished from a singular one; use more bits"):
+        with pytest.raises(ValueError, match="cannot distinguish from a singular one; use more bits"):
             bounds.ball(a, a, preconditioned)
 
 

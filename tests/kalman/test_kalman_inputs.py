@@ -250,7 +250,7 @@ def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
 REFUSED = [
     ({"B": [[1], [1]]}, "got B without u; needed both"),
     ({"u": [[1]]}, "got u without B; needed both"),
-    ({"B": [[1, 2], [1, 2]], "u": [[1]]}, "got B with 2 columns and u with 1 numbers a step"),
+    ({"B": [[1, 2], [1, 2]], "u": [[1]]}, "got B with 2 columns and u with 1 numbers per step"),
     ({"B": [[1]], "u": [[1]]}, "got B of shape"),
     ({"b": [1]}, r"got b of shape \(1,\); needed \(2,\)"),
     ({"d": [[[1]]]}, "got d of shape"),

@@ -142,5 +142,5 @@ def test_an_unstable_system_has_no_bound():
     growing = LinearSystem([["1.01"]], [[1]])
     found = required_precision(growing, 80, 1e-3, z=U, basis="bound")
     assert found.fmt is None
-    assert "needed a stable one" in str(found)
+    assert "needed a stable filter" in str(found)
     assert required_precision(growing, 80, 1e-3, z=U).fmt is not None

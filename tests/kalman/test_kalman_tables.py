@@ -131,7 +131,7 @@ def test_slack():
     first, second = report_bounds.coefficients(k, 10, 2)
     assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
     assert row[-1] == "1.25000"
-    with pytest.raises(ValueError, match="needed one to step 3"):
+    with pytest.raises(ValueError, match="needed one up to step 3"):
         tables.slack(
             [run(steps=np.array([1, 3]))],
             [year.Bounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],

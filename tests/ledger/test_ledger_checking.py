@@ -53,13 +53,15 @@ def test_an_iterator_of_entries_will_do(complete):
 
 def test_a_check_of_no_entry_is_refused(topic):
     name = topic("stray", '@CHECKS.add("hung1984.II.eq999")\ndef stray():\n    return compare(True, "1")\n')
-    with pytest.raises(ValueError, match=r"stray checks 'hung1984\.II\.eq999', which is not in statements"):
+    with pytest.raises(
+        ValueError, match=r"got a check of 'hung1984\.II\.eq999' in stray; needed an id from statements"
+    ):
         rows(topics=topics(name))
 
 
 def test_two_topics_with_one_entry_are_refused(topic, complete):
     name = topic("rival", '@CHECKS.add("hung1984.I.two-tasks")\ndef rival():\n    return compare(True, "1")\n')
-    with pytest.raises(ValueError, match=f"'hung1984.I.two-tasks' is checked by {complete} and by rival"):
+    with pytest.raises(ValueError, match=f"checks of 'hung1984.I.two-tasks' in {complete} and in rival"):
         rows(topics=topics(complete, name))
 
 

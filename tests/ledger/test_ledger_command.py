@@ -71,7 +71,7 @@ def test_the_command_itself_runs_the_topics_of_the_package():
     assert list(found[0]) == ["id", "document", "kind", "printed", "recomputed", "agrees", "verdict", "note"]
     assert [record["id"] for record in found] == [entry.id for entry in INVENTORY if entry.document == "savage2016"]
     missing = sum(not record["verdict"] for record in found)
-    assert f"\n{missing} lack their check\n" in done.stderr.decode()
+    assert f"\n{missing} entries have no check\n" in done.stderr.decode()
     assert done.returncode == (1 if missing else 0)
 
 
@@ -82,7 +82,7 @@ def test_one_record_an_entry_and_status_1_while_checks_are_missing(ledger, compl
     assert [record["printed"] for record in found] == [entry.printed for entry in INVENTORY]
     lacking = len(INVENTORY) - 5
     assert done.stderr.decode() == (
-        f"{len(INVENTORY)} entries: 5 misprint, {lacking} no check\n{lacking} lack their check\n"
+        f"{len(INVENTORY)} entries: 5 misprint, {lacking} no check\n{lacking} entries have no check\n"
     )
     assert done.returncode == 1
 
@@ -90,7 +90,7 @@ def test_one_record_an_entry_and_status_1_while_checks_are_missing(ledger, compl
 def test_status_0_when_the_selection_is_complete(ledger, complete):
     done = ledger(complete, "--document", "hung1984", "--chapter", "I")
     assert [record["verdict"] for record in records(done.stdout)] == ["misprint"] * 5
-    assert done.stderr.decode() == "5 entries: 5 misprint\n0 lack their check\n"
+    assert done.stderr.decode() == "5 entries: 5 misprint\n0 entries have no check\n"
     assert done.returncode == 0
 
 
@@ -124,14 +124,17 @@ def test_two_runs_are_alike(ledger, complete):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--document", "hung1983"], "no entry of document 'hung1983'; here are: hung1984, hung1982, savage2016"),
-        (["--chapter", "V"], "no entry of chapter 'V'"),
-        (["--section", "2", "99"], "no entry of section '99'"),
+        (
+            ["--document", "hung1983"],
+            "got document 'hung1983', which no entry has; needed one of hung1984, hung1982, savage2016",
+        ),
+        (["--chapter", "V"], "got chapter 'V'"),
+        (["--section", "2", "99"], "got section '99'"),
         (["--section"], "expected at least one argument"),
         (["--format", "xml"], "invalid choice: 'xml'"),
-        (["--output", "."], "is not a regular file"),
-        (["--output", os.devnull], "is not a regular file"),
-        (["--output", "no/such/file.csv"], "there is no directory"),
+        (["--output", "."], "needed a regular file"),
+        (["--output", os.devnull], "needed a regular file"),
+        (["--output", "no/such/file.csv"], "needed an existing directory"),
         (["extra"], "unrecognized arguments: extra"),
     ],
 )
@@ -148,7 +151,7 @@ def test_a_check_of_no_statement_is_explained_with_status_2(ledger, topic):
         topic("stray_topic", '@CHECKS.add("hung1984.II.eq999")\ndef stray():\n    return compare(True, "1")\n')
     )
     assert done.returncode == 2
-    assert "which is not in statements.csv" in done.stderr.decode()
+    assert "needed an id from statements.csv" in done.stderr.decode()
     assert "Traceback" not in done.stderr.decode()
 
 
@@ -171,7 +174,7 @@ def test_a_check_that_raises_is_named_and_hides_no_other(ledger, topic):
     first, *rest = done.stderr.decode().splitlines()
     assert first.startswith("the check of hung1984.I.two-tasks failed: ZeroDivisionError: division by zero (")
     assert first.endswith("raising_topic.py:9)")
-    assert rest == ["5 entries: 4 verified, 1 check failed", "0 lack their check"]
+    assert rest == ["5 entries: 4 verified, 1 check failed", "0 entries have no check"]
 
 
 def test_output_file_is_replaced_as_a_whole(ledger, complete, tmp_path):
@@ -184,7 +187,7 @@ def test_output_file_is_replaced_as_a_whole(ledger, complete, tmp_path):
     done = ledger(complete, *chosen, "--output", str(link))
     assert done.returncode == 0
     assert done.stdout == b""
-    assert b"0 lack their check" in done.stderr
+    assert b"0 entries have no check" in done.stderr
     assert target.read_bytes() == ledger(complete, *chosen).stdout
     assert link.is_symlink()
     assert {path.name for path in target.parent.iterdir()} == {"ledger.csv", "link.csv"}

@@ -179,7 +179,7 @@ def test_counts_add_up(by):
 
 
 def test_counts_by_something_else_are_refused():
-    with pytest.raises(ValueError, match="by='colour'; take one of document, chapter, kind"):
+    with pytest.raises(ValueError, match="by='colour'; needed one of document, chapter, kind"):
         ledger.count_table(ROWS, "colour")
 
 
@@ -189,7 +189,7 @@ def test_select_topic():
     assert [row.statement.id for row in found] == [s.id for s in STATEMENTS if owner.get(s.id) == "rounding"]
     wrong = ledger.select_topic(ROWS, "rounding", Verdict.WRONG, Verdict.MISPRINT)
     assert wrong == tuple(row for row in found if row.outcome in ("wrong", "misprint")) != ()
-    with pytest.raises(ValueError, match="no topic 'Rounding'; the topics are rounding"):
+    with pytest.raises(ValueError, match="topic 'Rounding'; needed one of rounding"):
         ledger.select_topic(ROWS, "Rounding")
 
 

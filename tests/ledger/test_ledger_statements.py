@@ -29,18 +29,24 @@ def test_reads_what_is_written(tmp_path):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ([], "line 1: the header is ''"),
-        ([HEAD.replace("item", "name"), GOOD], "line 1: the header is 'id,document,chapter,section,name"),
-        ([HEAD, GOOD, GOOD.replace("eq14", "eq15") + ",more"], "line 3: 9 fields; 8 are needed"),
-        ([HEAD, "", GOOD], "line 2: 0 fields; 8 are needed"),
-        ([HEAD, GOOD, GOOD], "line 3: id 'hung1984.II.eq14' is that of line 2 already"),
-        ([HEAD, GOOD.replace("equation", "equations")], "line 2: unknown kind 'equations'; take one of equation,"),
-        ([HEAD, GOOD.replace("hung1984", "hung1983")], "line 2: unknown document 'hung1983'; take one of hung1984,"),
-        ([HEAD, GOOD.replace("hung1984.", "hung1982.")], "line 2: id 'hung1982.II.eq14' does not begin with its"),
-        ([HEAD, GOOD.replace(",4,", ",,")], "line 2: section='' is blank"),
-        ([HEAD, GOOD.replace(",4,", ", 4,")], "line 2: section=' 4' is blank or has blanks at an end"),
-        ([HEAD, GOOD[:-1] + "$,"], "line 2: text=.* has an unpaired or doubled dollar sign"),
-        ([HEAD, GOOD.replace("$", "$$")], "line 2: text=.* has an unpaired or doubled dollar sign"),
+        ([], "line 1: got the header ''"),
+        ([HEAD.replace("item", "name"), GOOD], "line 1: got the header 'id,document,chapter,section,name"),
+        ([HEAD, GOOD, GOOD.replace("eq14", "eq15") + ",more"], "line 3: got 9 fields; needed 8"),
+        ([HEAD, "", GOOD], "line 2: got 0 fields; needed 8"),
+        ([HEAD, GOOD, GOOD], "line 3: got id 'hung1984.II.eq14', which line 2 has already"),
+        ([HEAD, GOOD.replace("equation", "equations")], "line 2: got kind 'equations'; needed one of equation,"),
+        ([HEAD, GOOD.replace("hung1984", "hung1983")], "line 2: got document 'hung1983'; needed one of hung1984,"),
+        (
+            [HEAD, GOOD.replace("hung1984.", "hung1982.")],
+            "line 2: got id 'hung1982.II.eq14'; needed an id that begins with its",
+        ),
+        ([HEAD, GOOD.replace(",4,", ",,")], "line 2: got section=''; needed a text without"),
+        (
+            [HEAD, GOOD.replace(",4,", ", 4,")],
+            "line 2: got section=' 4'; needed a text without leading or trailing blanks",
+        ),
+        ([HEAD, GOOD[:-1] + "$,"], "line 2: got text=.* with an unpaired or doubled dollar sign"),
+        ([HEAD, GOOD.replace("$", "$$")], "line 2: got text=.* with an unpaired or doubled dollar sign"),
         ([HEAD, GOOD, '"open'], "line 3: unexpected end of data"),
     ],
 )
@@ -51,12 +57,12 @@ def test_a_bad_line_is_named(tmp_path, lines, message):
 
 def test_a_quoted_line_break_counts_as_a_line(tmp_path):
     broken = 'hung1984.II.x,hung1984,II,4,x,claim,"a\n\nb",'
-    with pytest.raises(ValueError, match="line 5: unknown kind"):
+    with pytest.raises(ValueError, match="line 5: got kind"):
         load_statements(inventory(tmp_path, HEAD, broken, GOOD.replace("equation", "x")))
 
 
 def test_other_encodings_are_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"list\.csv is not UTF-8"):
+    with pytest.raises(ValueError, match=r"list\.csv, which is not UTF-8"):
         load_statements(inventory(tmp_path, HEAD, GOOD[:-1] + "é,", encoding="latin-1"))
 
 
@@ -72,7 +78,7 @@ def sections(entries):
 def test_quotes_are_what_the_inventory_has():
     assert quote("hung1984.I.contract") == "the study was supported under contract NA58-34426"
     assert all(quote(entry.id) == entry.printed for entry in INVENTORY[::100])
-    with pytest.raises(KeyError, match=r"no statement 'hung1984\.I\.none' in statements"):
+    with pytest.raises(KeyError, match=r"'hung1984\.I\.none'; needed the id of a statement"):
         quote("hung1984.I.none")
 
 
@@ -99,11 +105,14 @@ def test_select_sections_takes_what_is_below_but_not_what_begins_alike():
 @pytest.mark.parametrize(
     ("filters", "message"),
     [
-        ({"document": "hung1983"}, "no entry of document 'hung1983'; here are: hung1984, hung1982, savage2016"),
-        ({"document": "hung1984", "chapter": "IV"}, "no entry of chapter 'IV'; here are: I, II, III"),
-        ({"chapter": "IV", "sections": [1]}, "no entry of section '1'; here are: -"),
-        ({"document": "hung1984", "sections": ["9", "99"]}, "no entry of section '99'"),
-        ({"sections": []}, "sections is empty"),
+        (
+            {"document": "hung1983"},
+            "got document 'hung1983', which no entry has; needed one of hung1984, hung1982, savage2016",
+        ),
+        ({"document": "hung1984", "chapter": "IV"}, "got chapter 'IV', which no entry has; needed one of I, II, III"),
+        ({"chapter": "IV", "sections": [1]}, "got section '1', which no entry has; needed one of -"),
+        ({"document": "hung1984", "sections": ["9", "99"]}, "got section '99', which no entry has"),
+        ({"sections": []}, "got an empty sections"),
     ],
 )
 def test_an_empty_selection_is_refused(filters, message):

@@ -126,7 +126,7 @@ UNSET = (
 
 def test_collapsed_formulas_are_typeset_when_opened_and_all_before_printing(open_page):
     with open_page(LEDGER) as page:
-        evidence = page.locator("details:has(.math):not([open])").first
+        evidence = page.locator(".ledger tr[id] details:has(.math)").first
         assert evidence.locator("mjx-container").count() == 0
         evidence.locator("summary").click()
         evidence.locator("mjx-container").first.wait_for()

@@ -307,7 +307,11 @@ def test_digits_needed_is_the_least(base):
 REFUSED = [
     (theory.largest_phase, (DRIFTS, 0.0), "got an error of 0.0 for a drift of 6600.12; needed 0 < error <= 13200.2"),
     (theory.largest_phase, (DRIFTS, 1e5), "got an error of 100000.0"),
-    (theory.roll_rate, (0.0,), "got a roll period of 0.0 s; needed a positive number; leave rolling out for none"),
+    (
+        theory.roll_rate,
+        (0.0,),
+        "got a roll period of 0.0 s; needed a positive number; omit rolling if there is no roll",
+    ),
     (theory.roll_rate, (math.inf,), "got a roll period of inf s"),
     (theory.variance_of_sum, ([[1.0]], LEVEL), r"got weights of shape \(1, 1\); needed \(n,\)"),
     (theory.variance_of_sum, ([], LEVEL), r"got weights of shape \(0,\)"),

@@ -282,11 +282,16 @@ REFUSED = [
         )
     ),
     *(
-        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of 2 and 1; needed equal lengths")
+        (bound, (VECTOR, [1], BETA), ValueError, r"got vectors of lengths 2 and 1; needed equal lengths")
         for bound in (theory.dot_bound, theory.strict_dot_bound, theory.relative_dot_bound)
     ),
     *(
-        (bound, (0, 2, BETA), ValueError, r"got 0 factors and 2 divisors; needed at least 1 and 0; write 1/y")
+        (
+            bound,
+            (0, 2, BETA),
+            ValueError,
+            r"got 0 factors and 2 divisors; needed at least 1 factor and 0 divisors; write 1/y",
+        )
         for bound in (theory.printed_product_bound, theory.product_bound, theory.strict_product_bound)
     ),
     (theory.product_bound, (2, -1, BETA), ValueError, r"got 2 factors and -1 divisors"),

@@ -107,7 +107,7 @@ def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(s
     assert command(sweep, "--cells", "3") == 0
     assert len(stored("saved")) == 3 * 3
     assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED
-    assert "goes on from what is saved" in capsys.readouterr().err
+    assert "continue from the progress saved" in capsys.readouterr().err
     assert command(dataclasses.replace(sweep, compute=interrupted), "--store", "--output", str(tmp_path / "new")) == 0
     assert stored("new") == stored("saved")
     assert command(sweep) == 0

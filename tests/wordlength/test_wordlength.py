@@ -135,7 +135,7 @@ def test_years_needed_against_each_run():
                 assert worst <= 1
     assert list(found.values()) == sorted(found.values())
     assert found[gravity_probe_b.YEAR] == 32
-    with pytest.raises(ValueError, match="got runs of 2 kinds; needed one"):
+    with pytest.raises(ValueError, match="got runs of 2 kinds; needed runs of one"):
         study.precision_by_step([runs[0], replace(runs[0], case=runs[0].case._replace(base=10))], 1.0)
 
 
@@ -430,7 +430,7 @@ def test_answers():
     table = tables.answers({"report": [("a minute", FOUND), ("an hour", NONE)]})
     assert table.header == ("form", "a minute", "an hour")
     assert table.body == (("report", "17", "none"),)
-    with pytest.raises(ValueError, match="got lines of 2 kinds"):
+    with pytest.raises(ValueError, match="got rows with 2 different sets"):
         tables.answers({"a": [("x", FOUND)], "b": [("y", FOUND)]})
 
 

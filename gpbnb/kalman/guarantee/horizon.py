@@ -132,7 +132,10 @@ def bounds_in_blocks(
             filter_run.notes[NEXT_CHECKPOINT] = 0
             filter_run.take(z[:count])
             if filter_run.stopped or filter_run.indefinite:
-                raise ArithmeticError(f"{model.name} in {fmt}: it stopped or lost definiteness by step {done + count}")
+                raise ArithmeticError(
+                    f"{model.name} in {fmt}: the filter stopped or its covariance lost definiteness by "
+                    f"step {done + count}"
+                )
         rows = np.arange(count)
         at = (done + rows) % cycle
         program, packed = packed_coefficients(run, fmt, form, rows, done)
@@ -274,8 +277,8 @@ def gravity_probe_b_bounds(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Follow a year of Gravity Probe B in a format; write two lines to the file after each 1 % of it."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Bounds for a year of Gravity Probe B.")
-    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the format")
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Compute error bounds for a year of Gravity Probe B.")
+    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the significand")
     parser.add_argument("--steps", type=int, default=YEAR, help="steps of 10 s")
     parser.add_argument("--output", type=Path, default=Path(".cache/horizon"), help=f"folder for {FILE.name}")
     given = parser.parse_args(arguments)

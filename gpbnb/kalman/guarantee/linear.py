@@ -130,7 +130,7 @@ def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
             if (narrow | (found.high <= negligible)).all():
                 return found
         bits *= 2
-    raise ValueError("got a filter of which no power was proved to contract; needed a stable one")
+    raise ValueError("got a filter for which no power of its matrix was proved to contract; needed a stable filter")
 
 
 def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> tuple[Enclosure | None, float]:

@@ -41,7 +41,9 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     """
     given = found.schedule
     if not found.for_ever:
-        raise ValueError(f"got a filter without a steady state: {found.why}; needed one with a bound for ever")
+        raise ValueError(
+            f"got a filter without a steady state: {found.why}; needed a filter with a bound that holds for all steps"
+        )
     each = separate_roundings(found)
     count, first = len(given.program.operations), given.first
     F, G, variance = each.F[first:], each.G[first:, :, :count], each.limits[first:, :count] ** 2 / 3

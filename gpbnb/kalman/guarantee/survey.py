@@ -106,10 +106,10 @@ def sample(count: int, seed: int) -> list[tuple[Row, Row]]:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compute the survey, or recompute a sample; return a nonzero status if the sample differs."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Emulated runs against guarantees.")
-    parser.add_argument("--sample", type=int, default=0, help="rows to recompute and compare")
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Compare emulated runs with their guarantees.")
+    parser.add_argument("--sample", type=int, default=0, help="number of rows to recompute and compare")
     parser.add_argument("--seed", type=int, default=0, help="which rows")
-    parser.add_argument("--rows", type=int, default=ROWS, help="how many to compute")
+    parser.add_argument("--rows", type=int, default=ROWS, help="number of rows to compute")
     parser.add_argument("--output", type=Path, default=Path(".cache/guarantee"), help="folder for survey.csv")
     given = parser.parse_args(arguments)
     if given.sample:

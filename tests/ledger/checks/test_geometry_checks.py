@@ -60,7 +60,7 @@ def test_findings_have_their_notes_and_numbers(rows):
     found = {row.statement.id.removeprefix("hung1982."): row.finding for row in rows}
     assert "0, 45, 90 degrees" in found["IV.deltas-zero"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
-    assert "signs to change: 2, before C, C" in found["IV.eq8"].recomputed
+    assert "takes at least 2 changes of sign, before C, C" in found["IV.eq8"].recomputed
     assert r"\theta_3\cos2" in found["IV.eq9"].recomputed
     assert "gamma1 0.64" in found["IV.use-of-model"].recomputed
 

@@ -110,9 +110,9 @@ def test_no_finding_is_without_a_note_where_it_differs(rows):
 
 def test_findings_quote_the_computed_numbers(rows):
     assert "6, 5, 4 in place of 5, 4, 3" in finding(rows, "hung1982.III.eq89-first-form").recomputed
-    assert "1.5 times (96)" in finding(rows, "hung1984.II.eq96").note
-    assert "4 times the last box" in finding(rows, "hung1984.II.eq96").note
-    assert "out 6% and 22%" in finding(rows, "hung1984.II.eq91").recomputed
+    assert "1.5 times bound (96)" in finding(rows, "hung1984.II.eq96").note
+    assert "4 times the bound in the last box" in finding(rows, "hung1984.II.eq96").note
+    assert "omit 6% of the size of $\\delta A$ and 22%" in finding(rows, "hung1984.II.eq91").recomputed
     assert "in 13 of 24 eliminations" in finding(rows, "hung1984.II.eq59").recomputed
     assert "48 of 48" in finding(rows, "hung1984.II.eq59").recomputed
 
@@ -214,7 +214,7 @@ def test_first_order_arithmetic_is_that_of_polynomials():
     unit = FirstOrder(np.array([[Fraction(1), Fraction(0)], [Fraction(0), Fraction(1)]], dtype=object))
     assert a * a.inv() == unit
     assert (a * a).T == a.T * a.T
-    with pytest.raises(ValueError, match="needed an exact one"):
+    with pytest.raises(ValueError, match="needed an exact quantity"):
         abs(x)
 
 

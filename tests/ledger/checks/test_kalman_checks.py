@@ -104,7 +104,7 @@ def test_findings_quote_the_computed_numbers(rows):
         ("s12.example-second-coefficient", "4.0775"),
         ("s12.example-9-digits", "10; for the printed β 10"),
         ("s12.example-17-digits", "16; for the printed β 17"),
-        ("s12.example-criterion", "13 and 20 digits"),
+        ("s12.example-criterion", "13 digits for the first term and 20"),
         ("s13.remark-2", "10 decimal digits or 32 bits"),
     ):
         assert number in finding(rows, f"hung1984.II.{place}").recomputed

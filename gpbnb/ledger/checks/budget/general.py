@@ -41,10 +41,14 @@ def two_tasks(printed: Statement) -> Finding:
     made = fixed and not spoiled and not left
     return compare(
         printed.claims("the corrections", {"have been made": made, "have not all been made": not made}),
-        f"(18) of 1982, exceeded by the two-digit sum 5.6 + 5.9 − 11, is {'corrected' if fixed else 'not corrected'}; "
-        f"(20), right in 1982, is {'spoiled' if spoiled else 'kept'}; (31), wrong in 1982, is "
+        "bound (18) of 1982, which the two-digit sum 5.6 + 5.9 − 11 violates, is "
+        f"{'corrected' if fixed else 'not corrected'}; equation (20), right in 1982, is "
+        f"{'made wrong' if spoiled else 'kept'}; bound (31), wrong in 1982, is "
         f"{'kept' if left else 'corrected'}",
-        otherwise_note=f"not all: (31) carries over to the main result; see the {chapter('rounding')}",
+        otherwise_note=(
+            "not all errors are corrected: bound (31) is still wrong, and the main result depends on it; "
+            f"see the {chapter('rounding')}"
+        ),
         root="product-error-relative-to-product",
     )
 
@@ -96,8 +100,8 @@ def one_over_f_study(printed: Statement) -> Finding:
     count = sum(rolling.CHECKS.run(entry).verdict is Verdict.ANSWERED for entry in left)
     return answer(
         bool(left) and count == len(left),
-        f"of the {len(left)} studies that ch. III leaves open, {count} are answered here",
-        "the ledger of hung1984, ch. III",
+        f"this book answers {count} of the {len(left)} studies that ch. III leaves open",
+        "the answers are in the ledger of hung1984, ch. III",
     )
 
 
@@ -118,7 +122,7 @@ def period_1984(printed: Statement) -> Finding:
     months, days = found or (0, 0)
     return compare(
         found is not None and months == printed.number("duration").value and days == 0,
-        f"{months} months and {days} days, the last day included",
+        f"{months} months and {days} days, including the last day",
     )
 
 
@@ -128,7 +132,7 @@ def contract(printed: Statement) -> Finding:
         printed.says("contract") == TITLE_PAGE,
         TITLE_PAGE,
         Verdict.MISPRINT,
-        otherwise_note="the title page and hung1982 have an S, where this page, or its scan, has a 5",
+        otherwise_note="the title page and hung1982 have an S where this page, or its scan, has a 5",
     )
 
 
@@ -140,8 +144,8 @@ def drift_rate(printed: Statement) -> Finding:
     limit = float(printed.number("drift rate").value) * ARCSEC / MAS
     others = math.sqrt(max(theory.GOAL**2 - limit**2, 0.0))
     return unverifiable(
-        f"at this limit the gyro alone uses up the goal: {others:g} milliarcseconds are left for all other sources",
-        "the documents hold no data on the drift of the gyros",
+        (f"a gyro at this limit uses up the goal alone: it leaves {others:g} milliarcseconds for all other sources"),
+        "the documents contain no data on the drift of the gyros",
     )
 
 
@@ -149,8 +153,8 @@ def drift_rate(printed: Statement) -> Finding:
 def design_goal(printed: Statement) -> Finding:
     goal = float(printed.number("goal").value) * ARCSEC / MAS
     return given(
-        f"the goal of the experiment, {goal:g} milliarcsecond a year, as in the basis of Figure II-2, which restores "
-        "the decimal point that the scan lost"
+        f"Figure II-2 is based on the same goal, {goal:g} milliarcsecond a year; it confirms the "
+        "decimal point, which the scan has lost"
     )
 
 
@@ -161,7 +165,7 @@ def rss_basis(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.I.history", "hung1982.I.apparatus")
 def history(printed: Statement) -> Finding:
-    return unverifiable("", "told without a source, and nothing in the analysis rests on it")
+    return unverifiable("", "the report names no source, and nothing in the analysis depends on this claim")
 
 
 @CHECKS.add("hung1982.I.previous-contract")
@@ -172,8 +176,9 @@ def previous_contract(printed: Statement) -> Finding:
     end, start = date(1981, 2, 18), date(1981, 6, 24)
     return compare(
         "18 February 1981" in listed and [printed.says("contract")] == numbers and award < end < start,
-        f"its final report, the first reference of ch. II, has the number {' and '.join(numbers)}; it came "
-        f"{span(award, end)[0]} months after the award, and {span(end, start)[0]} months before this contract's period",
+        f"its final report, the first reference of ch. II, gives the number {' and '.join(numbers)}; "
+        f"it appeared {span(award, end)[0]} months after the award and {span(end, start)[0]} months "
+        "before the period of this contract",
     )
 
 
@@ -199,7 +204,9 @@ def chapters(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.I.references", "hung1982.II.references")
 def references(printed: Statement) -> Finding:
-    return unverifiable("", "the works are not among the documents; all but the first of ch. II are lost from the scan")
+    return unverifiable(
+        "", ("the cited works are not among the documents; the scan has lost all references except the first of ch. II")
+    )
 
 
 @CHECKS.add("hung1982.I.chapter-reference")
@@ -210,7 +217,7 @@ def chapter_reference(printed: Statement) -> Finding:
         printed.says("chapter") == where,
         f"the measurement geometry is chapter {where}",
         Verdict.MISPRINT,
-        otherwise_note="two letters changed places; there is no chapter VI",
+        otherwise_note="two letters are interchanged; there is no chapter VI",
     )
 
 
@@ -220,9 +227,12 @@ def period_1982(printed: Statement) -> Finding:
     restored = span(date(1981, 6, 24), date(1982, 9, 1))
     return compare(
         months == printed.number("duration").value,
-        f"from the printed year {months} months and {days} days; from 1981 {restored[0]} months and {restored[1]} days",
+        (
+            f"the period is {months} months and {days} days with the printed year, and {restored[0]} "
+            f"months and {restored[1]} days with 1981"
+        ),
         Verdict.OCR,
-        otherwise_note="1981, read as 1987",
+        otherwise_note="the year must be 1981, which the scan shows as 1987",
     )
 
 

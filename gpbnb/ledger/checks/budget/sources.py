@@ -22,7 +22,7 @@ from gpbnb.measurement import ARCSEC, MAS, STATES, apply, deroll, measurement_ma
 
 @CHECKS.add("hung1982.II.figure-ii-1", "hung1982.II.nine-groups")
 def block_diagram(printed: Statement) -> Finding:
-    return unverifiable("", "the picture is lost from the scan, and the text does not name the nine groups")
+    return unverifiable("", "the scan has lost the picture, and the text does not name the nine groups")
 
 
 @CHECKS.add("hung1982.II.classification-by-statistics")
@@ -38,8 +38,8 @@ def by_statistics(printed: Statement) -> Finding:
     complete = [len(classes(*case)) for case in itertools.product((True, False), repeat=2)] == [1] * 4
     return compare(
         printed.claims("the three types", {"cover every error": complete, "leave errors out": not complete}),
-        "every error, known or not, constant or not, is in exactly one class",
-        note="1/f noise, which Table II-1 lists apart, is a random process",
+        "each error, known or unknown, constant or varying, belongs to exactly one class",
+        note="1/f noise, which Table II-1 lists separately, is a random process",
     )
 
 
@@ -48,10 +48,13 @@ def by_form(printed: Statement) -> Finding:
     outside = without_form()
     return compare(
         printed.claims("the four forms", {"cover every error": not outside, "leave errors out": bool(outside)}),
-        f"the columns of the measurement matrix for {', '.join(outside)} are no sums of those of the four forms",
+        (
+            f"for {', '.join(outside)}, the columns of the measurement matrix are not sums of the columns "
+            "of the four forms"
+        ),
         Verdict.INCONSISTENT,
-        otherwise_note="bias, drift, scale factor and noise are the forms of one reading; two readings also have a "
-        "rotation between them, and the misalignments about the roll axis of ch. IV are of this form",
+        otherwise_note="the four forms describe the errors of one reading; a pair of readings can also be rotated, "
+        "as by the misalignments about the roll axis in ch. IV",
     )
 
 
@@ -78,9 +81,10 @@ def deterministic(printed: Statement) -> Finding:
     right = known < 1e-6 * MAS
     return compare(
         printed.claims("this type", {"can be compensated": right, "cannot be compensated": not right}),
-        f"readings turned back through a known misalignment of 20 arcseconds are off by {known / MAS:.3f} "
-        f"milliarcseconds; through one that is known to 1 %, by {nearly / MAS:.0f}",
-        note="as far as they are known",
+        "after correction for a misalignment of 20 arcseconds the readings are off by "
+        f"{known / MAS:.3f} milliarcseconds if the angle is known exactly, and by {nearly / MAS:.0f} "
+        "if it is known to 1 %",
+        note="compensation removes an error only as far as the error is known",
     )
 
 
@@ -100,9 +104,10 @@ def random_variables(printed: Statement) -> Finding:
     right = right and math.isclose(rolled_mean(), theory.cycles_factor(10.3), rel_tol=1e-5)
     return compare(
         printed.claims("averaging", {"removes some of them": right, "removes none of them": not right}),
-        f"a constant that rolls: {rolls:g} of it is left after 52560 whole rolls, {orbits:.1g} if the last is not "
-        "whole; a constant that does not roll stays",
-        note=CHAPTER,
+        f"of a constant that rolls with the spacecraft, a fraction {rolls:g} remains after 52560 "
+        f"whole rolls, and {orbits:.1g} if the last roll is incomplete; a constant that does not roll "
+        "remains",
+        note=f"see the {CHAPTER}",
     )
 
 
@@ -132,8 +137,14 @@ def random_processes(printed: Statement) -> Finding:
     right = agree and expected < 0.5 and derivation.averages().holds
     return compare(
         printed.claims("averaging or filtering", {"reduces some of their effect": right, "reduces nothing": not right}),
-        f"a mean over 30 correlation times leaves {expected:.2g}, one over a tenth of one {slow:.2g}",
-        note="some: averaging does not help against what hardly changes within the mean",
+        (
+            f"a mean over 30 correlation times leaves {expected:.2g} of the error; a mean over a tenth of "
+            f"a correlation time leaves {slow:.2g}"
+        ),
+        note=(
+            "averaging reduces only some of the errors: it does not reduce an error that hardly changes "
+            "during the averaging time"
+        ),
     )
 
 
@@ -142,10 +153,10 @@ def scale_factor(printed: Statement) -> Finding:
     right = identifiable(20 * ARCSEC) and not identifiable(0.0)
     return compare(
         printed.claims("Kalman filtering", {"may identify it": right, "cannot identify it": not right}),
-        "with a known signal that changes in time, readings separate scale factor from drift and bias; without one "
-        "they do not",
-        note="the report does not name the signal; the apparent motion of the star, which the telescope follows, is "
-        "one",
+        "the readings separate the scale factor from drift and bias only if they contain a known "
+        "signal that changes with time",
+        note="the report does not name such a signal; the apparent motion of the guide star, which the "
+        "telescope follows, is an example",
     )
 
 
@@ -164,7 +175,7 @@ def identifiable(amplitude: float) -> bool:
 
 @cache
 def filtered_noise() -> tuple[float, float, int]:
-    """Return error of a Kalman filter for a constant in white noise / error of one reading, √(1/N), and the trials."""
+    """Return error of a filter for a constant in white noise / error of one reading, expected √(1/N), trials."""
     rng = np.random.default_rng(44)
     readings, trials = 400, 2000
     estimate, variance = np.zeros(trials), 1e12
@@ -182,7 +193,7 @@ def noise(printed: Statement) -> Finding:
     return compare(
         printed.claims("Kalman filtering", {"may help": right, "does not help": not right}),
         f"a simulated filter for a constant leaves {left:.3g} of the noise after 400 readings; theory: {expected:.3g}",
-        note="noise that is correlated over long times gains less",
+        note="the filter reduces noise less if the noise is correlated over long times",
     )
 
 
@@ -204,9 +215,9 @@ def equal_case() -> tuple[int, float]:
 def table(printed: Statement) -> Finding:
     total, (sources, _) = total_error(), equal_case()
     return unverifiable(
-        f"no entry is above {total}; were there {sources}, the sum of their sizes is from {total} to "
-        f"{math.sqrt(sources) * total:.2f} milliarcseconds",
-        "the table is lost from the scan",
+        f"no entry can exceed {total}; if there were {sources} entries, the sum of their absolute "
+        f"values would lie between {total} and {math.sqrt(sources) * total:.2f} milliarcseconds",
+        "the scan has lost the table",
     )
 
 
@@ -217,9 +228,12 @@ def abbreviations(printed: Statement) -> Finding:
     stray = sorted(explained - classes)
     return compare(
         not stray,
-        f"{', '.join(stray) or 'none'} is no class of either list",
+        f"not in either list of classes: {', '.join(stray) or 'none'}",
         Verdict.INCONSISTENT,
-        otherwise_note="a random process, to be reduced otherwise than white noise: hung1984, ch. III, is about it",
+        otherwise_note=(
+            "1/f noise is a random process, but reducing it takes other means than white noise does; "
+            "hung1984, ch. III, treats it"
+        ),
     )
 
 
@@ -229,10 +243,10 @@ def total(printed: Statement) -> Finding:
     if value < 0:
         return compare(False, "the root of a sum of squares is not negative")
     return unverifiable(
-        f"{value / theory.GOAL - 1:.1%} above the goal; {sources} equal sources of "
-        f"{theory.equal_error(value, sources):.3f} make it up, or {theory.equal_sources(value, single):.0f} "
-        f"of {single}",
-        "the errors that were added up are lost with Table II-1; its blanks can only raise the total",
+        f"the total is {value / theory.GOAL - 1:.1%} above the goal; {sources} equal sources of "
+        f"{theory.equal_error(value, sources):.3f} give this total, as do "
+        f"{theory.equal_sources(value, single):.0f} sources of {single}",
+        "the individual errors are lost with Table II-1; its blank entries could only raise the total",
     )
 
 
@@ -240,7 +254,8 @@ def total(printed: Statement) -> Finding:
 def blanks(printed: Statement) -> Finding:
     added = [theory.root_sum_square((total_error(), more)) for more in (0.1, 0.5, 1.0)]
     return Finding(
-        "a blank of 0.1, 0.5 or 1 milliarcsecond makes the total " + ", ".join(f"{value:.3f}" for value in added),
+        "a blank entry of 0.1, 0.5 or 1 milliarcsecond would raise the total to "
+        + ", ".join(f"{value:.3f}" for value in added),
         None,
         Verdict.OPEN,
         "the sources and their data are not in the documents",
@@ -252,11 +267,11 @@ def reduction(printed: Statement) -> Finding:
     square = 1 - (theory.GOAL / total_error()) ** 2
     single = math.sqrt(total_error() ** 2 - theory.GOAL**2)
     return Finding(
-        f"to reach the goal the sum of squares must fall by {square:.1%}; taking away one source does it only if that "
-        f"is {single:.3f} milliarcseconds or more",
+        f"the sum of squares must fall by {square:.1%} to reach the goal; removing one source is "
+        f"enough only if it contributes {single:.3f} milliarcseconds or more",
         None,
         Verdict.OPEN,
-        "which source can be reduced is not in the documents",
+        "the documents do not say which source can be reduced",
     )
 
 
@@ -264,9 +279,9 @@ def reduction(printed: Statement) -> Finding:
 def curve(printed: Statement) -> Finding:
     sources, _ = equal_case()
     return unverifiable(
-        f"by the text its curve is $1/\\sqrt N$ milliarcsecond; for {sources} sources "
-        f"{theory.equal_error(theory.GOAL, sources):.4f}",
-        "the picture is lost from the scan",
+        f"according to the text, the curve is $1/\\sqrt N$ milliarcsecond; for {sources} sources this "
+        f"is {theory.equal_error(theory.GOAL, sources):.4f}",
+        "the scan has lost the picture",
     )
 
 
@@ -278,7 +293,7 @@ def equal_sources(printed: Statement) -> Finding:
     value = float(each.value)
     return compare(
         prints_as(Fraction(largest), each.literal) and largest >= value and derivation.equal_sources().holds,
-        f"$1/\\sqrt{{44}}={largest:.4f}$; 44 errors of {value} make "
+        f"$1/\\sqrt{{44}}={largest:.4f}$; the root sum square of 44 errors of {value} is "
         f"{theory.root_sum_square([value] * int(sources)):.4f}",
-        note=f"errors of one sign would add up to {int(sources) * value:.1f}",
+        note=f"{int(sources)} errors with the same sign would add up to {int(sources) * value:.1f}",
     )

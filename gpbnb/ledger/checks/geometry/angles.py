@@ -29,8 +29,11 @@ def first_angles(printed: Statement) -> Finding:
     rank = int(np.linalg.matrix_rank(np.array(columns) / h, tol=1e-6))
     return compare(
         printed.says("angles") == ("cannot be determined" if absent and rank == 2 else "can be determined"),
-        f"no trace of $\\alpha_1$ to first order; exactly, the direction of one star fixes {rank} of three angles",
-        note="so exact equations would not help: it takes a second star, as for the roll phase",
+        (
+            "to first order, $\\alpha_1$ has no effect on the reading; even with exact equations, the "
+            f"direction of one star determines only {rank} of the three angles"
+        ),
+        note="determining the third angle takes a second star, as for the roll phase; exact equations do not help",
     )
 
 
@@ -44,7 +47,7 @@ def colinear(printed: Statement) -> Finding:
             f"{offset / ARCSEC:.0f} arcseconds apart with $\\gamma_2=\\gamma_3={size}$"
             for size, offset in zip(("0", "60''"), apart, strict=True)
         ),
-        note="so under the ideal condition that (3) to (7) rest on, and not otherwise",
+        note="the axes are colinear only under the ideal condition that (3) to (7) assume",
     )
 
 
@@ -57,10 +60,10 @@ def identity(printed: Statement) -> Finding:
     return compare(
         printed.says("matrix")
         == ("an identity matrix" if without and error < MAS else "a matrix that is not the identity"),
-        f"$\\alpha_1$ of 60 arcseconds moves {error / MAS:.2f} milliarcseconds of a year's drift of 6.6 arcseconds "
-        "across",
-        otherwise_note="that $\\alpha_1$ cannot be determined does not make it zero; it must be known to "
-        f"{limit / ARCSEC:.0f} arcseconds for one milliarcsecond",
+        f"an $\\alpha_1$ of 60 arcseconds turns {error / MAS:.2f} milliarcseconds of a drift of 6.6 "
+        "arcseconds a year into the perpendicular direction",
+        otherwise_note="an angle $\\alpha_1$ that cannot be determined is not necessarily zero; it must be known to "
+        f"{limit / ARCSEC:.0f} arcseconds for an error of one milliarcsecond",
         root="undetermined-roll-angle-taken-for-zero",
     )
 
@@ -73,12 +76,13 @@ def phi_frame(printed: Statement) -> Finding:
     stands = float(rotation(phi)[2, 0])
     return compare(
         bool(abs(against[printed.says("frame")[0]] - phi[1]) < MAS and stands < 0),
-        f"$\\varphi_2$ of 5 arcseconds at a pointing of 4: the gyro is turned by {against['i'] / ARCSEC:.0f} against "
-        f"the intermediate frame and by {against['a'] / ARCSEC:.0f} against the absolute one, and its axis stands at "
-        f"$z={'+' if stands > 0 else '-'}{abs(stands) / ARCSEC:.0f}$",
+        "for $\\varphi_2$ of 5 arcseconds and a pointing angle of 4 arcseconds, the gyro is turned "
+        f"by {against['i'] / ARCSEC:.0f} arcseconds relative to the intermediate frame and by "
+        f"{against['a'] / ARCSEC:.0f} relative to the absolute frame, and its axis is at "
+        f"$z={'+' if stands > 0 else '-'}{abs(stands) / ARCSEC:.0f}$ arcseconds",
         Verdict.INCONSISTENT,
-        otherwise_note="φ is the drift against the absolute frame, with the sign reversed: as (2) is set up it turns "
-        "the gyro frame into the absolute one",
+        otherwise_note="φ is the drift relative to the absolute frame, with the sign reversed: in (2), φ turns the "
+        "gyro frame into the absolute frame",
     )
 
 
@@ -87,8 +91,8 @@ def known(printed: Statement) -> Finding:
     left = compensated()
     return compare(
         printed.says("effect") == ("can be compensated" if left < 1e-6 * MAS else "cannot be compensated"),
-        "the readings turned back through known β and γ leave the drift without error",
-        note="for a telescope and a gyro that both give y and z",
+        "turning the readings back through the known angles β and γ leaves no error in the drift",
+        note="this holds if the telescope and the gyro both measure y and z",
     )
 
 
@@ -120,8 +124,8 @@ def use_of_model() -> Finding:
     first = derivation.first_order_effects().holds and derivation.second_order_effects().holds
     return answer(
         holds and first,
-        "error of a year's drift for 20 arcseconds, rolling, in milliarcseconds: " + ", ".join(shown),
-        f"{CHAPTER}: analysis to second order, and a simulated year with exact rotations that agrees",
+        "error of a year's drift, in milliarcseconds, with rolling and angles of 20 arcseconds: " + ", ".join(shown),
+        f"see the {CHAPTER}: an analysis to second order agrees with a simulated year with exact rotations",
     )
 
 

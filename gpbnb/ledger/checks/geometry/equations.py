@@ -49,7 +49,7 @@ def rotation_to_first_order(name: str) -> tuple[sp.Matrix, sp.Matrix]:
         matrix = derivation.exact([H * value for value in ANGLES[name]], sequence)
         found.append((matrix.subs(H, 0), matrix.diff(H).subs(H, 0)))
     if not all(vanishes(value - first) for values in found for value, first in zip(values, found[0], strict=True)):
-        raise ArithmeticError("the orders of turns differ to first order")
+        raise ArithmeticError("got orders of the turns that differ to first order; needed the same first order for all")
     return found[0]
 
 
@@ -97,8 +97,10 @@ def rotation(name: str) -> tuple[sp.Matrix, sp.Matrix]:
 def chains(printed: Statement) -> Finding:
     return compare(
         first_order(printed),
-        "the first order of the exact chain of rotations",
-        note="for each of the six orders in which three angles can be turned; the report does not name one",
+        "the equation is the exact chain of rotations to first order",
+        note=(
+            "this holds for each of the six orders of the three rotations; the report does not say which order it uses"
+        ),
     )
 
 
@@ -120,7 +122,7 @@ def derolled(printed: Statement) -> Finding:
     return compare(
         hold(printed.links(readings())),
         "both rows follow from (3) and (4)",
-        note="the scan keeps fragments of it; the text is restored from (5) and (6)" if restored else "",
+        note="only fragments remain in the scan; the text is restored from (5) and (6)" if restored else "",
     )
 
 
@@ -132,10 +134,10 @@ def estimates(printed: Statement) -> Finding:
     return compare(
         hold(printed.links(readings())),
         f"the right side is $[-{name}_3\\cos2\\omega t+{name}_2\\sin2\\omega t;\\ "
-        f"{name}_3\\sin2\\omega t+{name}_2\\cos2\\omega t]$, with mean 0 over a roll; "
-        f"the fewest signs to change: {len(changes[0])}, before {' or '.join(sorted(signs))}",
-        otherwise_note="it rolls the readings once more instead of derolling them; the inverse of (3), as in (5), is "
-        f"$[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$",
+        f"{name}_3\\sin2\\omega t+{name}_2\\cos2\\omega t]$, with mean 0 over a roll; correcting it "
+        f"takes at least {len(changes[0])} changes of sign, before {' or '.join(sorted(signs))}",
+        otherwise_note="the equation rolls the readings once more instead of derolling them; the inverse of (3), as "
+        f"in (5), is $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$",
         root=DEROLL,
     )
 
@@ -148,7 +150,10 @@ def signs_to_change() -> tuple[tuple[int, ...], ...]:
 
 @CHECKS.add("hung1982.IV.eq10", "hung1982.IV.eq11")
 def errors_of_estimates(printed: Statement) -> Finding:
-    return given("a definition: the error of an estimate; the scan keeps fragments, restored from the other equation")
+    return given(
+        "this defines the error of an estimate; only fragments remain in the scan, and the text is "
+        "restored from the other equation"
+    )
 
 
 @CHECKS.add("hung1982.IV.eq12")
@@ -160,8 +165,11 @@ def error_of_drift(printed: Statement) -> Finding:
         names |= {f"Deltaalpha_{k}": alpha, f"Deltatheta_{k}": theta, f"Deltaphi_{k}": estimate - names[f"phi_{k}"]}
     return compare(
         hold(printed.links(names)),
-        "the error of (7) with estimated angles, for both angles",
-        note="for any estimates; with those of (8) and (9) as printed the errors are as large as the angles",
+        "subtracting (7) from (7) with estimated angles gives this error for both angles",
+        note=(
+            "this holds for any estimates; with estimates from (8) and (9) as printed, the errors are as "
+            "large as the angles"
+        ),
     )
 
 
@@ -177,5 +185,5 @@ def deroll_matrix(printed: Statement) -> Finding:
     undoes = vanishes(sp.Matrix.hstack(*columns) * rolled - sp.eye(2))
     return compare(
         printed.says("operation") == ("deroll" if undoes else "roll"),
-        "the matrix of (7) times the roll is the identity",
+        "the matrix in (7) times the roll matrix is the identity",
     )

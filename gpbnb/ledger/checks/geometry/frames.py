@@ -26,7 +26,7 @@ from gpbnb.measurement import (
 @CHECKS.add("hung1982.IV.figure-iv-1", "hung1982.IV.figure-iv-2")
 def pictures() -> Finding:
     return unverifiable(
-        "drawn again from the definitions of the frames", f"the picture is missing from the scan; {CHAPTER}"
+        "the figure was redrawn from the definitions of the frames", f"the scan has lost the picture; see the {CHAPTER}"
     )
 
 
@@ -38,7 +38,7 @@ def six_frames(printed: Statement) -> Finding:
     count = len(np.unique(frames_of_a_case().round(9), axis=0))
     return compare(
         count == _COUNTS[printed.says("frames")],
-        f"with all angles nonzero the definitions give {count} different frames",
+        f"if no angle is zero, the definitions give {count} different frames",
     )
 
 
@@ -48,13 +48,14 @@ def absolute_frame(printed: Statement) -> Finding:
     line = theory.line_fit_leak(year, 1)
     return compare(
         printed.says("frame") == ("stationary in orientation" if year + orbit < MAS else "moving with the aberration"),
-        f"starlight is aberrated: the line of sight moves by up to {year / ARCSEC:.1f} arcseconds in a year and "
-        f"{orbit / ARCSEC:.1f} in an orbit at 640 km; a straight line through a year of (7) would be off by up to "
-        f"{line / ARCSEC:.0f} arcseconds a year",
+        f"due to aberration, the line of sight moves by up to {year / ARCSEC:.1f} arcseconds in a "
+        f"year and {orbit / ARCSEC:.1f} in an orbit at 640 km; the slope of a straight line fitted to "
+        f"a year of drift angles from (7) would be wrong by up to {line / ARCSEC:.0f} arcseconds a "
+        "year",
         Verdict.INCONSISTENT,
-        otherwise_note="it cannot stand still and follow the line of sight. (1) keeps the star at (1, 0, 0): "
-        "(7) gives the drift against the apparent star, and the report does not mention aberration; from the "
-        "known velocities it can be taken out",
+        otherwise_note="the frame cannot be stationary and also follow the line of sight. Because (1) keeps the "
+        "star at (1, 0, 0), (7) gives the drift relative to the apparent direction of the star. The "
+        "report does not mention aberration, which can be corrected from the known velocities",
     )
 
 
@@ -74,11 +75,12 @@ def intermediate_frame(printed: Statement) -> Finding:
     apart = float(np.abs(np.array(drifts) - [-phi[2], phi[1]]).max())
     return compare(
         printed.says("frame") == ("stationary in orientation" if turned < 1e-9 else "turning with the roll axis"),
-        f"pointings of (−2, 4) and (7, −1) arcseconds turn it by {turned / ARCSEC:.1f}; at both (7) gives the drift to "
+        "between pointings of (−2, 4) and (7, −1) arcseconds the frame turns by "
+        f"{turned / ARCSEC:.1f} arcseconds; at both pointings (7) gives the drift to within "
         f"{apart / MAS:.0e} milliarcseconds",
         Verdict.MISPRINT if apart < 1e-3 * MAS else Verdict.WRONG,
-        otherwise_note="it stands still only as long as the roll axis does; (5) to (7) are of one instant and do not "
-        "ask it to",
+        otherwise_note="the intermediate frame is stationary only while the roll axis is; equations (5) to (7) "
+        "describe a single instant and do not require a stationary frame",
     )
 
 
@@ -111,11 +113,10 @@ def turning_delta(claimed: bool, limit: float) -> Finding:
     degrees = ", ".join(f"{math.degrees(angle):.0f}" for angle in turned)
     return compare(
         bool(claimed and max(turned) < limit),
-        f"with no misalignment and no drift $\\delta_1$ is {degrees} degrees after 0, an eighth and a quarter of a "
-        "roll",
+        f"without misalignment and drift, $\\delta_1$ is {degrees} degrees after 0, an eighth and a quarter of a roll",
         Verdict.INCONSISTENT,
-        otherwise_note="the readout frame rolls and the gyro frame does not, so that δ contains the roll; no equation "
-        "uses δ",
+        otherwise_note="the readout frame rolls but the gyro frame does not, so δ contains the roll angle; no "
+        "equation uses δ",
     )
 
 
@@ -126,11 +127,14 @@ def readout_normal(printed: Statement) -> Finding:
     alone = derivation.one_ring().holds
     return compare(
         to_normal < 1 if printed.says("reference") == "the readout normal zᵣ" else to_axis < 1,
-        f"aligned, the spin axis is {to_normal:.0f} degrees from the normal $z_r$ and {to_axis:.0f} from $x_r$",
+        (
+            f"without misalignments, the spin axis is {to_normal:.0f} degrees from the normal $z_r$ and "
+            f"{to_axis:.0f} degrees from $x_r$"
+        ),
         Verdict.INCONSISTENT,
-        otherwise_note="(6) is about $x_r$. A ring with the normal $z_r$ reads the component $z_r$ alone, while (6) "
-        "and (9) also need $y_r$: a second ring"
-        + (", or the mean over a roll, which tells both angles" if alone else ""),
+        otherwise_note="equation (6) gives the offset from $x_r$. A ring with the normal $z_r$ measures only the "
+        "component $z_r$, while (6) and (9) also need $y_r$, which takes a second ring"
+        + (" or the mean over a roll, which gives both angles" if alone else ""),
     )
 
 
@@ -139,10 +143,10 @@ def boresight(printed: Statement) -> Finding:
     off = boresight_offset(np.array([0.0, MINUTE, 0.0]))
     return compare(
         off < 1e-9 if printed.says("axis") == "telescope's boresight" else off > 1e-9,
-        f"with $\\beta_2$ of 60 arcseconds boresight and roll axis are {off / ARCSEC:.0f} arcseconds apart",
+        (f"with $\\beta_2$ of 60 arcseconds, the boresight and the roll axis are {off / ARCSEC:.0f} arcseconds apart"),
         Verdict.INCONSISTENT,
-        otherwise_note="α belongs to the roll axis, by the definition of the intermediate frame; of the boresight only "
-        "where β is zero",
+        otherwise_note="by the definition of the intermediate frame, α is the deviation of the roll axis; it is the "
+        "deviation of the boresight only where β is zero",
     )
 
 
@@ -158,8 +162,10 @@ def thetas(printed: Statement) -> Finding:
     meant = phi if printed.says("thetas") == "the relativistic drift angles" else phi + alpha
     return compare(
         bool(np.allclose(theta, meant, atol=MAS)),
-        "for drift angles (5, 3) and pointing (−2, 4) arcseconds θ is "
-        f"({theta[1] / ARCSEC:.0f}, {theta[2] / ARCSEC:.0f})",
+        "for drift angles of (5, 3) and pointing angles of (−2, 4) arcseconds, θ is "
+        f"({theta[1] / ARCSEC:.0f}, {theta[2] / ARCSEC:.0f}) arcseconds",
         Verdict.INCONSISTENT,
-        otherwise_note="θ is drift and pointing together; the drift is $\\varphi=\\theta-\\alpha$, as (7) says",
+        otherwise_note=(
+            "θ is the sum of the drift and pointing angles; the drift angle is $\\varphi=\\theta-\\alpha$, as (7) says"
+        ),
     )

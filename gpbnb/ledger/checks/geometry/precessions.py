@@ -17,7 +17,8 @@ from gpbnb.measurement import ARCSEC, deroll
 @CHECKS.add("hung1982.I.figure-i-1")
 def picture() -> Finding:
     return unverifiable(
-        "drawn again for a star in the plane of a polar orbit", f"the picture is missing from the scan; {CHAPTER}"
+        "the figure was redrawn for a star in the plane of a polar orbit",
+        f"the scan has lost the picture; see the {CHAPTER}",
     )
 
 
@@ -26,8 +27,9 @@ def two_precessions(printed: Statement) -> Finding:
     holds = derivation.precessions().holds
     return compare(
         holds and printed.says("geodetic") == "in a plane of orbit" and printed.says("motional") == "perpendicular to",
-        "for a star in the plane of a polar orbit: geodetic drift in this plane, motional drift along its normal, "
-        "which is across the Earth's axis; their inner product is 0",
+        "for a star in the plane of a polar orbit, the geodetic drift lies in this plane and the "
+        "motional drift along its normal, which is perpendicular to the Earth's axis; the inner "
+        "product of the two drifts is 0",
     )
 
 
@@ -38,8 +40,9 @@ def larger_effect(printed: Statement) -> Finding:
     larger = "geodetic" if min(ratios) > 1 else "motional"
     return compare(
         printed.says("larger") == larger,
-        f"{geodetic / ARCSEC:.2f} and {motional / ARCSEC:.3f} arcseconds a year at 640 km; at least "
-        f"{min(ratios):.0f} times larger from the ground to 36000 km",
+        f"the drifts are {geodetic / ARCSEC:.2f} and {motional / ARCSEC:.3f} arcseconds a year at 640 "
+        f"km; from the ground to 36000 km, the geodetic drift is at least {min(ratios):.0f} times the "
+        "motional drift",
     )
 
 
@@ -53,9 +56,11 @@ def approximately_parallel(printed: Statement) -> Finding:
     direction = "approximately parallel to" if off < 10 else "perpendicular to" if off > 80 else "oblique to"
     return compare(
         printed.says("direction") == direction,
-        f"the drift of a gyro that points to Rigel makes {off:.1f} degrees with the Earth's axis, as "
-        "much as the star is off the equator",
-        note="if it is said of the plane: that of a polar orbit contains the axis",
+        f"the drift of a gyro that points to Rigel makes an angle of {off:.1f} degrees with the "
+        "Earth's axis, which is the declination of the star",
+        note=(
+            "the claim is right only if it means the plane of the orbit: the plane of a polar orbit contains the axis"
+        ),
     )
 
 
@@ -74,9 +79,11 @@ def theories_differ(printed: Statement) -> Finding:
     differ = difference != 0 and sp.limit(ratio, omega, sp.oo) == 1
     return compare(
         printed.says("magnitudes") == ("vary from theory to theory" if differ else "are the same in every theory"),
-        f"in the Brans-Dicke theory the geodetic drift is ${sp.latex(sp.factor(ratio))}$ of Einstein's, with its "
-        f"parameter $\\omega$: {float(difference.subs(omega, 6)):.0%} less for $\\omega=6$, and the same in the limit",
-        note="procession is a slip for precession",
+        "in the Brans-Dicke theory with parameter $\\omega$ the geodetic drift is "
+        f"${sp.latex(sp.factor(ratio))}$ times that of Einstein's theory: "
+        f"{float(difference.subs(omega, 6)):.0%} less for $\\omega=6$, and the same in the limit of "
+        "large $\\omega$",
+        note="'procession' is a misprint for 'precession'",
     )
 
 
@@ -91,9 +98,9 @@ def progress_report() -> Finding:
     as_printed, corrected = deroll_errors()
     return answer(
         corrected < 1e-12 * ARCSEC < as_printed,
-        f"over a roll (8) as printed is off by up to {as_printed / ARCSEC:.0f} arcseconds for a pointing of 17, and "
-        "by none when corrected",
-        f"this project: errors corrected and announced work done; for this chapter in the {CHAPTER}",
+        f"over a roll, equation (8) as printed is wrong by up to {as_printed / ARCSEC:.0f} arcseconds "
+        "for a pointing angle of 17 arcseconds; the corrected equation is exact",
+        f"this book corrects the errors and does the announced work; for this chapter, see the {CHAPTER}",
     )
 
 

@@ -76,7 +76,7 @@ def at(now: Any, before: Any) -> Callable[[Any], Any]:
             return now
         if index == N - 1:
             return before
-        raise LookupError(f"this case has no value at the cycle {index}")
+        raise LookupError(f"got cycle {index}; needed a cycle at which this case has a value")
 
     return value
 

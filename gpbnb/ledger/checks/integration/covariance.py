@@ -40,7 +40,10 @@ def if_used(place: str) -> str:
     """Return the rate that a misprint would give, for μ = 0.1 and T = 0.01 s."""
     values = {MU: sp.Rational(1, 10), T: sp.Rational(1, 100)}
     found, right = (float(e.subs(values)) for e in (_misprints()[place], derivation.walk()))
-    return f"if used, it would make the rate at $\\mu=0.1$, $T=0.01$ s {found:.4g} instead of {right:.4g}"
+    return (
+        f"if the printed form were used, the rate for $\\mu=0.1$ and $T=0.01$ s would be {found:.4g} "
+        f"instead of {right:.4g}"
+    )
 
 
 @cache
@@ -71,9 +74,9 @@ def squared_mean(printed: Statement) -> Finding:
     }
     return compare(
         hold(printed.links(names)),
-        "$E(x_{2n}^2)$; the print has the square of a mean, which is zero",
+        "the mean of the square, $E(x_{2n}^2)$, is meant; the printed square of the mean is zero",
         Verdict.MISPRINT,
-        otherwise_note=f"(13) has $P_{{22}}$ again, so nothing depends on the slip; {if_used('(12)')}",
+        otherwise_note=f"(13) again has $P_{{22}}$, so nothing depends on the misprint; {if_used('(12)')}",
     )
 
 
@@ -84,7 +87,8 @@ def error_variance(printed: Statement) -> Finding:
         names = {**from_zero(case), "P_ee": at(closed_form(case, case.cycle), None)}
         agrees = agrees and hold(printed.links(names))
     return compare(
-        agrees, "with the covariances of cycle $n$ it is the variance that the errors of single cycles add up to"
+        agrees,
+        ("with the covariances of cycle $n$, the equation gives the total variance of the errors of single cycles"),
     )
 
 
@@ -104,21 +108,21 @@ def rate(printed: Statement) -> Finding:
     agrees = all(any(hold(printed.links(names)) for names in every_index(case)) for case in cases())
     return compare(
         agrees,
-        "$\\Delta P_{ee_n}/T$; no $\\Delta P_{ij}$ with $i,j\\le3$ is equal to it",
+        "the rate is $\\Delta P_{ee_n}/T$; no $\\Delta P_{ij}$ with $i,j\\le3$ equals $\\Delta P_{ee_n}$",
         Verdict.MISPRINT,
-        otherwise_note="$ij$ for $ee$, as in (15) below it, so by the author rather than the scan; the last member, "
-        "which is used, is right",
+        otherwise_note="$ij$ stands for $ee$, in (15) below as well, so the mistake is probably the author's rather "
+        "than the scan's; the last expression, which is used later, is right",
     )
 
 
 @CHECKS.add(*eq("15", "26", "29"))
 def differences(printed: Statement) -> Finding:
-    return given("a definition: the change over a cycle")
+    return given("defines the change over a cycle")
 
 
 @CHECKS.add(MAIN + "sanalysis.symbols-14")
 def rate_of_a_cycle() -> Finding:
-    return given("names $\\dot P_{ee_n}$: a difference over $T$, not a derivative")
+    return given("names $\\dot P_{ee_n}$: a difference divided by $T$, not a derivative")
 
 
 # -- products and their expected values, (16)-(18) ------------------------------------------------
@@ -127,13 +131,15 @@ def rate_of_a_cycle() -> Finding:
 @CHECKS.add(*eq("16", "17"))
 def products(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(states(case))) for case in cases())
-    return compare(agrees, "each product expanded with (10)")
+    return compare(agrees, "(10) was used to expand each product")
 
 
 @CHECKS.add(*eq("18-p31", "18-p33"))
 def covariance_step(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(arbitrary(case))) for case in cases())
-    return compare(agrees, "the covariance matrix of $(x_1,x_2,x_3)$ carried through a cycle by (4) and (2)")
+    return compare(
+        agrees, "(4) and (2) propagate the covariance matrix of $(x_1,x_2,x_3)$ through a cycle to this result"
+    )
 
 
 @CHECKS.add(*eq("18-p32"))
@@ -141,10 +147,11 @@ def p32(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(arbitrary(case))) for case in cases())
     return compare(
         agrees,
-        "the last term is $\\frac12\\phi_{21}P_{11_{n-1}}T$",
+        "the last term must be $\\frac12\\phi_{21}P_{11_{n-1}}T$",
         Verdict.WRONG,
-        otherwise_note="(16) and (17) give the factor $\\frac12$ and (32) has it again, so the final result is right; "
-        f"the set of equations (18), (25), (27)-(29) is not; {if_used('(18)')}, a negative variance",
+        otherwise_note="(16) and (17) give the factor $\\frac12$ and (32) has it again, so the final result is "
+        f"right, but the set of equations (18), (25), (27)-(29) is wrong; {if_used('(18)')}, a "
+        "negative variance",
         root="savage-18-missing-half",
     )
 
@@ -192,7 +199,10 @@ def covariance_equation(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(_from_any(case))) for case in cases())
     return compare(
         agrees,
-        "$\\Phi P\\Phi^T+E(\\underline q\\,\\underline q^T)$ solves it, with $N_{P_{11}}=2\\omega_{bw}P_{11\\infty}$",
+        (
+            "$\\Phi P\\Phi^T+E(\\underline q\\,\\underline q^T)$ solves the equation, with "
+            "$N_{P_{11}}=2\\omega_{bw}P_{11\\infty}$"
+        ),
     )
 
 
@@ -204,7 +214,7 @@ def covariance_names(printed: Statement) -> Finding:
 @CHECKS.add(MAIN + "sanalysis.symbols-20")
 def density() -> Finding:
     return given(
-        "names the symbols of (20); the density is two-sided and per hertz, twice as much over positive frequencies"
+        "names the symbols of (20); the density is two-sided and per hertz; a one-sided density would be twice as large"
     )
 
 
@@ -216,21 +226,23 @@ def covariance_components(printed: Statement) -> Finding:
         agrees,
         "$\\dot P_{12}=P_{11}-\\omega_{bw}P_{12}$; the others as printed",
         Verdict.MISPRINT if same_letter else Verdict.WRONG,
-        otherwise_note="the subscript is in capitals here alone, by the author or the scan; $A$ is that of (4), not "
-        "of (3)",
+        otherwise_note="the subscript has capitals only here, due to the author or the scan; $A$ is the matrix of "
+        "(4), not of (3)",
     )
 
 
 @CHECKS.add(*eq("22"))
 def simplified(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(_from_steady(case))) for case in cases())
-    return compare(agrees, "(21) with $P_{11}$ at its steady value")
+    return compare(agrees, "this is (21) with $P_{11}$ at its steady-state value")
 
 
 @CHECKS.add(*eq("23"))
 def continuous_solution(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(_from_steady(case))) for case in cases())
-    return compare(agrees, "$E(\\underline x\\,\\underline x^T)$ from zero $P_{12}$ and $P_{22}$")
+    return compare(
+        agrees, "the matrix $E(\\underline x\\,\\underline x^T)$ follows from $P_{12}=P_{22}=0$ at the start"
+    )
 
 
 _STARTS = {"at its steady state value": 1, "zero": 0, "twice its steady state value": 2}
@@ -252,8 +264,8 @@ def steady_start(printed: Statement) -> Finding:
     late = [float(np.diff(theory.error_variance([5000, 5001], 0.5, s))[0]) for s in (1.0, 0.0)]
     return compare(
         agrees,
-        "(22) and (23) follow from this start and from no other",
-        note="after many cycles the rate does not depend on the start of $P_{11}$"
+        "(22) and (23) follow only from this initial value",
+        note="after many cycles the rate does not depend on the initial value of $P_{11}$"
         if abs(late[0] / late[1] - 1) < 1e-9
         else "",
     )
@@ -270,7 +282,7 @@ def steady_input() -> Finding:
 @CHECKS.add(*eq("24", "27", "28"))
 def at_cycles(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(from_zero(case))) for case in cases())
-    return compare(agrees, "the covariances carried from zero, cycle by cycle, to $t_{n-1}$ and $t_n$")
+    return compare(agrees, "the covariances were propagated from zero, cycle by cycle, to $t_{n-1}$ and $t_n$")
 
 
 @CHECKS.add(*eq("25"))
@@ -282,9 +294,10 @@ def p22_recursion(printed: Statement) -> Finding:
         agrees,
         "$\\frac2{\\omega_{bw}}[T-\\frac1{\\omega_{bw}}(1-e^{-\\omega_{bw}T})e^{-\\omega_{bw}t_{n-1}}]P_{11\\infty}$",
         Verdict.WRONG,
-        otherwise_note="it subtracts a number from a time, where (24) has $\\frac1{\\omega_{bw}}$; for large $n$ the "
-        "term vanishes, so the final result is right, but the set of equations (18), (25), (27)-(29) is not: the first "
-        f"change of $P_{{22}}$ for $\\omega_{{bw}}=10$, $T=0.01$ is {found:.3g}, not {right:.3g}",
+        otherwise_note="the printed term subtracts a pure number from a time, where (24) has "
+        "$\\frac1{\\omega_{bw}}$; for large $n$ the term vanishes, so the final result is right, "
+        "but the set of equations (18), (25), (27)-(29) is wrong: the first change of $P_{22}$ for "
+        f"$\\omega_{{bw}}=10$, $T=0.01$ is {found:.3g}, not {right:.3g}",
         root="savage-25-missing-bandwidth",
     )
 
@@ -292,12 +305,13 @@ def p22_recursion(printed: Statement) -> Finding:
 @CHECKS.add(MAIN + "sanalysis.complete-set")
 def complete_set(printed: Statement) -> Finding:
     right, wrong = errors_of_the_set()
-    fit = f"accurate to {CLOSE:.0e}" if right < CLOSE else f"off by {right:.1e}"
+    fit = f"accurate to {CLOSE:.0e}" if right < CLOSE else f"wrong by {right:.1e}"
     return compare(
         printed.says("set") == "comprise a complete set for evaluating" and wrong < CLOSE,
-        f"with (18) and (25) corrected, and zero $P_{{31}}$, $P_{{32}}$, $P_{{33}}$ to begin with, $P_{{ee_n}}$ is "
-        f"{fit}; as printed it is wrong by up to {wrong:.2g} times itself",
+        "with (18) and (25) corrected and the initial values $P_{31}=P_{32}=P_{33}=0$, "
+        f"$P_{{ee_n}}$ is {fit}; with the printed equations, its error is up to {wrong:.2g} times its "
+        "value",
         Verdict.WRONG,
-        otherwise_note="no equation is missing, but the misprints of (18) and (25) spoil the numbers",
+        otherwise_note="no equation is missing, but the misprints in (18) and (25) make the results wrong",
         root="savage-18-missing-half",
     )

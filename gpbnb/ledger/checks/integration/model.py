@@ -26,14 +26,14 @@ def date() -> Finding:
 
 @CHECKS.add(MAIN + "sreference.reference")
 def reference() -> Finding:
-    return unverifiable("", "the book is not among the documents; (3), (5) and (19), which cite it, are derived here")
+    return unverifiable("", "the cited book is not among the documents; we derive (3), (5) and (19), which cite it")
 
 
 @CHECKS.add(MAIN + "sfig-1.fig-1")
 def figure() -> Finding:
     return unverifiable(
-        "redrawn from (1), (2) and (11)",
-        f"the picture is missing from the scan, which keeps only its caption; {CHAPTER}",
+        "the figure was redrawn from (1), (2) and (11)",
+        f"the scan has lost the picture and keeps only its caption; see the {CHAPTER}",
     )
 
 
@@ -54,12 +54,13 @@ def abstract(printed: Statement) -> Finding:
     away = np.maximum(abs(width - bandwidth), abs(rate - frequency)) + abs(in_rms - amplitude)
     return compare(
         bool(np.all(away < 0.01)),
-        f"powers of bandwidth and frequency {width[0]:.2f} and {rate[0]:.2f} at $\\mu=10^{{-3}}$, {width[2]:.2f} and "
-        f"{rate[2]:.2f} at $\\mu=1$, {width[-1]:.2f} and {rate[-1]:.2f} at $\\mu=100$; the power of the rms is "
+        f"the error varies with the bandwidth and the frequency to the powers {width[0]:.2f} and "
+        f"{rate[0]:.2f} at $\\mu=10^{{-3}}$, {width[2]:.2f} and {rate[2]:.2f} at $\\mu=1$, and "
+        f"{width[-1]:.2f} and {rate[-1]:.2f} at $\\mu=100$; it varies with the rms to the power "
         f"{in_rms:.2f} throughout",
         Verdict.INCONSISTENT,
-        otherwise_note="true only of the approximation (39) for small $\\mu$, not of (35); (39) is 1 % too large at "
-        f"$\\mu={theory.validity(0.01):.2f}$ and 10 % at {theory.validity(0.1):.2f}",
+        otherwise_note="the claim is true only of approximation (39) for small $\\mu$, not of (35); (39) is 1 % too "
+        f"large at $\\mu={theory.validity(0.01):.2f}$ and 10 % at {theory.validity(0.1):.2f}",
         root="abstract-states-small-mu-limit",
     )
 
@@ -93,9 +94,9 @@ def walk_type(printed: Statement) -> Finding:
         printed.says("growth") == grows,
         "after many cycles the variance grows by the same amount in each cycle, for the input of (1) and for a "
         "resonant one; the spectrum at the multiples of $f_c$ gives the same rate",
-        note=f"for noise limited by a filter; an input whose flat spectrum ends at ${_EDGE:g}f_c$ causes no random "
-        f"walk: its error variance is ${early:.2g}\\sigma_x^2T^2$ after 100 cycles and ${late:.2g}\\sigma_x^2T^2$ "
-        "after 1000",
+        note="the claim holds for noise limited by a filter; an input whose flat spectrum ends at "
+        f"${_EDGE:g}f_c$ causes no random walk: its error variance is ${early:.2g}\\sigma_x^2T^2$ "
+        f"after 100 cycles and ${late:.2g}\\sigma_x^2T^2$ after 1000",
     )
 
 
@@ -112,8 +113,8 @@ def aim(printed: Statement) -> Finding:
     letters = sp.simplify((d33 + d22 - 2 * d32) / T).free_symbols
     return compare(
         letters == _LETTERS[printed.says("of")],
-        "$\\dot P_{ee}$ depends on $P_{11\\infty}=\\sigma_x^2$, $\\omega_{bw}$ and $T$ alone",
-        note="for large $n$, and for the growth of the error; the error itself depends on the time too",
+        "$\\dot P_{ee}$ depends only on $P_{11\\infty}=\\sigma_x^2$, $\\omega_{bw}$ and $T$",
+        note="the claim holds for the growth of the error at large $n$; the error itself also depends on the time",
     )
 
 
@@ -122,7 +123,7 @@ def aim(printed: Statement) -> Finding:
 
 @CHECKS.add(*eq("1"))
 def model(printed: Statement) -> Finding:
-    return given("the model: the input and its true integral")
+    return given("states the model: the input and its true integral")
 
 
 @CHECKS.add(MAIN + "sanalysis.band-limited")
@@ -133,7 +134,7 @@ def band_limited() -> Finding:
     # Shares of the variance below ω tan θ; the density over θ is uniform.
     density = process.psd(omega * np.tan(angle)) * omega / np.cos(angle) ** 2 / 2000
     inside = float(np.sum(density[:500]) / np.sum(density))
-    return given(f"names $x_1$; {inside:.0%} of its variance lies below $\\omega_{{bw}}$, and the rest above")
+    return given(f"names $x_1$, of whose variance {inside:.0%} lies below $\\omega_{{bw}}$ and the rest above")
 
 
 @CHECKS.add(MAIN + "sanalysis.bandwidth")
@@ -160,7 +161,7 @@ def trapezoidal(printed: Statement) -> Finding:
         names = {"T": period, "n": sp.Integer(k), "x_1": lambda i: samples[int(i)]}
         names["x_3"] = {k - 1: start, k: start + area}
         agrees = agrees and hold(printed.links(names))
-    return compare(agrees, "the area of the trapezoid between two samples is added in each cycle")
+    return compare(agrees, "each cycle adds the area of the trapezoid between two samples")
 
 
 @CHECKS.add(*eq("3"))
@@ -172,7 +173,7 @@ def state_form(printed: Statement) -> Finding:
         "x_underline": sp.Matrix([x1, x2]),
         "n_underline_p": sp.Matrix([n1, 0]),
     }
-    return compare(hold(printed.links(names)), "(1) with the vectors and the matrix of (4)")
+    return compare(hold(printed.links(names)), "this is (1), with the vectors and the matrix of (4)")
 
 
 @CHECKS.add(*eq("4"))
@@ -183,7 +184,10 @@ def matrices(printed: Statement) -> Finding:
     agrees = x == sp.Matrix([x1, x2]) and vanishes(a - rates.jacobian(x)) and vanishes(rates - a * x - noise)
     return compare(
         bool(agrees),
-        "the derivatives of (1) by $\\underline x$ are $\\underline A$, and the rest is $\\underline n_p$",
+        (
+            "the derivatives of (1) with respect to $\\underline x$ form $\\underline A$, and the "
+            "remaining term is $\\underline n_p$"
+        ),
     )
 
 
@@ -221,8 +225,8 @@ def discrete(printed: Statement) -> Finding:
         agrees = agrees and hold(printed.links(names))
     return compare(
         agrees,
-        "(3) integrated over a cycle with a given input; the part that does not depend on the state is "
-        "$\\underline q_n$",
+        "the equation is (3), integrated over a cycle with a given input; the part independent of "
+        "the state is $\\underline q_n$",
     )
 
 
@@ -254,9 +258,10 @@ def transition_integral(printed: Statement) -> Finding:
         hold(links),
         f"(7) exceeds the printed integral by ${sp.latex(residual)}$: $\\Phi(\\tau)=I+\\int_0^\\tau A\\Phi\\,d\\tau_1$",
         Verdict.MISPRINT,
-        otherwise_note="the $I$ is missing, against $\\Phi(0)=I$ beside it, and the limits are those of $t$, not of "
-        "$\\tau$; as printed only $\\Phi=0$ solves it. (7) is right, so nothing depends on the slip. The scan may have "
-        "lost the $I$; the limits are the author's, since both integrals have them",
+        otherwise_note="the $I$ is missing, although $\\Phi(0)=I$ is printed beside the equation, and the limits "
+        "are those of $t$, not of $\\tau$; the printed equation has only the solution $\\Phi=0$. (7) "
+        "is right, so nothing depends on the misprint. The scan may have lost the $I$; the wrong "
+        "limits are the author's, since both integrals have them",
     )
 
 
@@ -287,8 +292,9 @@ def noise_integral(printed: Statement) -> Finding:
         "$\\underline q_n=\\int\\Phi(t_n-\\tau)\\,\\underline n_p(\\tau)\\,d\\tau$; as printed, $E(q_1^2)$ would fall "
         f"to {found:.2g} of $\\sigma_x^2$ after five correlation times, where it is {expected:.2g}",
         Verdict.MISPRINT,
-        otherwise_note="the document uses only that $\\underline q_n$ is new in each cycle, so nothing depends on the "
-        "slip. $\\Phi(\\tau-t_{n-1})$ would give the right covariance too; the capital $P$ stands for $p$",
+        otherwise_note="the document uses only that the $\\underline q_n$ of different cycles are independent, so "
+        "nothing depends on the misprint. $\\Phi(\\tau-t_{n-1})$ would also give the right "
+        "covariance; the capital $P$ stands for $p$",
     )
 
 
@@ -315,7 +321,7 @@ def easily_shown(printed: Statement) -> Finding:
     follows = solves and vanishes((ours - derivation.printed_transition()).applyfunc(sp.simplify))
     return compare(
         printed.says("from") == ("easily shown" if follows else "easily refuted"),
-        "(6) differentiated, $\\dot\\Phi=A\\Phi$, has one solution with $\\Phi(0)=I$, and it is (7)",
+        "(7) is the only solution of the derivative of (6), $\\dot\\Phi=A\\Phi$, with $\\Phi(0)=I$",
         note="the printed integral of (6) lacks the identity",
     )
 
@@ -331,12 +337,12 @@ def transitions() -> Finding:
 @CHECKS.add(*eq("10"))
 def components(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(states(case))) for case in cases())
-    return compare(agrees, "the rows of (5), and (2)")
+    return compare(agrees, "the equations are the rows of (5), and (2)")
 
 
 @CHECKS.add(*eq("11"))
 def error(printed: Statement) -> Finding:
-    return given("the error: the digital less the true integral")
+    return given("defines the error: the digital integral minus the true integral")
 
 
 @CHECKS.add(MAIN + "sanalysis.uncorrelated-q")
@@ -348,6 +354,6 @@ def uncorrelated(printed: Statement) -> Finding:
     found = "uncorrelated" if sp.simplify(past) == 0 == sp.simplify(integral) else "correlated"
     return compare(
         printed.says("noise") == found,
-        "$E(q_1x_1)=E(q_2x_1)=0$ for $x_1$ at $t_{n-1}$ and at any time before, of which $x_2$ and $x_3$ are made, "
-        "from $E(x_1x_1')=\\sigma_x^2e^{-\\omega_{bw}|\\tau|}$",
+        "$E(x_1x_1')=\\sigma_x^2e^{-\\omega_{bw}|\\tau|}$ gives $E(q_1x_1)=E(q_2x_1)=0$ for $x_1$ at "
+        "$t_{n-1}$ and at all earlier times, and $x_2$ and $x_3$ are computed from these values",
     )

@@ -31,9 +31,9 @@ def transient() -> Finding:
     away = float(np.max(np.abs(run.deviations(closed[n]))))
     return answer(
         derivation.transient().holds and again < 1e-12 and away < 4,
-        "$P_{ee_n}=\\sigma_x^2T^2[nL-\\frac12L^2(1-e^{-n\\mu})]$, $L=L(\\mu/2)$; simulations of 1 to 20 cycles are off "
-        f"by at most {away:.1f} standard errors",
-        f"{CHAPTER}, section on the build-up",
+        "$P_{ee_n}=\\sigma_x^2T^2[nL-\\frac12L^2(1-e^{-n\\mu})]$, $L=L(\\mu/2)$; simulations of "
+        f"1 to 20 cycles differ from it by at most {away:.1f} standard errors",
+        f"see the {CHAPTER}, section on the build-up",
     )
 
 
@@ -46,7 +46,7 @@ def numerical_example() -> Finding:
     away = worst(simulated())
     return answer(
         bool(abs(ours / again - 1) < 1e-12 and abs(rate / f_c - 1) < 1e-9 and away < 4),
-        f"1 °/s rms in 100 Hz at 1 kHz: {ours:.3g} °/√s, {60 * ours:.2g} °/√h; simulations agree within {away:.1f} "
-        "standard errors",
-        f"{CHAPTER}, sections on the simulation and on a sensor",
+        f"noise of 1 °/s rms with a bandwidth of 100 Hz, sampled at 1 kHz, gives {ours:.3g} °/√s or "
+        f"{60 * ours:.2g} °/√h; simulations agree within {away:.1f} standard errors",
+        f"see the {CHAPTER}, sections on the simulation and on a sensor",
     )

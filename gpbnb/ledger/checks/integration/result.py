@@ -25,7 +25,7 @@ def steady_covariances(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(steady(case))) for case in cases())
     return compare(
         agrees,
-        "the values to which a cycle returns: $P_{12\\infty}=P_{11\\infty}/\\omega_{bw}$, "
+        "the steady-state values are $P_{12\\infty}=P_{11\\infty}/\\omega_{bw}$, "
         "$P_{31\\infty}=\\frac12\\frac{1+\\phi_{11}}{1-\\phi_{11}}P_{11\\infty}T$",
     )
 
@@ -38,7 +38,7 @@ def steady_names() -> Finding:
 @CHECKS.add(*eq("32"))
 def steady_changes(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(steady(case))) for case in cases())
-    return compare(agrees, "the changes of the covariance matrix over a cycle in the steady state, all members")
+    return compare(agrees, "all expressions equal the change of the covariance matrix over a cycle in the steady state")
 
 
 @CHECKS.add(*eq("33"))
@@ -48,7 +48,7 @@ def steady_rate(printed: Statement) -> Finding:
         names = constants(case)
         names["P_dot_ee"] = {names["n"]: walk_rate(case)}
         agrees = agrees and hold(printed.links(names))
-    return compare(agrees, "the same from the errors of single cycles, without (10)-(32)")
+    return compare(agrees, "the errors of single cycles give the same result without (10)-(32)")
 
 
 @CHECKS.add(*eq("34"))
@@ -57,10 +57,13 @@ def rate_in_mu(printed: Statement) -> Finding:
     ends = all(vanishes(links[0].left - links[-1].right) for links in (printed.links(constants(c)) for c in cases()))
     return compare(
         agrees,
-        "$(1+\\phi_{11})T-\\frac2{\\omega_{bw}}(1-\\phi_{11})$ over $1-\\phi_{11}$ in the second member",
+        (
+            "the second expression must be $(1+\\phi_{11})T-\\frac2{\\omega_{bw}}(1-\\phi_{11})$ divided "
+            "by $1-\\phi_{11}$"
+        ),
         Verdict.MISPRINT if ends else Verdict.WRONG,
-        otherwise_note="its $T$ is lost, by the author or the scan, and is back in the third member; "
-        f"{if_used('(34)')}; with $T=1$ nobody would see it",
+        otherwise_note="the author or the scan has lost the factor $T$, which the third expression has again; "
+        f"{if_used('(34)')}; with $T=1$ the misprint has no effect",
     )
 
 
@@ -73,7 +76,7 @@ def random_walk(printed: Statement) -> Finding:
     return compare(
         agrees,
         "$\\sigma_x\\sqrt{L(\\mu/2)/f_c}$, with Langevin's function $L(x)=\\coth x-1/x$",
-        note="from the errors of single cycles, without (10)-(34)",
+        note="we derived the result from the errors of single cycles, without (10)-(34)",
     )
 
 
@@ -92,9 +95,12 @@ def exact(printed: Statement) -> Finding:
     found = "an exact" if folded < _SUMMED and derivation.independent().holds else "an approximate"
     return compare(
         printed.says("kind") == found,
-        "derived again from the errors of single cycles; the spectrum summed over the multiples of $f_c$ agrees to "
-        f"{_SUMMED:.0e}",
-        note="the rate is exact; the variance itself is smaller by $\\frac12\\sigma_x^2T^2L^2$ after many cycles",
+        "the errors of single cycles give the same rate; the sum of the spectrum over the multiples "
+        f"of $f_c$ agrees to {_SUMMED:.0e}",
+        note=(
+            "the rate is exact; after many cycles the variance itself is smaller than the rate times the "
+            "time by $\\frac12\\sigma_x^2T^2L^2$"
+        ),
     )
 
 
@@ -126,7 +132,7 @@ def large_n(printed: Statement) -> Finding:
     begins = {mu: theory.settling_cycles(mu, 0.01) for mu in (0.1, 1.0, 100.0)}
     return compare(
         away < 1e-3,
-        "the variance is that of the random walk to 1 % from cycle "
+        "the variance agrees with that of the random walk to 1 % from cycle "
         + ", ".join(f"{np.ceil(k):.0f} on at $\\mu={mu:g}$" for mu, k in begins.items()),
         note="the relative difference is $L(1-e^{-n\\mu})/2n$, so $n$ need not be very large",
     )
@@ -144,9 +150,9 @@ def units(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(constants(case))) for case in cases())
     return compare(
         agrees and expected is not None and abs(power - expected) < 1e-12,
-        f"with minutes for seconds throughout the number is {per_minute / base:.4f} times as large, which is "
-        "$\\sqrt{60}$; $\\mu=\\omega_{bw}T$",
-        note="the unit of the integral, per √s",
+        f"with minutes in place of seconds throughout, the number is {per_minute / base:.4f} times as "
+        "large, which is $\\sqrt{60}$; $\\mu=\\omega_{bw}T$",
+        note="the unit is that of the integral, per √s",
     )
 
 
@@ -158,7 +164,7 @@ def exponential(printed: Statement) -> Finding:
     (link,) = printed.links({"mu": MU, "dots": sp.O(MU**4)})
     ours = sp.series(link.left, MU, 0, 4).removeO()
     agrees = link.right.has(sp.Order) and vanishes(link.right.removeO() - ours)
-    return compare(bool(agrees), f"${sp.latex(ours, order='rev-lex')}$, then terms from $\\mu^4$ on")
+    return compare(bool(agrees), f"${sp.latex(ours, order='rev-lex')}$, plus terms of order $\\mu^4$ and higher")
 
 
 @CHECKS.add(*eq("37"))
@@ -169,11 +175,15 @@ def series(printed: Statement) -> Finding:
     others = all(_order(gap) >= 2 for gap in (first, third, fourth)) and last == 0
     return compare(
         bool(others and second == 0),
-        "the cubic term of the numerator is $\\frac1{12}\\mu^3$; all else, and the result $\\frac16\\mu$, is right",
+        (
+            "the cubic term of the numerator must be $\\frac1{12}\\mu^3$; everything else, including the "
+            "result $\\frac16\\mu$, is right"
+        ),
         Verdict.MISPRINT if others else Verdict.WRONG,
-        otherwise_note="the quadratic term is halved with the 2 in front, the cubic one is not, by the author or the "
-        "scan; the next line drops it, so nothing depends on it. If kept, it would add a term "
-        f"${sp.latex(derivation.misprints()['(37)'] - MU / 6)}$ to an odd function of $\\mu$",
+        otherwise_note="the factor 2 in front halves the quadratic term but was not applied to the cubic term, due "
+        "to the author or the scan; the next line drops the cubic term, so nothing depends on it. If "
+        f"kept, it would add a term ${sp.latex(derivation.misprints()['(37)'] - MU / 6)}$ to an odd "
+        "function of $\\mu$",
     )
 
 
@@ -198,9 +208,9 @@ def approximation(printed: Statement) -> Finding:
     next_term = bool(np.all(abs(excess / (mu**2 / 120) - 1) < 0.01))
     return compare(
         _in_the_limit(printed) and next_term,
-        f"too large by $\\mu^2/120$; by 1 % at $\\mu={theory.validity(0.01):.2f}$, by 10 % at "
-        f"$\\mu={theory.validity(0.1):.2f}$",
-        note="for small $\\mu$, as the document says",
+        "the approximation is too large by a fraction $\\mu^2/120$: by 1 % at "
+        f"$\\mu={theory.validity(0.01):.2f}$, by 10 % at $\\mu={theory.validity(0.1):.2f}$",
+        note="the approximation holds for small $\\mu$, as the document says",
     )
 
 

@@ -22,7 +22,7 @@ from gpbnb.ledger.formula import Relation
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 
-COUNTED = "to first order; each coefficient counts roundings, and each rounding has an error of its own"
+COUNTED = "to first order; each coefficient is a number of roundings, and each rounding has its own error"
 GENERAL = (*substitutions(4), *substitutions(5))
 
 
@@ -51,8 +51,8 @@ def before_68(printed: Statement) -> Finding:
         printed,
         GENERAL,
         "(A_hat - DeltaA)*(x_hat - Deltax) == b_hat - Deltab",
-        "$(\\hat A-\\Delta A)(\\hat x-\\Delta x)=\\hat b-\\Delta b$: both sides are those of $Ax=b$",
-        "brackets are missing around $\\hat x-\\Delta x$; hung1982 has them",
+        "$(\\hat A-\\Delta A)(\\hat x-\\Delta x)=\\hat b-\\Delta b$ is $Ax=b$ written with hats",
+        "the parentheses around $\\hat x-\\Delta x$ are missing; hung1982 prints them",
     )
 
 
@@ -60,8 +60,11 @@ def before_68(printed: Statement) -> Finding:
 def perturbed_solution(printed: Statement) -> Finding:
     return compare(
         holds(printed, GENERAL),
-        "the same, to first order; exact with $A^{-1}$ and $\\hat x$, or with $\\hat A^{-1}$ and $x$",
-        note="to first order: it mixes the two, and lacks $\\hat A^{-1}\\Delta A\\,\\Delta x$",
+        "correct to first order; exact with $A^{-1}$ and $\\hat x$, or with $\\hat A^{-1}$ and $x$",
+        note=(
+            "the printed form mixes the two exact forms and so omits the second-order term $\\hat "
+            "A^{-1}\\Delta A\\,\\Delta x$"
+        ),
     )
 
 
@@ -72,7 +75,10 @@ def perturbed_solution(printed: Statement) -> Finding:
     "hung1982.III.s11-2.x-3-x-2-lines",
 )
 def rows(printed: Statement) -> Finding:
-    return compare(holds(printed, substitutions(3)), "the rows of (69), exact for random triangular systems")
+    return compare(
+        holds(printed, substitutions(3)),
+        "the equations are the rows of (69); they hold exactly for random triangular systems",
+    )
 
 
 @CHECKS.add(
@@ -91,7 +97,9 @@ def rows(printed: Statement) -> Finding:
 )
 def rounded_rows(printed: Statement) -> Finding:
     return compare(
-        holds(printed, substitutions(3)), "the same after every rounding of the row, to first order", note=COUNTED
+        holds(printed, substitutions(3)),
+        "rounding every operation of the row gives the same, to first order",
+        note=COUNTED,
     )
 
 
@@ -99,8 +107,8 @@ def rounded_rows(printed: Statement) -> Finding:
 def assembled_1982(printed: Statement) -> Finding:
     return compare(
         holds(printed, substitutions(3)),
-        "the same after every rounding, to first order",
-        note="the scan does not show whether the vector of (80) has hats; those of hung1984 (79) are taken",
+        "rounding every operation gives the same, to first order",
+        note="the scan does not show whether the vector in (80) has hats; we use those of hung1984 (79)",
     )
 
 
@@ -108,7 +116,7 @@ def assembled_1982(printed: Statement) -> Finding:
 def approximations(printed: Statement) -> Finding:
     links = [link for names in substitutions(3) for link in printed.links(names, Fraction)]
     agrees = all(link.symbol == "≈" and EPSILON * link.left == EPSILON * link.right for link in links)
-    return compare(agrees, "multiplied by ε, as in (78), both sides agree to first order")
+    return compare(agrees, "multiplied by ε, as in (78), the two sides agree to first order")
 
 
 @CHECKS.add(*both("eq77"))
@@ -118,8 +126,8 @@ def second_equation(printed: Statement) -> Finding:
         substitutions(3),
         "a[2,2]*x_hat[2] + a[2,3]*(1 + 3*epsilon)*x_hat[3] == b[2]*(1 + 2*epsilon); a_hat[2,2] == a[2,2]; "
         "a_hat[2,3] == a[2,3]*(1 + 3*epsilon); b_hat[2] == b[2]*(1 + 2*epsilon)",
-        "it holds to first order with $\\hat x_3$; with $x_3$ it leaves $a_{23}x_3\\epsilon$",
-        "$\\hat x_3$ is meant, and printed in hung1982",
+        ("the equation holds to first order with $\\hat x_3$; with $x_3$, the sides differ by $a_{23}x_3\\epsilon$"),
+        "$\\hat x_3$ is meant, as hung1982 prints it",
     )
 
 
@@ -129,8 +137,8 @@ def first_row_with_hats(printed: Statement) -> Finding:
         printed,
         substitutions(3),
         "x[1] == 1/a[1,1]*(b[1] - a[1,2]*x[2] - a[1,3]*x[3])",
-        "without hats it is (71a), exactly; with them it differs from $x_1$ in first order",
-        "the hats belong to the next line, what is computed; the line for $x_2$, above (75), has none",
+        "without hats the line is (71a) and exact; with hats it differs from $x_1$ to first order",
+        ("the hats belong to the next line, which gives the computed value; the line for $x_2$, above (75), has none"),
     )
 
 
@@ -140,8 +148,8 @@ def assembled(printed: Statement) -> Finding:
         printed,
         substitutions(3),
         printed.form.replace("[x[", "[x_hat["),
-        "it holds to first order with $\\hat x_1,\\hat x_2,\\hat x_3$",
-        "hats are missing in the vector, which is labelled $\\hat x$",
+        "the equation holds to first order with $\\hat x_1,\\hat x_2,\\hat x_3$",
+        "the entries of the vector lack hats, although the vector is labelled $\\hat x$",
     )
 
 
@@ -153,7 +161,7 @@ def factored_three(printed: Statement) -> Finding:
         "DeltaA == [[0, 4*epsilon*a[1,2], 3*epsilon*a[1,3]], [0, 0, 3*epsilon*a[2,3]], [0, 0, 0]] == "
         "[[0, a[1,2], a[1,3]], [0, 0, a[2,3]], [0, 0, 0]]*[[0, 0, 0], [0, 4, 0], [0, 0, 3]]*epsilon",
         "$A_D\\,\\mathrm{diag}(0,4,3)\\,\\epsilon$",
-        "the second form lacks the $\\epsilon$ of the first",
+        "the second form lacks the factor $\\epsilon$ of the first",
     )
 
 
@@ -190,10 +198,10 @@ def weights_of_the_matrix(printed: Statement) -> Finding:
     diagonal, off, where = (printed.relation(i) for i in (1, 2, 3))
     return compare(
         _piecewise(diagonal, off, where),
-        "$1\\le k<j\\le n$, for $n=4$ and 5; with $k\\le j$ the entries of the diagonal have two values",
+        "$1\\le k<j\\le n$ is right for $n=4$ and 5; with $k\\le j$ each diagonal entry would have two values",
         Verdict.MISPRINT if _piecewise(diagonal, off, Relation("1 <= k < j <= n")) else Verdict.WRONG,
         note=COUNTED,
-        otherwise_note="$k<j$ is meant, and printed in (87) and in hung1982",
+        otherwise_note="$k<j$ is meant, as printed in (87) and in hung1982",
     )
 
 
@@ -201,7 +209,7 @@ def weights_of_the_matrix(printed: Statement) -> Finding:
 def weights_of_the_change(printed: Statement) -> Finding:
     return compare(
         _piecewise(None, printed.relation(1), printed.relation(2)),
-        "counted in rows of up to four products",
+        "the roundings were counted in rows of up to four products",
         note=COUNTED,
     )
 
@@ -209,7 +217,7 @@ def weights_of_the_change(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.eq86", "hung1984.II.eq88")
 def weights_of_the_right_side(printed: Statement) -> Finding:
     each = [{**names, "k": Fraction(k)} for names in GENERAL for k in range(1, int(names["n"]) + 1)]
-    return compare(holds(printed, each), "counted in rows of up to four products", note=COUNTED)
+    return compare(holds(printed, each), "the roundings were counted in rows of up to four products", note=COUNTED)
 
 
 @CHECKS.add("hung1982.III.eq86-88")
@@ -218,7 +226,7 @@ def weights_1982(printed: Statement) -> Finding:
     of_right = corrected(printed, f"{printed.relation(1).text}; {printed.relation(4).text}")
     return compare(
         holds(of_right, each) and _piecewise(None, printed.relation(2), printed.relation(3)),
-        "counted in rows of up to four products",
+        "the roundings were counted in rows of up to four products",
         note=COUNTED,
     )
 
@@ -244,9 +252,9 @@ def generalization(printed: Statement) -> Finding:
     kept, count = _generalizes()
     return compare(
         says(printed, verb="can be obtained" if kept == count else "cannot be obtained"),
-        f"the computed solutions of {kept} of {count} triangular systems of 3 and 4 rows solve a system perturbed by "
-        "at most so many roundings",
-        note="for subtraction from left to right; each row and each right side has its own errors",
+        f"for {kept} of {count} triangular systems of 3 and 4 rows, the computed solution solves "
+        "exactly a system whose entries are perturbed by at most these numbers of roundings",
+        note="the counts hold for subtraction from left to right; each row and each right side has its own errors",
     )
 
 
@@ -258,7 +266,7 @@ def factored(printed: Statement) -> Finding:
         GENERAL,
         shown.form.replace("A_D*M_A", "A_D*M_A*epsilon"),
         "the first form is (87); the second is $A_DM_A\\,\\epsilon$",
-        "the second form lacks the $\\epsilon$ of the first; hung1982 has β there",
+        "the second form lacks the factor $\\epsilon$ of the first; hung1982 has β there",
     )
 
 
@@ -273,7 +281,10 @@ def first_form_1982(printed: Statement) -> Finding:
         f"$2n-j$ {'is right for $n=3$ alone' if three else 'is wrong'}; for $n=4$ it gives "
         f"{', '.join(map(str, four))} in place of {', '.join(map(str, right))}",
         Verdict.INCONSISTENT,
-        otherwise_note="contradicts (87), its own second form, and its own last entries 4 and 3; corrected in hung1984",
+        otherwise_note=(
+            "the count contradicts (87), the second form of the same equation, and its own last entries "
+            "4 and 3; hung1984 corrects it"
+        ),
     )
 
 
@@ -282,8 +293,8 @@ def factored_1982(printed: Statement) -> Finding:
     positive = [names for names in GENERAL if names["epsilon"] == EPSILON]
     return compare(
         holds(evaluable(printed), positive),
-        "the weights of (87), with β for $\\epsilon$",
-        note="as sizes, with $|A_D|$",
+        "the weights are those of (87), with β in place of $\\epsilon$",
+        note="the equation holds for absolute values, with $|A_D|$",
     )
 
 
@@ -295,8 +306,8 @@ def right_side_inequality(printed: Statement) -> Finding:
         holds(shown, GENERAL),
         "the inequality fails where $\\epsilon$ or an entry of $b$ is negative; $|\\Delta b|\\le M_b|b|\\beta$ holds",
         Verdict.WRONG if holds(meant, GENERAL) else Verdict.INCONSISTENT,
-        otherwise_note="bars are missing on both sides, and (95) subtracts $\\delta A\\,\\hat x$ from it as if the "
-        "signs were known",
+        otherwise_note="the absolute-value bars are missing on both sides, and (95) subtracts $\\delta A\\,\\hat x$ "
+        "from $\\Delta b$ as if the signs were known",
         root=ONE_EPSILON,
     )
 
@@ -309,8 +320,8 @@ def backward(printed: Statement) -> Finding:
     kept, count = _generalizes()
     return compare(
         says(printed, verb="has been transformed to" if kept == count else "cannot be transformed to"),
-        f"each computed solution solves a system perturbed within the counts of (85) and (86), in {kept} of {count} "
-        "cases (by the theorem of Oettli and Prager)",
+        f"in {kept} of {count} cases the computed solution solves exactly a system perturbed within "
+        "the counts of (85) and (86), as the theorem of Oettli and Prager shows",
     )
 
 
@@ -330,11 +341,11 @@ def computed_inverse(printed: Statement) -> Finding:
     apart, same, second_order = _perturbed_inverse()
     return compare(
         says(printed, verb="are computed" if same else "are not both computed"),
-        f"the inverse of the perturbed matrix differs from the computed one by {apart:.1e} in norm, in the example of "
-        "11.4 in four digits",
+        "in the example of 11.4 with four digits, the inverse of the perturbed matrix differs from "
+        f"the computed inverse by {apart:.1e} in norm",
         Verdict.MISPRINT if second_order else Verdict.WRONG,
-        otherwise_note="$\\hat A$ is not known, and one system gives one column; the computed inverse takes its "
-        "place, which leaves out a term of second order",
+        otherwise_note="$\\hat A$ is unknown, and one system gives only one column; the computed inverse can "
+        "replace $\\hat A^{-1}$, with an error of second order",
     )
 
 
@@ -357,5 +368,5 @@ def only_back_substitution(printed: Statement) -> Finding:
     triangular, full, count = _left_alone()
     return compare(
         says(printed, form="upper triangular" if triangular == count > full else "full"),
-        f"elimination leaves {triangular} of {count} triangular systems as they are, and {full} of {count} full ones",
+        (f"elimination does not change {triangular} of {count} triangular systems and {full} of {count} full systems"),
     )

@@ -152,7 +152,10 @@ class Elimination:
                 i, *rest = map(int, where)
                 j, k = (self.n + 1, *rest) if right and rest else (self.n + 1, 0) if right else (*rest, 0)[:2]
                 if not 1 <= i <= self.n or not (right or 1 <= j <= self.n) or not 0 <= k < min(i, j):
-                    raise KeyError(f"no entry {where}: the documents name an entry by the last step that changed it")
+                    raise KeyError(
+                        f"got the entry {where}; needed the last step that changed the entry, by which "
+                        "the documents name it"
+                    )
                 return FirstOrder(stages[k].value[i - 1, j - 1], stages[k].slope[i - 1, j - 1])
 
             return look
@@ -168,7 +171,9 @@ class Elimination:
                     for t, c in zip(true, new, strict=True):
                         if t.value and t == value:
                             return c
-            raise LookupError("no quantity of the elimination has this exact value")
+            raise LookupError(
+                "got a value that no quantity of the elimination has; needed the exact value of one of them"
+            )
 
         return {
             "n": Fraction(self.n),

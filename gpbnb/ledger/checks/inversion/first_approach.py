@@ -19,7 +19,7 @@ from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
 
-EXACTLY = "exact for random matrices and computed inverses of any error"
+EXACTLY = "exact for random matrices, however inaccurate the computed inverse is"
 
 
 @CHECKS.add(*both("s10.inverse-definition"))
@@ -34,7 +34,7 @@ def residue_defined(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1984.II.eq41", *both("s10.residue-of-41"))
 def changed_residue_defined(printed: Statement) -> Finding:
-    return given("states the system with a changed matrix and defines its residue")
+    return given("states the system with a perturbed matrix and defines its residue")
 
 
 @CHECKS.add("hung1984.II.eq33", "hung1984.II.eq35", "hung1984.II.eq38")
@@ -52,7 +52,7 @@ def residue_norms(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1984.II.s10.line-before-42", "hung1984.II.eq42")
 def changed_relations(printed: Statement) -> Finding:
-    return compare(holds(printed, residues(True)), "both sides agree for random matrices and changes")
+    return compare(holds(printed, residues(True)), "both sides agree for random matrices and perturbations")
 
 
 @CHECKS.add("hung1982.III.eq42")
@@ -60,9 +60,9 @@ def changed_relation_1982(printed: Statement) -> Finding:
     right = holds(printed, residues(True))
     return compare(
         right and printed.number("number").value == 42,
-        "the equation is right; the text below cites it as (42), and (43) is the number of the next one",
+        "the equation is right; the text below cites it as (42), and (43) is the number of the next equation",
         Verdict.OCR if right else Verdict.WRONG,
-        otherwise_note="the scan shows (43) twice",
+        otherwise_note="the scan shows the number (43) twice",
     )
 
 
@@ -70,8 +70,8 @@ def changed_relation_1982(printed: Statement) -> Finding:
 def changed_error_matrix(printed: Statement) -> Finding:
     return compare(
         holds(printed, residues(True)),
-        "exact with the computed inverse; the last form drops $A^{-1}\\Delta A\\,E$",
-        note="to first order, as $\\approx$ says",
+        "exact with the computed inverse; the last form drops the second-order term $A^{-1}\\Delta A\\,E$",
+        note="the equation holds to first order, as the sign $\\approx$ says",
     )
 
 
@@ -79,9 +79,10 @@ def changed_error_matrix(printed: Statement) -> Finding:
 def changed_norm(printed: Statement) -> Finding:
     return compare(
         holds(printed, residues(True, sharp=True)),
-        "to first order in $R$ and $\\Delta A$, equal where $A$ is a multiple of $I$; over "
-        "$1-\\|A^{-1}\\|\\|\\Delta A\\|$ it holds to every order",
-        note="to first order, as $\\approx$ before it says",
+        "the inequality holds to first order in $R$ and $\\Delta A$, with equality where $A$ is a "
+        "multiple of $I$; divided by $1-\\|A^{-1}\\|\\|\\Delta A\\|$, the right side is a strict "
+        "bound",
+        note="the inequality holds to first order, as the sign $\\approx$ before it says",
     )
 
 
@@ -91,8 +92,8 @@ def changed_relative_norm(printed: Statement) -> Finding:
         printed,
         residues(True, sharp=True),
         "epsilon == norm(E)/norm(A.inv) <= norm(R) + norm(A.inv)*norm(DeltaA)",
-        "to first order, the relative error is at most the right side, and equal to it only in special cases",
-        "$\\le$ is meant, as in (43) and in hung1982 (44)",
+        "to first order, the relative error is at most the right side; the two are equal only in special cases",
+        "the sign $\\le$ is meant, as in (43) and in hung1982 (44)",
     )
 
 
@@ -107,7 +108,7 @@ def n_solutions(printed: Statement) -> Finding:
         needed += bool((column == inverse[:, j]).all())
     return compare(
         needed == n and says(printed, times="n times"),
-        f"each of the {n} solutions gives its own column of the inverse, digit by digit",
+        f"each of the {n} solutions equals its column of the inverse in every digit",
     )
 
 
@@ -125,9 +126,10 @@ def partial_pivoting(printed: Statement) -> Finding:
     needed = fails and solved and without > 100 * with_pivots
     return compare(
         says(printed, method="with partial pivoting" if needed else "without pivoting"),
-        f"without pivoting, rows (0, 1), (1, 0) have no first pivot, and rows (.0001, 1), (1, 1) in four digits get an "
-        f"error of {without:.2g}; with pivoting it is {with_pivots:.2g}",
-        note="section 11 and its flow chart leave pivoting out",
+        "without pivoting, the matrix with rows (0, 1), (1, 0) has no first pivot, and the relative "
+        f"error for rows (.0001, 1), (1, 1) in four digits is {without:.2g}; with pivoting it is "
+        f"{with_pivots:.2g}",
+        note="section 11 and its flow chart omit pivoting",
     )
 
 
@@ -137,9 +139,9 @@ def reference_33(printed: Statement) -> Finding:
     meant = holds(statement("hung1984.II.eq33"), residues(False))
     return compare(
         number == 33,
-        "the equation that is solved $n$ times is (33); (29) is a chain of matrix products",
+        "the equation to be solved $n$ times is (33); equation (29) is a chain of matrix products",
         Verdict.MISPRINT if meant else Verdict.WRONG,
-        otherwise_note="(33) is meant, and printed in hung1984",
+        otherwise_note="(33) is meant, as hung1984 prints it",
     )
 
 
@@ -156,7 +158,7 @@ def special_case(printed: Statement) -> Finding:
     wider = any(a != names["R"].norm() for a, names in zip(general, residues(True), strict=True))
     return compare(
         says(printed, relation="a special case" if same and wider else "the general case"),
-        "with $\\Delta A=0$, (44) is (40); with another $\\Delta A$ it is larger",
+        "with $\\Delta A=0$, bound (44) equals bound (40); with any other $\\Delta A$ it is larger",
     )
 
 
@@ -172,9 +174,10 @@ def _residual_bound() -> tuple[str, bool]:
     trial = experiment.trial(sample.matrix, False, experiment.BETTER)
     tightest = min(trial.bounds, key=trial.overestimation)
     text = (
-        f"one product in {twice.precision} digits gives $R$ of the example of 11.4 "
-        f"{'exactly' if apart == 0 else f'to {float(apart):.0e}'}; the bound from it is "
-        f"{trial.overestimation(tightest):.4g} times the error, the tightest of {len(trial.bounds)}"
+        f"one matrix product in {twice.precision} digits gives $R$ in the example of 11.4 "
+        f"{'exactly' if apart == 0 else f'to {float(apart):.0e}'}; the bound computed from this $R$ "
+        f"is {trial.overestimation(tightest):.4g} times the error, the tightest of "
+        f"{len(trial.bounds)} bounds"
     )
     return text, apart < Fraction(1, 100) and tightest == "a posteriori" and not trial.violates(tightest)
 
@@ -190,8 +193,9 @@ def practicality(printed: Statement) -> Finding:
         ),
         text,
         Verdict.WRONG,
-        otherwise_note="$R$ costs one matrix product with twice the digits. (43) and (44) contain no β because they "
-        "bound the error that was made, not the largest possible one: this is their strength",
+        otherwise_note="computing $R$ takes one matrix product with twice the digits. Bounds (43) and (44) contain "
+        "no β because they bound the actual error rather than the largest possible error; this makes "
+        "them tight",
         root="residue-hard-to-obtain",
     )
 
@@ -208,9 +212,9 @@ def two_parts(printed: Statement) -> Finding:
     same, count = _two_parts()
     return compare(
         same == count and says(printed, count="two parts"),
-        "triangularization, the same steps on the columns of the identity, and back substitution give all digits of "
-        f"the inverse in {same} of {count} cases",
-        note="the transformation of the right sides counts as a part of the triangularization",
+        "applied separately to the matrix and the columns of the identity, triangularization and "
+        f"back substitution give all digits of the computed inverse in {same} of {count} cases",
+        note="the transformation of the right sides belongs to the triangularization",
     )
 
 
@@ -228,6 +232,9 @@ def one_epsilon(printed: Statement) -> Finding:
     (link,) = printed.links({"epsilon": worst, "beta": beta}, Fraction)
     return compare(
         link.symbol == "<=" and link.right * Fraction(99, 100) < link.left <= link.right,
-        f"the largest relative error of a rounding to four digits is {float(worst / beta):.4f} β",
-        note="a bound on the size of each error; (48) to (60) use it as one number with one sign for all roundings",
+        f"the largest relative error found for a rounding to four digits is {float(worst / beta):.4f} β",
+        note=(
+            "this bounds the size of each error; (48) to (60) use ε as if all roundings had the same "
+            "error with the same sign"
+        ),
     )

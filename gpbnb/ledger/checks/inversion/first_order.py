@@ -61,7 +61,7 @@ class FirstOrder:
 
     def __pow__(self, exponent: Any) -> FirstOrder:
         if exponent != int(exponent) or exponent < 1:
-            raise ValueError(f"got the exponent {exponent}; needed a whole number from 1")
+            raise ValueError(f"got exponent {exponent}; needed an integer of at least 1")
         return self if exponent == 1 else self * self ** (exponent - 1)
 
     __radd__ = __add__
@@ -73,7 +73,7 @@ class FirstOrder:
 
     def __abs__(self) -> FirstOrder:
         if np.any(self.slope) and np.any(self.value):
-            raise ValueError("got a quantity with a rounding error; needed an exact one, or an error alone")
+            raise ValueError("got a quantity with a rounding error; needed an exact quantity or a pure error")
         return FirstOrder(abs(self.value), abs(self.slope))
 
     def __eq__(self, other: object) -> bool:

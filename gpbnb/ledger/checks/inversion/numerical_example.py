@@ -54,7 +54,10 @@ def actual_norms(printed: Statement) -> Finding:
     true = "exactly" if apart == 0 else "approximately" if apart < 1e-6 else "not"
     return compare(
         printed.says("how") == true,
-        f"with an inverse of 20 digits in place of the true one, the norms change by a relative {apart:.0e} at most",
+        (
+            "with an inverse computed in 20 digits in place of the true inverse, the norms change by at "
+            f"most {apart:.0e}, relatively"
+        ),
     )
 
 
@@ -100,9 +103,9 @@ def _proposed(printed: Statement) -> tuple[bool, str]:
     search = _closest("proposed")
     values = [search.closest.values[example.PLACES.index(places)] for places in _numbers(printed, "proposed")]
     return found > 0, (
-        f"{found or 'none'} of {count} readings of the procedure gives all digits; the closest, "
-        f"{', '.join(f'{v:.3e}' for v in values)}, is off by {search.closest.distance - 1:.1%} "
-        f"({search.closest.wordlength}; {search.closest.detail})"
+        f"the procedure can be read in {count} ways, and {found or 'none'} of them gives all printed "
+        f"digits; the closest result, {', '.join(f'{v:.3e}' for v in values)}, is off by "
+        f"{search.closest.distance - 1:.1%} ({search.closest.wordlength}; {search.closest.detail})"
     )
 
 
@@ -110,9 +113,10 @@ def _actual(printed: Statement) -> tuple[bool, str]:
     found, count = _reproduced(printed, "actual")
     can, searches = _possible(tuple(_numbers(printed, "actual")))
     return found > 0, (
-        f"{found or 'none'} of {count} readings gives all digits; the closest column is off by a factor of "
-        f"{_closest('actual').closest.distance:.2f}; {can or 'none'} of {searches} searches through all matrices of so "
-        "many places, or of one digit more, finds one whose error has this norm"
+        f"the procedure can be read in {count} ways, and {found or 'none'} of them gives all printed "
+        f"digits; the closest column is off by a factor of {_closest('actual').closest.distance:.2f}; "
+        f"{can or 'none'} of {searches} searches through all matrices with this number of places, or "
+        "with one digit more, finds a matrix whose error has the printed norm"
     )
 
 
@@ -123,7 +127,7 @@ def proposed(printed: Statement) -> Finding:
         agrees,
         text,
         Verdict.NOT_REPRODUCED,
-        otherwise_note="Table 1 of this chapter shows what the procedure gives in each reading",
+        otherwise_note="Table 1 of the chapter shows the result of each way of reading the procedure",
     )
 
 
@@ -134,7 +138,7 @@ def actual(printed: Statement) -> Finding:
         agrees,
         text,
         Verdict.NOT_REPRODUCED,
-        otherwise_note="elimination in that wordlength has another error",
+        otherwise_note="elimination in that wordlength has a different error",
     )
 
 
@@ -160,7 +164,7 @@ def table(printed: Statement) -> Finding:
 
 def _claim(word: str) -> tuple[example.Claim, str]:
     (found,) = (claim for claim in _claims() if word in claim.name)
-    return found, f"{found.name} in {found.holds} of {found.readings} readings"
+    return found, f"{found.name} in {found.holds} of {found.readings} ways of reading the procedure"
 
 
 @cache
@@ -191,7 +195,10 @@ def _mantissa() -> tuple[str, str]:
     right = printed and same == len(more)
     return (
         "the same mantissa" if right else "different mantissas",
-        f"{text}: in {same} of the {len(more)} whose quantities are computed with more digits",
+        (
+            f"{text}; the mantissa is the same in {same} of the {len(more)} ways that compute the "
+            "quantities with more digits"
+        ),
     )
 
 
@@ -208,7 +215,10 @@ def conservative(printed: Statement) -> Finding:
     return compare(
         printed.says("verb") == phrase,
         text,
-        note="for this matrix; for others the error exceeds the bound of the printed procedure, see (96)",
+        note=(
+            "the bounds are conservative for this matrix; for other matrices the error exceeds the bound "
+            "of the printed procedure, see (96)"
+        ),
     )
 
 
@@ -218,15 +228,16 @@ def same_mantissa(printed: Statement) -> Finding:
     return compare(
         printed.says("mantissa") == phrase,
         text,
-        note="the bound is $\\beta$ times a number that does not depend on the wordlength; if that number is "
-        "computed in the wordlength itself, as the chart says, its digits change with it",
+        note="the bound is $\\beta$ times a number that does not depend on the wordlength; if this number "
+        "is computed in the wordlength under study, as the chart says, its digits change with the "
+        "wordlength",
     )
 
 
 @CHECKS.add("hung1984.II.s11-4.table-1-claim-decreasing")
 def decreasing(printed: Statement) -> Finding:
     phrase, text = _trend()
-    return compare(printed.says("verb") == phrase, text, note="worklength is a slip for wordlength")
+    return compare(printed.says("verb") == phrase, text, note="'worklength' is a misprint for 'wordlength'")
 
 
 @CHECKS.add("hung1982.III.s11-4.claims-on-table-i")

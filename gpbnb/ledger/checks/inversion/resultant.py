@@ -50,27 +50,32 @@ def exceeded() -> str:
     for form in COUNTEREXAMPLES:
         trial, name = counterexample(form)
         if not trial.violates(name):
-            raise ArithmeticError(f"the error of the counterexample to {form} does not exceed the bound")
+            raise ArithmeticError(
+                f"got a counterexample to {form} whose error is within the bound; needed an error above the bound"
+            )
         rows = ", ".join("(" + ", ".join(f"{float(x):g}" for x in row) + ")" for row in trial.matrix.to_float())
         texts.append(
-            f"for rows {rows}, {trial.matrix.format.precision} digits, {'with' if trial.pivot else 'without'} "
-            f"pivoting, condition {trial.condition:.3g}, the error is "
-            f"{trial.ratio(name):.2g} times {'the last box of the chart' if form == 'chart' else '(96)'}"
+            f"for the matrix with rows {rows} and condition number {trial.condition:.3g}, inverted in "
+            f"{trial.matrix.format.precision} digits {'with' if trial.pivot else 'without'} pivoting, "
+            f"the error is {trial.ratio(name):.2g} times "
+            f"{'the bound in the last box of the chart' if form == 'chart' else 'bound (96)'}"
         )
     return "; ".join(texts)
 
 
 NO_SUM = (
-    "$\\tilde A$ and $\\tilde b$ change the given system, $\\Delta A$ and $\\Delta b$ the triangular one: to be "
-    "added, these must be multiplied by $L$. As sizes, $L$ costs a factor of $(n+3)/2$ at most"
+    "$\\tilde A$ and $\\tilde b$ perturb the given system, but $\\Delta A$ and $\\Delta b$ perturb "
+    "the triangular one, so they must be multiplied by $L$ before they can be added. In a bound on "
+    "absolute values, $L$ adds a factor of at most $(n+3)/2$"
 )
 
 
 def _sum_text() -> str:
     matrix, right = _left_out()
     return (
-        "$\\delta A=\\tilde A+L\\,\\Delta A$, $\\delta b=\\tilde b+L\\,\\Delta b$, derived for every $n$; in the "
-        f"example of 11.4 the print leaves out {matrix:.0%} and {right:.0%} of their sizes"
+        "$\\delta A=\\tilde A+L\\,\\Delta A$, $\\delta b=\\tilde b+L\\,\\Delta b$, derived for every "
+        f"$n$; in the example of 11.4 the printed sums omit {matrix:.0%} of the size of $\\delta A$ "
+        f"and {right:.0%} of that of $\\delta b$"
     )
 
 
@@ -101,8 +106,8 @@ def two_sets(printed: Statement) -> Finding:
 def resultant_error(printed: Statement) -> Finding:
     return compare(
         holds(printed, inverses()),
-        "right to first order, with the $\\delta A$ and $\\delta b_j$ of the system that was solved",
-        note="each column has its own $\\Delta A$; with $A^{-1}$ for $\\hat A^{-1}$ it is exact",
+        "right to first order, if $\\delta A$ and $\\delta b_j$ belong to the system that was solved",
+        note="each column has its own $\\Delta A$; with $A^{-1}$ in place of $\\hat A^{-1}$ the equation is exact",
     )
 
 
@@ -110,8 +115,8 @@ def resultant_error(printed: Statement) -> Finding:
 def resultant_errors(printed: Statement) -> Finding:
     return compare(
         holds(evaluable(printed), inverses()),
-        "column by column (94): right to first order",
-        note="with the $\\delta A$ and $\\delta b_j$ of the system that was solved",
+        "each column is (94), which is right to first order",
+        note="the equation needs the $\\delta A$ and $\\delta b_j$ of the system that was solved",
     )
 
 
@@ -130,13 +135,13 @@ def similar_to_68(printed: Statement) -> Finding:
     similar = holds(statement("hung1984.II.eq68"), environments)
     return compare(
         says(printed, way="similar to" if similar else "different from"),
-        "(68) with the resultant perturbations in place of those of the back substitution is (94)",
+        "equation (68) becomes (94) if the resultant perturbations replace those of the back substitution",
     )
 
 
 FOLLOWS = (
-    "it follows from (95); its faults come from (59), (60) and (91), with which $E$ is evaluated. So evaluated, the "
-    "bound is exceeded: "
+    "the bound follows from (95), but $E$ is evaluated with (59), (60) and (91), which are wrong. "
+    "Evaluated in this way, the bound fails: "
 )
 
 
@@ -144,7 +149,10 @@ FOLLOWS = (
 def error_norm(printed: Statement) -> Finding:
     return compare(
         holds(printed, factored_errors()),
-        "the norm of a product is at most the product of the norms; equal where $\\hat A$ is a multiple of $I$",
+        (
+            "the norm of a product is at most the product of the norms; the two are equal where $\\hat "
+            "A$ is a multiple of $I$"
+        ),
         note=FOLLOWS + exceeded(),
     )
 
@@ -154,8 +162,8 @@ def error_norm_1982(printed: Statement) -> Finding:
     columns, norm = evaluable(printed).form.split("; ")
     return compare(
         holds(corrected(printed, columns), inverses()) and holds(corrected(printed, norm), factored_errors()),
-        "(95) to first order, and (96) from it; equal where $\\hat A$ is a multiple of $I$",
-        note=FOLLOWS + exceeded() + ". Of (97) the scan does not show the sign before $\\|D\\|$",
+        ("(95) holds to first order, and (96) follows from it, with equality where $\\hat A$ is a multiple of $I$"),
+        note=FOLLOWS + exceeded() + ". In (97) the scan does not show the sign before $\\|D\\|$",
     )
 
 
@@ -184,12 +192,13 @@ def letter_e(printed: Statement) -> Finding:
     shown = {"(95)": "E" in statement("hung1984.II.eq95").form, "(36)": error <= inverse * error}
     return compare(
         shown[printed.says("place")],
-        f"the scan has one $E$ before, (36), the error itself: with it (96) would say that $\\|\\hat A^{{-1}}\\|$ is "
-        f"at least 1, and it is {inverse:.2f} in the example of 11.4; with the bracket of (95) it says "
-        f"{error:.1e} is at most {inverse * bracket:.1e}",
+        "the scan defines one $E$ earlier, in (36): the error itself. With this $E$, (96) would say "
+        f"that $\\|\\hat A^{{-1}}\\|$ is at least 1, but in the example of 11.4 it is {inverse:.2f}. "
+        f"With the bracket of (95) as $E$, (96) says that {error:.1e} is at most "
+        f"{inverse * bracket:.1e}",
         Verdict.OCR if error <= inverse * bracket else Verdict.WRONG,
-        otherwise_note="the bracket of (95) is meant, whose letter is not in this scan; the scan of hung1982 shows a "
-        "D below it. As printed, $E$ has two meanings",
+        otherwise_note="$E$ means the bracket of (95), whose letter this scan does not show; the scan of hung1982 "
+        "shows a D below the bracket. As printed, $E$ has two meanings",
     )
 
 
@@ -203,9 +212,10 @@ def letter_d(printed: Statement) -> Finding:
     }
     return compare(
         shown[printed.says("place")],
-        f"with the bracket of (95), (96) says for the example of 11.4 that {error:.1e} is at most "
-        f"{inverse * bracket:.1e}; with the $D$ below (27), whose norm is $n$, at most {inverse * below_27:.2g}",
-        note="the letter has two more meanings, below (27) and in the examples of 9.2",
+        "with the bracket of (95) as $D$, (96) says that the error in the example of 11.4, "
+        f"{error:.1e}, is at most {inverse * bracket:.1e}; with the $D$ below (27), whose norm is "
+        f"$n$, at most {inverse * below_27:.2g}",
+        note="the letter $D$ has two more meanings, below (27) and in the examples of 9.2",
     )
 
 
@@ -223,17 +233,17 @@ def computation(printed: Statement) -> Finding:
     much = min(three[1] / three[0], twenty[1] / twenty[0]) > 1
     return compare(
         says(printed, amount="a good deal of computation" if much else "little computation"),
-        f"{three[1]} multiplications for the bound compared with {three[0]} for the inverse, $n=3$; {twenty[1]:,} "
-        f"compared with {twenty[0]:,}, $n=20$",
-        note="more than for the inverse itself",
+        f"for $n=3$ the bound takes {three[1]} multiplications and the inverse {three[0]}; for $n=20$ "
+        f"they take {twenty[1]:,} and {twenty[0]:,}",
+        note="the bound takes more computation than the inverse itself",
     )
 
 
 @CHECKS.add("hung1984.II.s11-3.figure-iii-1-flow-chart")
 def flow_chart() -> Finding:
     return unverifiable(
-        "the procedure is implemented from the texts of the boxes in the scan of hung1982",
-        "the picture is lost from the scan, which keeps its caption alone",
+        "we implement the procedure from the texts of the boxes in the scan of hung1982",
+        "the scan has lost the picture and keeps only its caption",
     )
 
 
@@ -243,7 +253,10 @@ def flow_chart_1982() -> Finding:
     return unverifiable(
         "the texts of the boxes follow (59), (60) and (89) to (95). One box calls $\\tilde A$ the error in $A_T$; "
         f"by (91) it is {'an error in $A$, which the derivation confirms' if right else 'not derived'}",
-        "the scan keeps the texts of most boxes, but no arrows, and not the box that generates the bracket of (95)",
+        (
+            "the scan shows the texts of most boxes, but no arrows, and it has lost the box that "
+            "generates the bracket of (95)"
+        ),
     )
 
 
@@ -253,7 +266,7 @@ def number_of_the_chart(printed: Statement) -> Finding:
     chapters = list(dict.fromkeys(e.chapter for e in figures if e.item.startswith("Figure III-1")))
     return compare(
         printed.says("chapter") == printed.chapter,
-        f"chapters {' and '.join(chapters)} both have a Figure III-1",
+        f"both chapters {' and '.join(chapters)} have a Figure III-1",
         Verdict.MISPRINT,
         otherwise_note="Figure II-1 is meant: in hung1982, from which it was taken, this was chapter III",
     )

@@ -23,7 +23,7 @@ from gpbnb.ledger.statements import Statement
 
 ONE_EPSILON = "one-signed-epsilon"
 COUNTED = (
-    "to first order; each ε stands for an error of its own: a multiple of ε counts the roundings, as "
+    "to first order; each rounding has its own ε: a multiple of ε is a number of roundings, as in "
     "$(\\epsilon_1+\\epsilon_2+\\epsilon_3)\\,a(1)-(\\epsilon_1+\\epsilon_2)\\,a(0)$"
 )
 
@@ -38,7 +38,7 @@ def system(printed: Statement) -> Finding:
     "hung1982.III.s11-1.blocks",
 )
 def blocks(printed: Statement) -> Finding:
-    return given("defines blocks: the entries that a step changes, and zeros elsewhere")
+    return given("defines matrices that hold the entries changed by a step, and zeros elsewhere")
 
 
 @CHECKS.add(
@@ -64,7 +64,10 @@ def exact_steps(printed: Statement) -> Finding:
     agrees = holds(printed, eliminations(3))
     return compare(
         agrees,
-        "the step of elimination, for random matrices: the multiplier makes the entry below the pivot zero",
+        (
+            "the equations are those of an elimination step, for random matrices: the multiplier makes "
+            "the entry below the pivot zero"
+        ),
     )
 
 
@@ -78,7 +81,7 @@ def exact_steps(printed: Statement) -> Finding:
 )
 def rounded_steps(printed: Statement) -> Finding:
     return compare(
-        holds(printed, eliminations(3)), "the same, to first order, after three roundings per entry", note=COUNTED
+        holds(printed, eliminations(3)), "three roundings per entry give the same, to first order", note=COUNTED
     )
 
 
@@ -88,8 +91,8 @@ def errors_of_the_first_step(printed: Statement) -> Finding:
         printed,
         eliminations(3),
         "a_tilde[1,j](1) == 0; a_tilde[i,1](1) == 0; a_tilde[i,j](1) == a[i,j](1)*(3*epsilon) - a[i,j](0)*(2*epsilon)",
-        "$3\\epsilon\\,a_{ij}(1)-2\\epsilon\\,a_{ij}(0)$ after three roundings per entry",
-        "the second (1) is a slip for (0): hung1982 itself has (0) in (48), and hung1984 corrects it",
+        "three roundings per entry give $3\\epsilon\\,a_{ij}(1)-2\\epsilon\\,a_{ij}(0)$",
+        "the second (1) is a misprint for (0): hung1982 itself has (0) in (48), and hung1984 corrects it",
     )
     return Finding(found.recomputed, found.agrees, found.verdict, found.note or COUNTED)
 
@@ -101,16 +104,16 @@ def right_side_definition(printed: Statement) -> Finding:
         eliminations(3),
         "b[i](1) == b[i](0) + m[i,1]*b[1](0) == b[i](0) - a[i,1](0)/a[1,1](0)*b[1](0)",
         "$b_i(0)+m_{i1}b_1(0)=b_i(0)-\\frac{a_{i1}(0)}{a_{11}(0)}b_1(0)$",
-        "two slips: the sign of $m_{i1}$, which contains the minus of (46), and $b_i(0)$ for $b_1(0)$ in the product; "
-        "the last line below is right for $b_1(0)$",
+        "there are two misprints: the sign of $m_{i1}$, which already contains the minus sign of "
+        "(46), and $b_i(0)$ for $b_1(0)$ in the product; the last line below is right with $b_1(0)$",
     )
 
 
 @CHECKS.add("hung1982.III.s11-1.b-i-1-definition")
 def right_side_definition_1982() -> Finding:
     return unverifiable(
-        "the next line has $b_1(0)$ in the product, without the slips of hung1984",
-        "the equation is lost from the scan; only a divisor $a_{11}(0)$ remains",
+        "the next line has $b_1(0)$ in the product, without the misprints of hung1984",
+        "the scan has lost the equation, except for a divisor $a_{11}(0)$",
     )
 
 
@@ -123,7 +126,7 @@ def right_side_step(printed: Statement) -> Finding:
         "b[i](1) + epsilon*b[i](0) - 3*epsilon*(a[i,1](0)/a[1,1](0))*b[1](0) == "
         "b[i](1) + 3*epsilon*b[i](1) - 2*epsilon*b[i](0)",
         "the last form follows with $b_1(0)$ in the product",
-        "$b_i(0)$ is a slip for $b_1(0)$ in the product, in two lines; hung1982 prints $b_1(0)$",
+        "$b_i(0)$ is a misprint for $b_1(0)$ in the product, in two lines; hung1982 prints $b_1(0)$",
     )
 
 
@@ -135,8 +138,8 @@ def right_side_second_step(printed: Statement) -> Finding:
         "b_hat[3](2) == fl(b[3](2)) == b_hat[3](1)*(1 + epsilon) - "
         "a_hat[3,2](1)/a_hat[2,2](1)*b_hat[2](1)*(1 + 3*epsilon) == "
         "b[3](2) + 3*epsilon*b[3](2) - 2*epsilon*b_hat[3](1)",
-        "$b_3(2)+3\\epsilon b_3(2)-2\\epsilon\\hat b_3(1)$, without a hat on the first $b_3(2)$",
-        "with the hat the error would be zero; hung1982 has none there",
+        "the result is $b_3(2)+3\\epsilon b_3(2)-2\\epsilon\\hat b_3(1)$, without a hat on the first $b_3(2)$",
+        "with the printed hat the error would be zero; hung1982 has no hat there",
     )
 
 
@@ -147,8 +150,11 @@ def after_the_first_step(printed: Statement) -> Finding:
         eliminations(3),
         "A_hat(1) == [[a[1,1](0), a[1,2](0), a[1,3](0)], [0, a_hat[2,2](1), a_hat[2,3](1)], "
         "[0, a_hat[3,2](1), a_hat[3,3](1)]]; b_hat_underline(1) == [[b[1](0)], [b_hat[2](1)], [b_hat[3](1)]]",
-        "the first row is unchanged, the first column cleared, and every other entry is that of stage 1",
-        "(0) for (1) in two entries, corrected in hung1984",
+        (
+            "the first row is unchanged, the first column is zero below the diagonal, and every other "
+            "entry is that of stage 1"
+        ),
+        "two entries have (0) in place of (1), which hung1984 corrects",
     )
 
 
@@ -167,8 +173,9 @@ def available(printed: Statement) -> Finding:
             count += 1
     return compare(
         says(printed, hat="is available" if computed == count > 2 * exact else "is not available"),
-        f"after the first step {computed} of {count} entries of $\\hat A$ are numbers of the format, and {exact} of "
-        "those of $A$; the two differ by a term of second order in (48)",
+        f"after the first step {computed} of {count} entries of $\\hat A$ are floating-point numbers "
+        f"of the format, but only {exact} entries of $A$; in (48) the two differ by a term of second "
+        "order",
     )
 
 
@@ -199,9 +206,12 @@ def compounded(printed: Statement) -> Finding:
     adds, changes, count = _compounded()
     return compare(
         adds == count and says(printed, verb="will be compounded to" if changes > count / 2 else "will not affect"),
-        f"errors of the first step change the exact result of the second in {changes} of {count} eliminations; "
-        f"$L\\hat A_T-A=\\tilde A(1)+\\tilde A(2)$ exactly in {adds}",
-        note="as changes of the given matrix the errors of the steps simply add up, which is why (53) may add them",
+        f"errors of the first step change the exact result of the second step in {changes} of {count} "
+        f"eliminations; $L\\hat A_T-A=\\tilde A(1)+\\tilde A(2)$ holds exactly in {adds}",
+        note=(
+            "expressed as perturbations of the given matrix, the errors of the steps simply add up, so "
+            "(53) may add them"
+        ),
     )
 
 
@@ -214,7 +224,7 @@ def upper_triangular(printed: Statement) -> Finding:
             first.add(n - cleared.index(True))
     return compare(
         first == {1} and says(printed, step="(n-1)", form="upper triangular"),
-        f"the entries below the diagonal are zero first after step $n-1$, in {2 * len(runs(3))} eliminations",
+        f"the entries below the diagonal become zero only with step $n-1$, in {2 * len(runs(3))} eliminations",
     )
 
 
@@ -260,18 +270,19 @@ def one_sign(printed: Statement) -> Finding:
     within = min(_within(relation, 3) for relation in relations)
     count = len(runs(3))
     besides = (
-        "; besides, $\\hat b_2(2)$ in the middle is a slip for $\\hat b_2(1)$"
+        "; also, $\\hat b_2(2)$ in the middle is a misprint for $\\hat b_2(1)$"
         if not holds(printed, eliminations(3)) and counted
         else ""
     )
     return compare(
         counted and within == count and not besides,
-        f"errors are larger than the right side in {count - within} of {count} eliminations, half of "
-        "them chosen so that $3a(1)$ and $2a(0)$ nearly cancel; sums of the sizes, "
+        f"the errors exceed the right side in {count - within} of {count} eliminations, half of which "
+        "are chosen so that $3a(1)$ and $2a(0)$ nearly cancel; the sums of absolute values, "
         f"$3|\\cdot|+2|\\cdot|$, bound all errors in {_sizes_hold(3)} of {2 * count} cases",
         Verdict.WRONG if counted else Verdict.INCONSISTENT,
-        otherwise_note="three roundings have three errors, $\\epsilon_3a(1)-(\\epsilon_1+\\epsilon_2)(a(0)-a(1))$: "
-        f"with one ε, or β, the terms $3a(1)$ and $2a(0)$ cancel, the errors do not{besides}",
+        otherwise_note="three roundings have three different errors, "
+        "$\\epsilon_3a(1)-(\\epsilon_1+\\epsilon_2)(a(0)-a(1))$: with a single ε or β the terms "
+        f"$3a(1)$ and $2a(0)$ can cancel, but the errors do not{besides}",
         root=ONE_EPSILON,
     )
 
@@ -281,14 +292,14 @@ def norms(printed: Statement) -> Finding:
     of_matrix = "A_tilde" in printed.form
     name, part = ("A_tilde", "A_hat") if of_matrix else ("b_tilde_underline", "b_hat_underline")
     environments = [names for n in (3, 4) for _, names, _ in runs(n)]
-    extra = "; besides, the sum runs over $i$ and its terms contain $k$" if of_matrix else ""
+    extra = "; also, the sum runs over $i$ but its terms contain $k$" if of_matrix else ""
     return slip(
         printed,
         environments,
         f"norm({name}) <= beta*Sum(3*norm({part}[k](k)) + 2*norm({part}[k](k-1)), (k,1,n-1))",
-        f"with $\\le$ it is a bound in {len(environments)} eliminations, and an equality in none",
-        "$\\le$ is meant. Sizes are added here as they must be, and it is a bound to first order; but the procedure of "
-        f"11.3 does not use it{extra}",
+        f"with $\\le$ the line is a bound in all {len(environments)} eliminations and an equality in none",
+        "the sign $\\le$ is meant. The line correctly adds absolute values and is a bound to first "
+        f"order, but the procedure of 11.3 does not use it{extra}",
         sharp=False,
     )
 
@@ -310,12 +321,12 @@ def partial_matrix(printed: Statement) -> Finding:
     ]  # fmt: skip
     same = [each for each in shapes if each["i"] == each["j"]]
     meant = corrected(printed, "A[j](k) == block(n - i, n - i)")
-    scan = "; the scan reads $(n-1)$ in one of the two factors" if "n - 1" in printed.form else ""
+    scan = "; the scan shows $(n-1)$ in one of the two factors" if "n - 1" in printed.form else ""
     return compare(
         holds(printed, shapes),
-        "$A_i$ has a block of $n-i$ rows and columns, which step $i$ changes",
+        "step $i$ changes a block of $n-i$ rows and columns, which $A_i$ contains",
         Verdict.MISPRINT if holds(meant, same) else Verdict.WRONG,
-        otherwise_note=f"one index with two names, $j$ on the left and $i$ in the block{scan}",
+        otherwise_note=f"the same index has two names: $j$ on the left and $i$ in the block{scan}",
     )
 
 
@@ -327,8 +338,11 @@ def triangular_matrix(printed: Statement) -> Finding:
         eliminations(4),
         "A_hat_T[1,k] == a_hat[1,k](0); A_hat_T[2,2] == a_hat[2,2](1); A_hat_T[2,k] == a_hat[2,k](1); "
         "A_hat_T[k,k] == a_hat[k,k](k-1); A_hat_T[k,n] == a_hat[k,n](k-1)",
-        "row $k$ of $\\hat A_T$ is that of $\\hat A(k-1)$, off the diagonal too",
-        "(0) for $(k-1)$ right of the diagonal; the diagonal is right, and nothing later uses the superscripts",
+        "row $k$ of $\\hat A_T$ is row $k$ of $\\hat A(k-1)$, also off the diagonal",
+        (
+            "to the right of the diagonal, (0) is printed for $(k-1)$; the diagonal is correct, and "
+            "nothing later uses the superscripts"
+        ),
     )
 
 
@@ -341,4 +355,4 @@ def triangular_right_side(printed: Statement) -> Finding:
         and [row[0] for row in entries(names["b_hat_T_underline"])] == [names["b_hat"](k, k - 1) for k in (1, 2, 3, 4)]
         for names in eliminations(4)
     )
-    return compare(whole and holds(evaluable, each), "entry $k$ keeps its value from step $k-1$ on, for $n=4$")
+    return compare(whole and holds(evaluable, each), "for $n=4$, entry $k$ keeps its value from step $k-1$ on")

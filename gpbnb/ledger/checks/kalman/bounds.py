@@ -17,9 +17,10 @@ from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
 
 _NO_BOUND = (
-    "one state, $P=H=\\Phi=x_0=1$, $z=0$, $R$ below the last digit: the estimate is lost altogether, in every format"
+    "the case is one state with $P=H=\\Phi=x_0=1$, $z=0$ and $R$ below the last digit; the estimate "
+    "is then lost completely, in every format"
 )
-_BETA = "; the prefactor is $\\beta$, as the example has it, though the scans read B"
+_BETA = "; the prefactor is $\\beta$, as in the example, although the scans show B"
 
 
 @CHECKS.add(*both("eq119"), *both("eq120"))
@@ -28,8 +29,9 @@ def three_steps(printed: Statement) -> Finding:
     return exceeded(
         "(119)",
         right,
-        "what (114) rests on fails, and roundings are counted twice; each term of (118) has an error of its own, so "
-        "their errors do not combine to one multiple of $x_3$" + ("" if right else "; $3m+1$ is printed for $3n+1$"),
+        "(114) rests on bounds that fail, and roundings are counted twice; each term of (118) has "
+        "its own error, so the errors do not combine into one multiple of $x_3$"
+        + ("" if right else "; $3m+1$ is printed for $3n+1$"),
         SIGNS,
     )
 
@@ -57,9 +59,11 @@ def norm_with_minus(printed: Statement) -> Finding:
     last = links[-1]
     return compare(
         all(link.symbol == "<=" and link.left <= link.right for link in links),
-        f"for $n=m=1$, $F_k=1$, $x_0=-3$ and $u_k=1$ the left side is ${last.left}\\epsilon$ and the right side "
-        f"${last.right}\\epsilon$",
-        otherwise_note="the norm of a difference is bounded by the sum of the norms; (122) has plus signs again",
+        f"for $n=m=1$, $F_k=1$, $x_0=-3$ and $u_k=1$, the left side is ${last.left}\\epsilon$ and the "
+        f"right side is ${last.right}\\epsilon$",
+        otherwise_note=(
+            "the sum of the norms bounds the norm of a difference, so (121) must add; (122) has plus signs again"
+        ),
         root="minus-signs-in-a-norm-bound",
     )
 
@@ -75,8 +79,8 @@ def assumptions(printed: Statement) -> Finding:
     powers = [printed.relation(3).links(least | {"i": i}, Fraction)[0].left for i in range(3)]
     return compare(
         all(printed.relation(i).text.count("<=") for i in (1, 2, 3)) and need <= max(powers),
-        f"for two loops $F=(0.9,0.9;0,0)$ and $u=(1,1)$: $\\|FFu\\|={float(need)}$, and the least $B$ is "
-        f"{float(max(powers))}",
+        "for two steps with the closed loop $F=(0.9,0.9;0,0)$ and $u=(1,1)$, "
+        f"$\\|FFu\\|={float(need)}$, but the smallest $B$ is {float(max(powers))}",
         otherwise_note="the norms (21) and (22) are not compatible: $\\|Fu\\|\\le\\|F\\|\\|u\\|$ needs row sums",
         root="incompatible-norms",
     )
@@ -104,7 +108,7 @@ def claim_of_a_bound(printed: Statement) -> Finding:
     bound = times <= 1
     return compare(
         printed.claims("equation (125)", {"gives the bound": bound, "does not give a bound": not bound}),
-        f"in four digits, the error of a filter is {times:.3g} times what (125) allows",
+        f"in four digits, the error of an example filter is {times:.3g} times what (125) allows",
         otherwise_note=_NO_BOUND,
         root=SIGNS,
     )
@@ -115,8 +119,8 @@ def pattern(printed: Statement) -> Finding:
     found = algebra.holds(statement("hung1984.II.eq125"), algebra.norms())
     return compare(
         printed.claims("the general case", {"follows the pattern": found, "departs from the pattern": not found}),
-        "the coefficients of (125) are right by summation for every $k$, $n$, $m$",
-        note="the pattern is right; what it is the pattern of is not",
+        "summation gives the coefficients of (125) for every $k$, $n$, $m$",
+        note="(125) continues the pattern of the preceding bounds correctly, but these bounds are wrong",
     )
 
 
@@ -126,7 +130,7 @@ def similar_derivation(printed: Statement) -> Finding:
     return compare(
         printed.claims("the same derivation", {"gives (124)": found, "does not give (124)": not found}),
         "the coefficients of (124) follow by the same sums for $k=4$",
-        note="what the derivation starts from fails",
+        note="the derivation starts from bounds that fail",
     )
 
 
@@ -141,8 +145,8 @@ def dependence(printed: Statement) -> Finding:
     grows = all(other > value() for other in others)
     return compare(
         printed.claims("the bound", {"depends on all six": grows, "is independent of some of the six": not grows}),
-        f"it grows with each of the {len(others)}",
-        note="the error depends on more: on how far $I-KH$ cancels, which none of the six shows",
+        f"the bound grows with each of the {len(others)}",
+        note="the error also depends on how far $I-KH$ cancels, which none of the six quantities shows",
     )
 
 
@@ -152,7 +156,7 @@ def word(printed: Statement) -> Finding:
         printed.claims("k counts", {"interactions": False, "iterations": True}),
         "$k$ counts the iterations of the filter",
         Verdict.MISPRINT,
-        otherwise_note="iterations are meant, and an iteration period of ten seconds",
+        otherwise_note="the text means iterations, with a period of ten seconds",
     )
 
 
@@ -166,7 +170,10 @@ def usefulness(printed: Statement) -> Finding:
             "equation (125)",
             {"gives a general idea of the digits": useful, "gives no idea of the digits": not useful},
         ),
-        f"with 17 digits, the error of a filter of one state is {times:.2g} times what (125) allows in its first step",
-        otherwise_note="the digits that a formula asks for are of use if the formula is a bound",
+        (
+            f"with 17 digits, the error of a filter with one state is {times:.2g} times what (125) allows "
+            "in the first step"
+        ),
+        otherwise_note="the number of digits that a formula requires is useful only if the formula is a bound",
         root=SIGNS,
     )

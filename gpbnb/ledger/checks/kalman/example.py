@@ -36,7 +36,7 @@ def sampling(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1984.II.s12.example-n-m", "hung1982.III.s12.example-n-m-and-sampling")
 def dimensions(printed: Statement) -> Finding:
-    return given("assumed dimensions; which ten states and two measurements is not said")
+    return given("assumed dimensions; the report does not say which ten states and which two measurements")
 
 
 @CHECKS.add(*both("s12.example-k"))
@@ -65,11 +65,11 @@ def _value(printed: Statement) -> Fraction:
 def first_coefficient(printed: Statement) -> Finding:
     value = coefficients()[0]
     misprints = report_bounds.one_digit_misprints(*report_bounds.EXAMPLE, printed.number("value").literal)
-    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in misprints) or "no change of one digit"
+    ways = " or ".join(f"${a}n+{b}m+{c}$" for a, b, c in misprints) or "no change of a single digit"
     return compare(
         _value(printed) == value and _number(printed, "value", value),
         scientific(value, 5),
-        otherwise_note=f"the printed number is $84k$, as by {ways}; the scan of 1984 has b for 6",
+        otherwise_note=f"the printed number is $84k$, which results from {ways}; the scan of 1984 shows b for 6",
         root=_FIRST,
     )
 
@@ -81,7 +81,10 @@ def second_coefficient(printed: Statement) -> Finding:
     return compare(
         _value(printed) == value and _number(printed, "value", value),
         scientific(value, 5),
-        otherwise_note="the printed number is $k(3n+1)\\cdot0.5(k-1)\\cdot84$: times for plus, and 84 for 82"
+        otherwise_note=(
+            "the printed number is $k(3n+1)\\cdot0.5(k-1)\\cdot84$: it multiplies where (125) adds, and "
+            "it has 84 in place of 82"
+        )
         if _number(printed, "value", product)
         else "no misprint was found that leads to the printed number",
         root=_SECOND,
@@ -98,8 +101,8 @@ def formula_8(printed: Statement) -> Finding:
         same += fl(1 + beta) > 1 and fl(1 + beta * Fraction(999, 1000)) == 1
     return compare(
         printed.relation().text.count("==") == 1 and same == len(precisions),
-        f"it is the least number that, added to 1, changes it, in {same} of {len(precisions)} precisions",
-        note="a computer of base 2 needs its own count: digits of other bases are worth different amounts",
+        f"in {same} of {len(precisions)} precisions, β is the smallest number that changes 1 when added to it",
+        note="the number of digits depends on the base, so a binary computer needs its own count",
     )
 
 
@@ -118,19 +121,19 @@ def first_beta(printed: Statement) -> Finding:
         printed,
         0,
         _FIRST,
-        "one over the printed coefficient, which is wrong, is $.3775\\times10^{-8}$; the minus sign of the exponent, "
-        "which hung1982 has, is lost",
+        "the reciprocal of the printed coefficient, which is wrong, is $.3775\\times10^{-8}$; the "
+        "minus sign of the exponent, present in hung1982, is missing",
     )
 
 
 @CHECKS.add("hung1982.III.s12.example-beta-first")
 def first_beta_1982(printed: Statement) -> Finding:
-    return _beta(printed, 0, _FIRST, "one over the printed coefficient, which is wrong")
+    return _beta(printed, 0, _FIRST, "this is the reciprocal of the printed coefficient, which is wrong")
 
 
 @CHECKS.add("hung1984.II.s12.example-beta-second-term", "hung1982.III.s12.example-beta-second")
 def second_beta(printed: Statement) -> Finding:
-    return _beta(printed, 1, _SECOND, "one over the printed coefficient, which is wrong")
+    return _beta(printed, 1, _SECOND, "this is the reciprocal of the printed coefficient, which is wrong")
 
 
 @cache
@@ -149,7 +152,9 @@ def first_digits(printed: Statement) -> Finding:
     return compare(
         printed.number("t").value == needed,
         f"{needed}; for the printed β {by_printed}, since (8) gives $t={real:.2f}$",
-        otherwise_note="rounded to the nearest integer where it must be rounded up: nine digits violate the criterion",
+        otherwise_note=(
+            "the report rounds to the nearest integer instead of rounding up: nine digits violate its criterion"
+        ),
         root="digits-not-rounded-up",
     )
 
@@ -161,8 +166,8 @@ def second_digits(printed: Statement) -> Finding:
     return compare(
         printed.number("t").value == needed,
         f"{needed}; for the printed β {by_printed}, since (8) gives $t={real:.2f}$",
-        otherwise_note="the printed number rules IEEE double precision out; the formula does not: its second term is "
-        f"{float(double):.2g} there",
+        otherwise_note="the printed number rules out IEEE double precision, but the formula does not: in double "
+        f"precision its second term is {float(double):.2g}",
         root=_SECOND,
     )
 
@@ -171,7 +176,9 @@ def second_digits(printed: Statement) -> Finding:
 def one_term(printed: Statement) -> Finding:
     first, second = coefficients()
     ratio = scientific(Fraction(second, first), 3).strip("$")
-    return given(f"an assumption, for discussion; the first term dominates where $\\|x_k\\|>{ratio}\\,B$")
+    return given(
+        f"the report assumes this for the sake of discussion; the first term dominates where $\\|x_k\\|>{ratio}\\,B$"
+    )
 
 
 @CHECKS.add(*both("s12.example-criterion"), *both("s12.example-criterion-second"))
@@ -181,9 +188,10 @@ def criterion(printed: Statement) -> Finding:
     (link,) = printed.links({"k": Fraction(YEAR, STEP), "n": N, "m": M, "beta": 1}, Fraction)
     return compare(
         link.symbol == "==" and link.left in coefficients() and link.right <= tolerance,
-        f"it allows an error as large as $\\|x_k\\|$, or as $B$; for {GOAL} mas in {SIGNAL} the two terms need "
-        f"{digits[0]} and {digits[1]} digits",
-        otherwise_note="the experiment's goal is a milliarcsecond a year",
+        f"the criterion allows an error as large as $\\|x_k\\|$ or as $B$; an error of {GOAL} mas in "
+        f"a signal of {SIGNAL} mas requires {digits[0]} digits for the first term and {digits[1]} for "
+        "the second",
+        otherwise_note="the goal of the experiment is one milliarcsecond a year",
         root="error-as-large-as-the-state-allowed",
     )
 
@@ -194,5 +202,5 @@ def name_of_the_experiment(printed: Statement) -> Finding:
         printed.claims("the experiment", {"GP-beta": False, "GP-B": True}),
         "GP-B",
         Verdict.OCR,
-        otherwise_note="the scan reads B as β here, and β as B in (122)",
+        otherwise_note="the scan shows β for B here, and B for β in (122)",
     )

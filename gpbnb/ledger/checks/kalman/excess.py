@@ -65,8 +65,8 @@ def exceeded(place: str, algebra: bool, note: str, root: str, name: str = "") ->
     right = "follow" if algebra else "do not follow"
     return compare(
         algebra and times <= 1,
-        f"the printed terms {right} from the report's own algebra; in four digits, the error of a filter is "
-        f"{times:.3g} times what {name or place} allows",
+        f"the printed terms {right} from the report's own algebra; in four digits, the error of an "
+        f"example filter is {times:.3g} times what {name or place} allows",
         Verdict.WRONG,
         otherwise_note=note,
         root=root,

@@ -12,7 +12,7 @@ from gpbnb.ledger.formula import Undefined
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 
-_EXACT = f"compared with weighted least squares in exact arithmetic, $n={STATES}$, $m={MEASUREMENTS}$"
+_EXACT = f"compared with weighted least squares in exact arithmetic for $n={STATES}$, $m={MEASUREMENTS}$"
 
 
 @CHECKS.add(*both("s12.model-equations"))
@@ -24,11 +24,14 @@ def model_equations(printed: Statement) -> Finding:
     except Undefined:
         return compare(
             False,
-            f"with $n={STATES}$, $m={MEASUREMENTS}$ the product $w_kv_j$ does not exist; $w_kv_j^T$ does",
+            (f"for $n={STATES}$, $m={MEASUREMENTS}$ the product $w_kv_j$ is undefined, while $w_kv_j^T$ is defined"),
             Verdict.MISPRINT,
-            note="a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ are one letter, as are $v$ and $V$",
+            note=(
+                "a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ stand for the same quantity, "
+                "as do $v$ and $V$"
+            ),
         )
-    return given("the model that the filter assumes")
+    return given("states the model that the filter assumes")
 
 
 @CHECKS.add(*both("s12.claim-asterisk"))
@@ -40,15 +43,17 @@ def asterisk(printed: Statement) -> Finding:
     rounded = bool((x == by_111).all())
     return compare(
         printed.claims("x denotes", {"the rounded value of the estimate": rounded, "the exact estimate": not rounded}),
-        f"a step of one state in four digits gives {float(x[0]):g}, equation (111) gives {float(by_111[0]):.4g}",
+        (f"for one state, a step in four digits gives {float(x[0]):g}; equation (111) gives {float(by_111[0]):.4g}"),
         Verdict.MISPRINT,
-        otherwise_note="from (111) on $x$ is the exact estimate, as (118) says, and $\\hat x$ the rounded one",
+        otherwise_note=(
+            "from (111) on, $x$ is the exact estimate, as (118) says, and $\\hat x$ is the rounded estimate"
+        ),
     )
 
 
 @CHECKS.add("hung1984.II.eq98", "hung1984.II.eq98-repeated", "hung1984.II.eq111")
 def estimate(printed: Statement) -> Finding:
-    return compare(holds_exactly(printed), f"the same estimate; {_EXACT}")
+    return compare(holds_exactly(printed), f"the equation gives the same estimate; {_EXACT}")
 
 
 @CHECKS.add("hung1984.II.eq99", "hung1984.II.s12.eq99-recalled")
@@ -56,9 +61,9 @@ def gains(printed: Statement) -> Finding:
     cyclic = report_bounds.order(second=True) is None
     return compare(
         holds_exactly(printed),
-        f"the same gain; {_EXACT}; with the second form "
+        f"the equation gives the same gain; {_EXACT}; with the second form, "
         + ("(99) needs (101) and (101) needs (99)" if cyclic else "an order of the four equations exists"),
-        note="the analysis (106) uses the second form, that of (104) a gain without error: no program does both",
+        note="analysis (106) uses the second form, while (104) uses a gain without error; no program can do both",
     )
 
 
@@ -68,9 +73,9 @@ def prediction(printed: Statement) -> Finding:
         holds_exactly(printed),
         r"the covariance of $\Phi_{k-1}x_{k-1}+w_{k-1}$ contains $Q_{k-1}$",
         Verdict.INCONSISTENT,
-        otherwise_note="(100) prints $Q_k$; (102), which recalls it, has $Q_{k-1}$ in both reports. In the scan of "
-        "hung1982 neither this index nor that of $K$ in (101) is legible: the first is taken from hung1984, the second "
-        "from the sense",
+        otherwise_note="(100) prints $Q_k$; (102), which repeats it, has $Q_{k-1}$ in both reports. In the scan of "
+        "hung1982 neither this index nor that of $K$ in (101) is legible: we take the first from "
+        "hung1984 and the second from the context",
     )
 
 
@@ -78,9 +83,9 @@ def prediction(printed: Statement) -> Finding:
 def covariance(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
-        "with $K_k$ it is the covariance of the least squares estimate",
+        "with $K_k$ the equation gives the covariance of the least-squares estimate",
         Verdict.MISPRINT,
-        otherwise_note="$K_p$ is printed for $K_k$, which the report has where it recalls (101)",
+        otherwise_note="$K_p$ is printed for $K_k$, which the report prints where it repeats (101)",
     )
 
 
@@ -92,28 +97,30 @@ def recalled(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.eq109", "hung1984.II.eq110")
 def defined(printed: Statement) -> Finding:
     if holds_exactly(printed):
-        return given("the definition of $F_k$ or $u_k$; with it (111) is the estimate of (98)")
-    return compare(False, "with this definition (111) is not the estimate of (98)")
+        return given("this defines $F_k$ or $u_k$; with this definition (111) gives the estimate of (98)")
+    return compare(False, "with this definition (111) does not give the estimate of (98)")
 
 
 @CHECKS.add("hung1982.III.eq109-111")
 def closed_loop(printed: Statement) -> Finding:
     return compare(
-        holds_exactly(printed), f"the same estimate; {_EXACT}", note="where the scan is garbled, restored from hung1984"
+        holds_exactly(printed),
+        f"the equation gives the same estimate; {_EXACT}",
+        note="where the scan is garbled, the text is restored from hung1984",
     )
 
 
 @CHECKS.add("hung1984.II.eq118", "hung1982.III.eq118", "hung1984.II.eq123")
 def unrolled(printed: Statement) -> Finding:
-    return compare(holds_exactly(printed), f"the same estimate; {_EXACT}")
+    return compare(holds_exactly(printed), f"the equation gives the same estimate; {_EXACT}")
 
 
 @CHECKS.add("hung1982.III.eq123")
 def unrolled_1982(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
-        "without $u_4$ it is not the estimate; with it, it is",
+        "the equation gives the estimate only with the term $u_4$",
         Verdict.OCR,
-        otherwise_note="the last term is lost from the scan, not from the report: hung1984 has it, and (124), the same "
-        "in both reports, counts it",
+        otherwise_note="the scan has lost the last term, but the report must contain it: hung1984 prints it, and "
+        "(124), which is the same in both reports, counts it",
     )

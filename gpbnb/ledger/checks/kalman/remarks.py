@@ -82,15 +82,16 @@ def remark_1(printed: Statement) -> Finding:
     tried, violations, factor = refined()
     return answer(
         violations == 0 and factor < 1000 and derivation.contraction().holds and derivation.recursion().holds,
-        f"(125) is no bound; the contraction bound is one, without first order: {violations} violations in {tried} "
-        f"entries of small filters, median bound over error {factor:.2g}",
-        note=f"{CHAPTER}, where a companion run makes it sharp over a year",
+        "(125) is not a bound; the contraction bound is strict, not only valid to first order: "
+        f"{violations} violations in {tried} entries of small filters, with a median ratio of bound "
+        f"to error of {factor:.2g}",
+        note=f"see the {CHAPTER}, where a companion run makes the bound tight over a year",
     )
 
 
 @CHECKS.add(*both("s13.several-approaches"))
 def several_approaches(printed: Statement) -> Finding:
-    return unverifiable("", "the other approaches are not in the documents")
+    return unverifiable("", "the documents do not describe the other approaches")
 
 
 @cache
@@ -99,7 +100,7 @@ def year_again() -> bool:
     stored = year.load()[0]
     case = stored.case
     if case.fmt is None:
-        raise ValueError(f"got {case.name} first in year.csv; needed a run in a format")
+        raise ValueError(f"got {case.name} as the first run in year.csv; needed a run in a floating-point format")
     steps = tuple(int(step) for step in stored.steps if step <= 10)
     z = year_cases.simulation(case.model).measurements(max(steps))
     found = emulation.emulate(year_cases.model(case.model, case.base), z, case.fmt, case.form, steps)
@@ -128,10 +129,10 @@ def remark_2(printed: Statement) -> Finding:
     asked = report_bounds.precision_for_coefficient(coefficients()[1], Fraction(GOAL, SIGNAL))
     return answer(
         again and decimal is not None and binary is not None,
-        f"a filter of our own with {N} states and {M} measurements, run for a year: "
-        f"{decimal} decimal digits or {binary} bits keep the drift rates within {GOAL} mas a year, of those tried; "
-        f"the second term of (125) asks for {asked} digits",
-        note=f"{CHAPTER}; the reports print no matrices, noise and time constants are our choice",
+        f"we ran a filter of our own with {N} states and {M} measurements for a year: {decimal} "
+        f"decimal digits or {binary} bits are the smallest tried precisions that keep the drift rates "
+        f"within {GOAL} mas a year; the second term of (125) requires {asked} digits",
+        note=f"see the {CHAPTER}; the reports print no matrices, so the noise and the time constants are our choice",
     )
 
 
@@ -151,12 +152,12 @@ def remark_4(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.s13.remark-5")
 def remark_5(printed: Statement) -> Finding:
-    return left_open("the compensation data are not in the documents")
+    return left_open("the documents do not contain the compensation data")
 
 
 @CHECKS.add("hung1984.II.s14.references")
 def references(printed: Statement) -> Finding:
-    return given("a list of works; the text refers to none of them, and only the seventh is among the documents")
+    return given("a list of works; the text cites none of them, and only the seventh is among the documents")
 
 
 @CHECKS.add("hung1984.II.s14.reference-1", "hung1984.II.s14.reference-5")
@@ -169,9 +170,9 @@ def titles(printed: Statement) -> Finding:
     }
     return compare(
         printed.claims("title", right),
-        "both titles end in s: *Rounding Errors in Algebraic Processes*, *Introduction to Numerical Computations*",
+        ("both titles are plural: *Rounding Errors in Algebraic Processes*, *Introduction to Numerical Computations*"),
         Verdict.MISPRINT,
-        otherwise_note="an s is missing",
+        otherwise_note="the final s of a title is missing",
     )
 
 
@@ -181,6 +182,6 @@ def reference_7(printed: Statement) -> Finding:
         printed.claims("contract", {"NA58-34426": False, "NAS8-34426": True}),
         "NAS8-34426",
         Verdict.MISPRINT,
-        otherwise_note="a 5 for the S that the title page has, as in chapter I; by the author or the scan. The date is "
-        "a month after the end of the period that the report of 1982 covers",
+        otherwise_note="a 5 stands for the S of the title page, as in chapter I, due to the author or the scan. The "
+        "date is a month after the end of the period that the report of 1982 covers",
     )

@@ -23,7 +23,10 @@ PRODUCT, EXACT_GAIN, SIGNS, TWICE = (
     "one-signed-epsilon",
     "roundings-counted-twice",
 )
-_CANCELS = "as in (30): the error of a product is no multiple of the product, which may cancel while the error stays"
+_CANCELS = (
+    "as in (30), the error of a product is not a multiple of the product: the product may cancel while "
+    "the error remains"
+)
 
 
 @CHECKS.add(*both("eq102"), *both("eq103"))
@@ -31,8 +34,8 @@ def rounded_prediction(printed: Statement) -> Finding:
     return exceeded(
         "(102)",
         algebra.holds(printed, algebra.prediction()),
-        f"{_CANCELS}; the inequality of (103) also takes $\\epsilon$ for positive, and the error of $P_{{k-1}}$ from "
-        "earlier steps is left out",
+        f"{_CANCELS}; the inequality in (103) also assumes that $\\epsilon$ is positive, and it omits "
+        "the error of $P_{k-1}$ from earlier steps",
         PRODUCT,
     )
 
@@ -42,8 +45,9 @@ def rounded_covariance(printed: Statement) -> Finding:
     return exceeded(
         "(104)",
         algebra.holds(printed, algebra.covariance()),
-        "the gain is taken to have no error, though it is computed, and $I-KH$ magnifies its error by $KP_{kp}/P_k$; "
-        "the hat of $P_{kp}$, missing in the first line of (104), is there in the second",
+        "the equation assumes that the gain has no error, but the gain is computed, and $I-KH$ "
+        "magnifies its error by $KP_{kp}/P_k$; the hat on $P_{kp}$, missing in the first line of "
+        "(104), is printed in the second",
         EXACT_GAIN,
     )
 
@@ -53,9 +57,10 @@ def covariance_bound(printed: Statement) -> Finding:
     return exceeded(
         "(105)",
         algebra.holds(printed, algebra.covariance()),
-        "$-m\\epsilon P_{kp}$ is dropped as if $\\epsilon$ were positive; $P_{kp}/P_k=1/(1-KH)$ has no limit, and "
-        "$P=H=1$ with $R$ below the last digit violates the bound by $1/(6\\beta)$ in every format; the second line "
-        "also has $K_kP_k$ for $K_kH_k$ and lacks an $\\epsilon$",
+        "the report drops $-m\\epsilon P_{kp}$ as if $\\epsilon$ were positive; but "
+        "$P_{kp}/P_k=1/(1-KH)$ is unbounded, and with $P=H=1$ and $R$ below the last digit the error "
+        "is $1/(6\\beta)$ times the bound in every format; the second line also has $K_kP_k$ for "
+        "$K_kH_k$ and lacks an $\\epsilon$",
         SIGNS,
     )
 
@@ -80,8 +85,8 @@ def inverse_of_r(printed: Statement) -> Finding:
     names = algebra.COMMON | {"R_hat_k": algebra.R / (1 + roundings * derivation.EPS)}
     return compare(
         algebra.holds(printed, names),
-        f"one division each: at most {float(largest):.3g} β in {count} divisions",
-        note="$R_k$ itself is exact; the exponents lost from the scan of hung1982 are restored from hung1984",
+        f"each entry takes one division, whose error is at most {float(largest):.3g} β in {count} divisions",
+        note="$R_k$ itself is exact; the exponents that the scan of hung1982 has lost are restored from hung1984",
     )
 
 
@@ -90,7 +95,7 @@ def gain_error(printed: Statement) -> Finding:
     return exceeded(
         "(107)",
         algebra.holds(printed, algebra.gain()),
-        "it starts from the covariance of (104), whose gain has no error",
+        "the equation starts from the covariance of (104), which ignores the error of the gain",
         EXACT_GAIN,
     )
 
@@ -102,9 +107,9 @@ def gain_bound(printed: Statement) -> Finding:
     return exceeded(
         "(108)",
         algebra.holds(printed, algebra.gain()),
-        f"$-m\\epsilon P_{{kp}}H^TR^{{-1}}$ is dropped as in (105); with the first form of (99) the bound holds for "
-        f"one state in the first step, and is exceeded {later:.3g} times in the second, or {matrices:.3g} times with "
-        "two states",
+        "the report drops $-m\\epsilon P_{kp}H^TR^{-1}$ as in (105); with the first form of (99) "
+        f"the bound holds for one state in the first step, but the error is {later:.3g} times the "
+        f"bound in the second step, or {matrices:.3g} times with two states",
         SIGNS,
     )
 
@@ -112,7 +117,10 @@ def gain_bound(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.eq112")
 def rounded_loop(printed: Statement) -> Finding:
     return exceeded(
-        "(112)", algebra.holds(printed, algebra.loop()), "it starts from the gain of (108), which fails", SIGNS
+        "(112)",
+        algebra.holds(printed, algebra.loop()),
+        "the equation starts from bound (108) on the gain, which fails",
+        SIGNS,
     )
 
 
@@ -121,8 +129,8 @@ def rounded_loop_1982(printed: Statement) -> Finding:
     return exceeded(
         "(112)",
         algebra.holds(printed, algebra.loop()),
-        "it starts from the gain of (108), which fails; $4n+3n+3$ is printed or scanned for $4n+3m+3$, and $I$ for "
-        "$\\phi_{k-1}$. Counts that are not legible are restored from hung1984",
+        "the equation starts from bound (108) on the gain, which fails; the scan has $4n+3n+3$ for "
+        "$4n+3m+3$, and $I$ for $\\phi_{k-1}$. Illegible counts are restored from hung1984",
         SIGNS,
     )
 
@@ -130,7 +138,10 @@ def rounded_loop_1982(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.eq113")
 def rounded_input(printed: Statement) -> Finding:
     return exceeded(
-        "(113)", algebra.holds(printed, algebra.loop()), "it starts from the gain of (108), which fails", SIGNS
+        "(113)",
+        algebra.holds(printed, algebra.loop()),
+        "the equation starts from bound (108) on the gain, which fails",
+        SIGNS,
     )
 
 
@@ -139,8 +150,8 @@ def rounded_input_1982(printed: Statement) -> Finding:
     return exceeded(
         "(113)",
         algebra.holds(printed, algebra.loop()),
-        "it starts from the gain of (108), which fails; $3n$ is printed or scanned for the $4n$ of (108), since (119) "
-        "goes on with $4n$. The counts of the last two lines are not legible",
+        "the equation starts from bound (108) on the gain, which fails; the scan has $3n$ for the "
+        "$4n$ of (108), with which (119) continues. The counts of the last two lines are not legible",
         SIGNS,
     )
 
@@ -150,7 +161,7 @@ def rounded_state(printed: Statement) -> Finding:
     return exceeded(
         "(114)",
         algebra.holds(printed, algebra.loop()),
-        "$-(4n+3m+3)\\epsilon\\Phi$ of (112) is dropped as if $\\epsilon$ were positive",
+        "the report drops the term $-(4n+3m+3)\\epsilon\\Phi$ of (112) as if $\\epsilon$ were positive",
         SIGNS,
     )
 
@@ -160,9 +171,9 @@ def defined_again(printed: Statement) -> Finding:
     loop, entered = (derivation.transition_error().coeff(derivation.FK), derivation.input_error().coeff(derivation.U))
     return compare(
         algebra.holds(printed, algebra.loop()),
-        f"by (112) and (113) the counts are ${sp.latex(loop)}$ and ${sp.latex(entered)}$",
+        f"(112) and (113) give the counts ${sp.latex(loop)}$ and ${sp.latex(entered)}$",
         Verdict.INCONSISTENT,
-        otherwise_note="the letters of (112) and (113) are defined again and now include the roundings of $\\hat F x$ "
+        otherwise_note="the symbols of (112) and (113) are redefined and now include the roundings of $\\hat F x$ "
         "and of the sum",
         root=TWICE,
     )
@@ -173,7 +184,7 @@ def rewritten(printed: Statement) -> Finding:
     return compare(
         algebra.holds(printed, algebra.restated()),
         "(114) with the counts of (115) and (116)",
-        note="with these letters no further rounding is to be counted",
+        note="with these redefined symbols, no further rounding remains to be counted",
     )
 
 
@@ -182,9 +193,9 @@ def counted_twice(printed: Statement) -> Finding:
     more = tuple(sp.expand(again - once) for again, once in zip(derivation.TWICE, derivation.ONCE, strict=True))
     return compare(
         algebra.holds(printed, algebra.three_steps(twice=False)),
-        f"by (117) no rounding is left to count: ${sp.latex(more[0])}$ per loop and ${sp.latex(more[1])}$ per input "
-        "are counted twice",
-        otherwise_note="(115) and (116) contain them already: $7n+3m+6$ in all that follows should be $6n+3m+5$. What "
-        "is not legible in hung1982 is restored from hung1984",
+        f"after (117) no rounding remains to be counted, so ${sp.latex(more[0])}$ for the closed loop "
+        f"and ${sp.latex(more[1])}$ for the input are counted twice",
+        otherwise_note="(115) and (116) already contain these roundings: from here on, $7n+3m+6$ should be "
+        "$6n+3m+5$. Illegible text in hung1982 is restored from hung1984",
         root=TWICE,
     )

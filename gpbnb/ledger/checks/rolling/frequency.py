@@ -33,7 +33,7 @@ def eq10(printed: Statement) -> Finding:
     for names in signals():
         derolled = names["m"](0) * sp.cos((names["omega_r"] + names["Deltaomega"]) * names["t"])
         agrees = agrees and hold(printed.links({**names, "s_2": fixed(derolled)}))
-    return compare(agrees, "the product of the cosines as a sum")
+    return compare(agrees, "this writes the product of the cosines as a sum")
 
 
 @CHECKS.add(entry("eq11"))
@@ -44,8 +44,11 @@ def eq11(printed: Statement) -> Finding:
     )
     return compare(
         agrees,
-        "the mean of the product of the cosines over the roll phase",
-        note="for the signal; in two dimensions the drift across gets $s\\sin\\Delta\\omega t$",
+        "this is the mean of the product of the cosines over the roll phase",
+        note=(
+            "the equation holds for the signal; in two dimensions, the perpendicular drift also gains "
+            "$s\\sin\\Delta\\omega t$"
+        ),
     )
 
 
@@ -57,9 +60,12 @@ def various_degrees(printed: Statement) -> Finding:
     depends = all(a > b for a, b in pairwise(lost))
     return compare(
         (printed.says("effect") == "to various degrees depending on its size") == depends,
-        f"a constant loses {', '.join(f'{part:.1g}' for part in lost)} of itself in a year, with six to ten digits",
-        note="section 5 takes a ramp for the signal: its slope, fitted over the year, loses up to "
-        f"{ramp:.2f} of itself with six digits",
+        (
+            "a constant signal loses these fractions of its value in a year, with six to ten digits: "
+            f"{', '.join(f'{part:.1g}' for part in lost)}"
+        ),
+        note="section 5 assumes that the signal is a ramp: its slope, fitted over the year, loses up to a "
+        f"fraction {ramp:.2f} of its value with six digits",
     )
 
 
@@ -69,9 +75,13 @@ def monitored() -> Finding:
     free = theory.off_tuned_drift(DRIFTS[0], error)
     reset = theory.phase_error_cost((DRIFTS[0], 0.0), error * PERIOD / 2)[1]
     return unverifiable(
-        "it would change the sample calculations, which let the phase run for a year: reset at every turn, six "
-        f"digits cost {reset:.2f} mas a year across the geodetic drift instead of {free:.0f}",
-        "the documents do not say how often and how well the sensor is read, nor whether it sets the phase too",
+        "monitoring would change the sample calculations, which do not reset the phase for a year: "
+        f"with a reset at every turn, six digits cause an error of {reset:.2f} mas a year "
+        f"perpendicular to the geodetic drift, instead of {free:.0f}",
+        (
+            "the documents do not say how often and how accurately the sensor is read, nor whether its "
+            "readings also reset the phase"
+        ),
     )
 
 
@@ -80,7 +90,10 @@ def finite_wordlength(printed: Statement) -> Finding:
     errors = [experiment.rounded_rate_error(PERIOD, fmt) for fmt in (SIX, TEN)]
     return compare(
         printed.says("register") == ("will cause" if all(errors) else "will not cause"),
-        f"ω_r of 600 s is off by {scientific(errors[0], 3)} rad/s at six digits and {scientific(errors[1], 3)} at ten",
+        (
+            f"for a roll period of 600 s, the rounding error of ω_r is {scientific(errors[0], 3)} rad/s "
+            f"with six digits and {scientific(errors[1], 3)} rad/s with ten"
+        ),
     )
 
 
@@ -117,7 +130,7 @@ def delta_omega_1(printed: Statement) -> Finding:
         first.left == first.right == second.right == second.left
         and math.isclose(worst, theory.worst_rate_error(PERIOD, SIX)),
         f"half a unit of the sixth place is {scientific(float(worst), 2)} rad/s",
-        note=f"the worst case; the actual rounding error of ω_r is {scientific(real, 4)}",
+        note=f"this is the worst case; the actual rounding error of ω_r is {scientific(real, 4)} rad/s",
     )
 
 
@@ -146,8 +159,8 @@ def quarter_turn(printed: Statement) -> Finding:
     (link,) = printed.links({"Deltaomega": offset, "t": YEAR, "pi": math.pi}, float)
     return compare(
         abs(link.left / link.right - 1) < 0.01 and offset * 0 == float(printed.says("start")),
-        f"{phase:.4f} rad, for $\\pi/2={math.pi / 2:.4f}$",
-        note=f"the worst case; with the actual rounding error of ω_r it is {real:.3f} rad",
+        f"the phase is {phase:.4f} rad, compared with $\\pi/2={math.pi / 2:.4f}$",
+        note=f"this is the worst case; with the actual rounding error of ω_r, the phase is {real:.3f} rad",
     )
 
 
@@ -160,9 +173,9 @@ def s_to_zero(printed: Statement) -> Finding:
         printed.number("cosine at the start").value == 2 * start
         and math.isclose(first.left, first.right)
         and abs(second.left - second.right) < 0.01,
-        f"by (11) from {start:g} s to {end:.3f} s",
+        f"by (11), the signal falls from {start:g} s to {end:.3f} s",
         Verdict.MISPRINT if math.isclose(start, 0.5) and abs(end) < 0.01 else Verdict.WRONG,
-        otherwise_note="the factor ½ of (11) is left out; it only scales",
+        otherwise_note="the factor ½ of (11) is missing; it only scales the signal",
     )
 
 
@@ -174,8 +187,9 @@ def severe(printed: Statement) -> Finding:
     judged = "very severe" if lost > 0.01 and across > DRIFTS[1] else "negligible"
     return compare(
         printed.says("errors") == judged,
-        f"with the actual rounding error of ω_r, {100 * lost:.0f} % of the signal is lost at the end of the year; in "
-        f"two dimensions the geodetic drift causes {across:.0f} mas a year across",
+        f"with the actual rounding error of ω_r, {100 * lost:.0f} % of the signal is lost at the end "
+        f"of the year; in two dimensions the geodetic drift causes an error of {across:.0f} mas a "
+        "year in the perpendicular direction",
     )
 
 
@@ -192,7 +206,9 @@ def delta_omega_2(printed: Statement) -> Finding:
         f"{scientific(float(worst), 2)} rad/s; the left side is {scientific(float(left), 2)}, the right side "
         f"{scientific(float(right), 2)}",
         Verdict.MISPRINT if right == worst else Verdict.WRONG,
-        otherwise_note="a zero is missing on the left; the right side, which is used, is right",
+        otherwise_note=(
+            "a zero is missing in the number on the left side; the right side, which is used later, is correct"
+        ),
     )
 
 
@@ -207,7 +223,7 @@ def period_2(printed: Statement) -> Finding:
         math.isclose(period, float(significand.replace(",", "")) * 10.0 ** int(power), rel_tol=1e-4),
         f"{scientific(period, 5)} s",
         Verdict.MISPRINT,
-        otherwise_note="a comma for the decimal point, by the author or the scan",
+        otherwise_note="a comma replaces the decimal point, due to the author or the scan",
     )
 
 
@@ -225,7 +241,7 @@ def cosine_2(printed: Statement) -> Finding:
     return compare(
         math.isclose(2 * math.pi / bare.left, years) and prints_side(link.left, printed.relation(), *PRINTED),
         f"{math.cos(2 * math.pi / years):.11f}",
-        note="chopped to nine digits",
+        note="the printed number is chopped to nine digits",
     )
 
 
@@ -242,9 +258,12 @@ def negligible(printed: Statement) -> Finding:
     across = [experiment.clean_drift_error((DRIFTS[0], 0.0), partial(np.multiply, e))[1] for e in (worst, real)]
     return compare(
         printed.says("effect") == ("negligible" if max(across) < ALLOWED else "not negligible"),
-        f"in two dimensions the geodetic drift causes {across[0]:.2f} mas a year across in the worst case, and "
-        f"{across[1]:.2f} with the actual rounding error of ω_r",
-        otherwise_note=f"negligible in one dimension only; hung1982 allows a single error {ALLOWED} mas",
+        f"in two dimensions the geodetic drift causes an error of {across[0]:.2f} mas a year in the "
+        f"perpendicular direction in the worst case, and {across[1]:.2f} with the actual rounding "
+        "error of ω_r",
+        otherwise_note=(
+            f"the error is negligible in one dimension only; hung1982 allows {ALLOWED} mas for a single error"
+        ),
         root=ONE_DIMENSION,
     )
 
@@ -259,5 +278,8 @@ def conclusion(printed: Statement) -> Finding:
     judged = "can be eliminated" if across[enough] < ALLOWED else "cannot be eliminated"
     return compare(
         printed.says("problem") == judged,
-        f"from {enough} digits on the worst case in two dimensions is below {ALLOWED} mas a year: {across[enough]:.2f}",
+        (
+            f"with {enough} or more digits, the worst case in two dimensions is below {ALLOWED} mas a "
+            f"year: {across[enough]:.2f}"
+        ),
     )

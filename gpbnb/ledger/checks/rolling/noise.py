@@ -20,7 +20,7 @@ from gpbnb.rolling.theory import DRIFTS, FLOWN_DENSITY, LEVEL, PERIOD, PERIOD_FL
 
 @CHECKS.add(entry("s5.ramp-signal"))
 def ramp_signal() -> Finding:
-    return given("the model of the relativistic signal")
+    return given("this is the model of the relativistic signal")
 
 
 @CHECKS.add(entry("s5.ramp-transform"))
@@ -33,7 +33,9 @@ def ramp_transform(printed: Statement) -> Finding:
         bool(sp.simplify(link.left - link.right) == 0),
         "$-k/\\omega^2+i\\pi k\\,\\delta'(\\omega)$",
         Verdict.MISPRINT if sp.simplify(sp.Abs(link.left) - link.right) == 0 else Verdict.WRONG,
-        otherwise_note="the sign, and the part at zero frequency; the next line uses only the magnitude",
+        otherwise_note=(
+            "the sign is wrong and the part at zero frequency is missing; the next line uses only the magnitude"
+        ),
     )
 
 
@@ -49,10 +51,11 @@ def ramp_density(printed: Statement) -> Finding:
     slopes = [float(np.diff(np.log(d))[0] / np.log(10)) for d in (record, densities)]
     return compare(
         bool(np.all(abs(np.array(densities) / record - 1) < 0.01)),
-        f"for a year's record, from 10 to 100 cycles a year, the density falls with the power {slopes[0]:.2f} of "
-        f"frequency, not {slopes[1]:.2f}: $2k^2T/\\omega^2$",
-        otherwise_note="$k^2/\\omega^4$ is the squared magnitude of a transform, not a power density, and belongs to "
-        "an endless ramp; a record ends with a jump, and its spectrum reaches much farther",
+        "for a record of a year, from 10 to 100 cycles a year, the density varies with frequency to "
+        f"the power {slopes[0]:.2f}, not {slopes[1]:.2f}: $2k^2T/\\omega^2$",
+        otherwise_note="$k^2/\\omega^4$ is the squared magnitude of a transform, not a power density, and describes "
+        "an endless ramp; a record of finite length ends with a jump, so its spectrum falls much "
+        "more slowly",
         root="ramp-density-from-endless-ramp",
     )
 
@@ -68,14 +71,17 @@ def spread(printed: Statement) -> Finding:
     found = "nonzero" if math.isclose(beside, math.pi**-2) else "zero"
     return compare(
         printed.says("spread") == found,
-        f"half of its peak at {half:.3f} cycles a record, $\\delta\\omega={2 * math.pi * half:.2f}/T$",
-        note="so the length of the record sets it",
+        (
+            f"the spectrum falls to half of its peak at {half:.3f} cycles per record, or "
+            f"$\\delta\\omega={2 * math.pi * half:.2f}/T$"
+        ),
+        note="the length of the record thus determines the spread",
     )
 
 
 @CHECKS.add(entry("s5.figure-iii-3-a"), entry("s5.figure-iii-3-b"))
 def pictures() -> Finding:
-    return unverifiable("drawn again from simulated data", f"{LOST}; {CHAPTER}")
+    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; see the {CHAPTER}")
 
 
 @CHECKS.add(entry("s5.inphase-noise"))
@@ -87,7 +93,7 @@ def inphase_noise(printed: Statement) -> Finding:
     return compare(
         printed.says("noise") == shifted,
         f"the derolled noise at low frequency is ${level:.2f}\\pm{error:.2f}$ times $S(f_r)$",
-        note="both components, in phase and in quadrature, since there are two readouts",
+        note="both the in-phase and the quadrature components are shifted, since there are two readouts",
     )
 
 
@@ -100,8 +106,8 @@ def not_completely(printed: Statement) -> Finding:
     stays = bool(np.all(study.error > 4 * study.uncertainty) and error > 0 and rate > 0)
     return compare(
         printed.says("noise") == ("cannot be suppressed completely" if stays else "can be suppressed completely"),
-        f"at 200 mas/√Hz at the roll frequency, {error:.2f} mas remain after the best low-pass filter, and {rate:.3f} "
-        "mas a year after a fit over the year",
+        f"for noise of 200 mas/√Hz at the roll frequency, {error:.2f} mas remain after the best "
+        f"low-pass filter, and {rate:.3f} mas a year after a fit over the year",
     )
 
 
@@ -117,7 +123,10 @@ def optimum_exists(printed: Statement) -> Finding:
     return compare(
         printed.says("choice") == ("an optimum choice" if one else "every choice"),
         f"$B=\\sqrt[3]{{k^2/(8N_0)}}={closed:.3g}$ Hz by the formula, {best:.3g} Hz by search",
-        note="if the ramp is read after the filter; a fit over the record needs no such choice",
+        note=(
+            "the claim holds if the ramp is read from the output of the filter; a fit over the record "
+            "needs no choice of bandwidth"
+        ),
     )
 
 
@@ -130,13 +139,14 @@ def optimum() -> Finding:
     snr = float(theory.signal_to_noise(DRIFTS[0], YEAR, poles[1]))
     return answer(
         bool(worst < 4 and np.argmin(poles) == 1),
-        f"simulated rms errors at a third of the optimum, at it and at three times it: "
-        f"{', '.join(f'{math.sqrt(p):.2f}' for p in poles)} mas, off theory by at most {worst:.1f} standard errors; "
-        f"over a year a signal-to-noise ratio of {10 * math.log10(snr):.0f} dB at {least:.2f} mas",
-        f"{CHAPTER}, section on noise within the band",
+        "the simulated rms errors at a third of the optimum bandwidth, at the optimum and at three "
+        f"times the optimum are {', '.join(f'{math.sqrt(p):.2f}' for p in poles)} mas, within "
+        f"{worst:.1f} standard errors of theory; over a year, the signal-to-noise ratio is "
+        f"{10 * math.log10(snr):.0f} dB at an error of {least:.2f} mas",
+        f"see the {CHAPTER}, section on noise within the band",
     )
 
 
 @CHECKS.add(entry("s6.references"))
 def references() -> Finding:
-    return unverifiable("", "the two works cited are not among the documents")
+    return unverifiable("", "the two cited works are not among the documents")

@@ -24,10 +24,14 @@ def no_direct_error(printed: Statement) -> Finding:
     return compare(
         printed.says("error")
         == ("does not directly introduce any error" if harmless else "directly introduces an error"),
-        f"in two dimensions one degree turns the geodetic drift into {cost[1]:.1f} mas a year of frame dragging and "
-        f"changes the geodetic drift by {cost[0]:.2f}; for a milliarcsecond a year the roll angle must be known to "
+        f"in two dimensions, a phase error of one degree turns {cost[1]:.1f} mas a year of the "
+        "geodetic drift into apparent frame dragging and changes the geodetic drift by "
+        f"{cost[0]:.2f}; for an error of one milliarcsecond a year, the roll angle must be known to "
         f"{limit:.0f} arcseconds",
-        otherwise_note="true for the strength in one dimension; in two dimensions a phase error mixes the drifts",
+        otherwise_note=(
+            "the claim is true for the signal strength in one dimension; in two dimensions a phase error "
+            "mixes the drifts"
+        ),
         root=ONE_DIMENSION,
     )
 
@@ -44,10 +48,11 @@ def signal_to_noise(printed: Statement) -> Finding:
     predicted = abs(kept[1] - math.cos(angles[1]) ** 2) < 1e-3 and abs(kept[2] / math.cos(angles[2]) ** 2 - 1) < 0.05
     return compare(
         bool(predicted and printed.says("ratio") == ("a reduction" if kept[2] < 1 else "an increase")),
-        f"in one dimension {kept[1]:.4f} of it is left at one degree and {kept[2]:.3f} at sixty: $\\cos^2\\theta$, as "
-        "the noise does not change",
-        note="in one dimension. In two nothing is lost: at sixty degrees the strength of both drifts together is "
-        f"{math.hypot(*pair) / math.hypot(*DRIFTS):.3f} of what it was; only their direction is wrong",
+        f"in one dimension, a fraction {kept[1]:.4f} of the ratio remains at one degree and "
+        f"{kept[2]:.3f} at sixty: $\\cos^2\\theta$, since the noise does not change",
+        note="the claim holds in one dimension. In two dimensions nothing is lost: at sixty degrees the "
+        f"combined strength of both drifts is {math.hypot(*pair) / math.hypot(*DRIFTS):.3f} times its "
+        "original value; only their direction is wrong",
     )
 
 
@@ -59,7 +64,7 @@ def one_degree(printed: Statement) -> Finding:
     lost = math.sin(math.radians(_DEGREES[printed.says("angle")])) ** 2
     return compare(
         lost < 0.0004,
-        f"$1-\\cos^21°={math.sin(math.radians(1)) ** 2:.6f}$ at one degree, below the .0004 that follow",
+        (f"at one degree, $1-\\cos^21°={math.sin(math.radians(1)) ** 2:.6f}$, below the value .0004 in the next line"),
     )
 
 
@@ -76,7 +81,7 @@ def cos_5(printed: Statement) -> Finding:
         agrees,
         f"$1-\\cos^25°={five:.4f}$; $1-\\cos^21°={one:.4f}$",
         Verdict.MISPRINT if one < 0.0004 < five else Verdict.WRONG,
-        otherwise_note="5° for 1°, by the author or the scan: .9998 is the cosine of one degree",
+        otherwise_note="5° stands for 1°, due to the author or the scan: .9998 is the cosine of one degree",
     )
 
 
@@ -87,7 +92,7 @@ def printed_cosine(printed: Statement) -> Finding:
     return compare(
         prints_side(float(link.left), printed.relation(), *PRINTED) and prints_as(cosine, ".9998", *PRINTED),
         f"$1-.9998^2={1 - 0.9998**2:.8f}$; $\\cos1°={cosine:.6f}$",
-        note=f"from the full cosine, {1 - cosine**2:.4f}",
+        note=f"the unrounded cosine gives {1 - cosine**2:.4f}",
     )
 
 
@@ -96,13 +101,13 @@ def less_than(printed: Statement) -> Finding:
     lost = 100 * math.sin(math.radians(1)) ** 2
     limit = printed.number("limit").value
     rounded = sp.Rational(round((1 - sp.Rational(9998, 10**4) ** 2) * 10**4), 10**2)  # .0004, in percent
-    return compare(bool(lost < limit == rounded), f"{lost:.4f} % of the power", note="in one dimension")
+    return compare(bool(lost < limit == rounded), f"the loss is {lost:.4f} % of the power", note="in one dimension")
 
 
 @CHECKS.add(entry("s3.synchronisation-claim"))
 def synchronisation() -> Finding:
     limit = math.degrees(theory.largest_phase(DRIFTS, 1.0)) * 3600
     return unverifiable(
-        f"one degree is not enough: an error below a milliarcsecond a year needs {limit:.0f} arcseconds",
+        f"one degree is not enough: an error below one milliarcsecond a year requires {limit:.0f} arcseconds",
         "the documents do not give the accuracy of the star sensor",
     )

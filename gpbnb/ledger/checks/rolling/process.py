@@ -29,7 +29,7 @@ from gpbnb.rolling import derivation, experiment, theory
 from gpbnb.rolling.theory import DRIFTS, LEVEL, PERIOD, PERIOD_FLOWN
 
 Names = dict[str, Any]
-LOST = "the picture is missing from the scan, which keeps only its caption"
+LOST = "the scan has lost the picture and keeps only its caption"
 
 
 # -- cases ----------------------------------------------------------------------------------------
@@ -112,8 +112,9 @@ def density_of_noise(printed: Statement) -> Finding:
     place = "near the zero frequency" if heaviest else "elsewhere"
     return compare(
         bool(abs(slope.value - _SLOPES[printed.says("density")]) < 3 * slope.error and printed.says("place") == place),
-        f"the generated noise has a slope of ${slope.value:.3f}\\pm{slope.error:.3f}$ over {slope.decades:.1f} "
-        "decades; it and the signal are both heaviest at the lowest frequency",
+        f"the generated noise has a slope of ${slope.value:.3f}\\pm{slope.error:.3f}$ over "
+        f"{slope.decades:.1f} decades; both the noise and the signal are strongest at the lowest "
+        "frequency",
         note="the $1/f$ law itself is assumed; no document gives its strength",
     )
 
@@ -122,10 +123,11 @@ def density_of_noise(printed: Statement) -> Finding:
 def hard_to_extract() -> Finding:
     error = theory.drift_error_unrolled(LEVEL)
     return unverifiable(
-        f"without rolling the standard error of a year's drift is $3\\sqrt{{A}}/T={error:.0f}$ mas a year, "
-        f"for {math.sqrt(LEVEL * PERIOD_FLOWN):.0f} mas/√Hz at {PERIOD_FLOWN} s; frame dragging is {DRIFTS[1]:.0f}, "
-        f"the geodetic drift {DRIFTS[0]:.0f}",
-        "the strength of the noise is not in the documents; the error scales with its amplitude",
+        f"without rolling the standard error of a year's drift is $3\\sqrt{{A}}/T={error:.0f}$ mas a "
+        f"year, for noise of {math.sqrt(LEVEL * PERIOD_FLOWN):.0f} mas/√Hz at a period of "
+        f"{PERIOD_FLOWN} s; frame dragging is {DRIFTS[1]:.0f} mas a year, and the geodetic drift is "
+        f"{DRIFTS[0]:.0f}",
+        "the documents do not give the strength of the noise; the error scales with its amplitude",
     )
 
 
@@ -133,8 +135,9 @@ def hard_to_extract() -> Finding:
 def before_noise() -> Finding:
     early, late = theory.drift_error_unrolled(LEVEL), theory.drift_error_rolled(LEVEL, PERIOD)
     return unverifiable(
-        "the gain from rolling rests on it: noise that arises before the roll is derolled with the signal and would "
-        f"leave a standard error of {early:.0f} mas a year in our example; noise after it leaves {late:.2f}",
+        "the gain from rolling depends on this assumption: noise that rolls with the signal is "
+        f"derolled with it and would leave a standard error of {early:.0f} mas a year in our example; "
+        f"noise that is added to the rolled signal leaves {late:.2f}",
         "the documents do not say where in the readout the noise arises",
     )
 
@@ -148,15 +151,19 @@ def much_less(printed: Statement) -> Finding:
     judged = "much less" if ratio > 100 else "much more" if ratio < 0.01 else "the same"
     return compare(
         printed.says("density") == judged,
-        f"the density at a cycle a year is {year:.0f} times that at a roll period of {PERIOD:g} s; "
-        f"{simulated:.0f} times in a simulated record of {found.duration / PERIOD:.0f} turns, from its lowest band",
-        note="the ratio is the number of turns, for noise that follows the $1/f$ law down to a cycle a year",
+        f"the density at one cycle a year is {year:.0f} times that at the roll frequency for a period "
+        f"of {PERIOD:g} s; in the lowest band of a simulated record of {found.duration / PERIOD:.0f} "
+        f"turns it is {simulated:.0f} times as large",
+        note=(
+            "the ratio equals the number of turns in a year, if the noise follows the $1/f$ law down to "
+            "one cycle a year"
+        ),
     )
 
 
 @CHECKS.add(entry("s1.figure-iii-1-a"), entry("s1.figure-iii-1-b"), entry("s1.figure-iii-2"))
 def pictures() -> Finding:
-    return unverifiable("drawn again from simulated data", f"{LOST}; {CHAPTER}")
+    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; see the {CHAPTER}")
 
 
 @CHECKS.add(entry("s1.equivalent-modulation"))
@@ -170,14 +177,14 @@ def equivalent(printed: Statement) -> Finding:
     undone = "demodulation" if error[0] < 1e-12 * np.max(abs(found["signal"])) < error[1] else "modulation"
     return compare(
         bool(printed.says("rolling") == moved and printed.says("derolling") == undone),
-        f"rolling is $z\\to ze^{{-i\\omega_rt}}$ and moves the spectrum of 20 turns to {peak:.0f} cycles; derolling "
-        "moves it back, to twelve digits",
+        "rolling is $z\\to ze^{-i\\omega_rt}$ and moves the spectrum of a record of 20 turns to "
+        f"{peak:.0f} cycles; derolling moves it back, to twelve digits",
     )
 
 
 @CHECKS.add(entry("s1.carriers"), *(entry(e) for e in ("eq1", "eq2", "eq9", "eq6")))
 def definitions() -> Finding:
-    return given("the model: carriers, rolled signal and measured signal")
+    return given("states the model: carriers, rolled signal and measured signal")
 
 
 @CHECKS.add(entry("eq3"))
@@ -186,9 +193,9 @@ def eq3(printed: Statement) -> Finding:
     ends = all(vanishes(group[0].left - group[-1].right) for group in links)
     return compare(
         all(hold(group) for group in links),
-        "first and last line are equal; the middle one lacks the factor $\\cos\\omega_rt$ of the signal",
+        ("the first and the last line are equal; the middle line lacks the factor $\\cos\\omega_rt$ of the signal"),
         Verdict.MISPRINT if ends else Verdict.WRONG,
-        otherwise_note="the last line, which is used, is right",
+        otherwise_note="the last line, which is used later, is right",
     )
 
 
@@ -199,8 +206,8 @@ def eq4(printed: Statement) -> Finding:
     )
     return compare(
         agrees,
-        "the mean of the signal over a turn",
-        note="for the signal; the noise near $\\omega_r$ passes the same filter, as section 5 says",
+        "this is the mean of the signal over a turn",
+        note="the equation holds for the signal; noise near $\\omega_r$ passes the same filter, as section 5 says",
     )
 
 
@@ -235,15 +242,15 @@ def eq5(printed: Statement) -> Finding:
         )
         for names in signals()
     )
-    return compare(agrees, "the pair as a complex number, times $e^{-i\\omega_rt}$")
+    return compare(agrees, "the operation multiplies the pair, as a complex number, by $e^{-i\\omega_rt}$")
 
 
 @CHECKS.add(entry("eq7"))
 def eq7(printed: Statement) -> Finding:
     return compare(
         all(hold(printed.links(names)) for names in signals()),
-        "the measured pair as a complex number, times $e^{i\\omega_rt}$",
-        note="with readouts of unequal gain the signal keeps a term at $2\\omega_r$",
+        "the operation multiplies the measured pair, as a complex number, by $e^{i\\omega_rt}$",
+        note="if the readouts have unequal gains, a term at $2\\omega_r$ remains in the signal",
     )
 
 
@@ -261,9 +268,10 @@ def recursively(printed: Statement) -> Finding:
     found, recursive = recursion()
     return compare(
         recursive and printed.says("deroll") == "a recursively computed",
-        f"each matrix is that of the sample before times a fixed one; in ten digits the product is off by "
-        f"{scientific(found.size[0], 2)} after a turn of {PERIOD:g} s and {scientific(found.size[1], 2)} after 60",
-        note=f"(7) itself shows no recursion and can be computed without one; the {CHAPTER} compares the two",
+        "each matrix is the matrix of the previous sample times a fixed matrix; in ten digits the "
+        f"error of the product is {scientific(found.size[0], 2)} after a turn of {PERIOD:g} s and "
+        f"{scientific(found.size[1], 2)} after 60 turns",
+        note=f"(7) itself shows no recursion and can be computed without it; the {CHAPTER} compares the two ways",
     )
 
 
@@ -278,9 +286,12 @@ def eq8(printed: Statement) -> Finding:
     )
     return compare(
         bool(agrees and printed.says("kept") == kept),
-        "drifts of $2\\times10^6$ and $10^6$ mas a year come back as "
-        f"{scientific(rates[0], 7)} and {scientific(rates[1], 7)}",
-        note=f"for the signal; a noise density of {scientific(band, 2)} mas²/Hz, $S(f_r)$, stays in the band",
+        f"drifts of $2\\times10^6$ and $10^6$ mas a year are recovered as {scientific(rates[0], 7)} "
+        f"and {scientific(rates[1], 7)}",
+        note=(
+            f"the claim holds for the signal; a noise density of {scientific(band, 2)} mas²/Hz, $S(f_r)$, "
+            "remains in the band"
+        ),
     )
 
 
@@ -301,7 +312,7 @@ def five_sources(printed: Statement) -> Finding:
     return compare(
         printed.says("sources") == judged,
         "; ".join(f"{name}: {value:.3g}" for name, value in found.items()) + " (mas a year)",
-        note="the $1/T$ of the third is $1/f$; unequal gains of the readouts are a sixth source",
+        note="the $1/T$ in the third source means $1/f$; unequal gains of the readouts are a sixth source",
     )
 
 
@@ -312,10 +323,10 @@ def one_over_t(printed: Statement) -> Finding:
     falls = math.isclose(long / short, 2) and abs(slope.value + 1) < 3 * slope.error
     return compare(
         printed.says("law") == ("1/f" if falls else "1/T"),
-        f"half the roll period divides the density of $1/f$ noise at the roll frequency by {long / short:g}; "
-        "noise with a $1/T$ law would double",
+        "halving the roll period divides the density of $1/f$ noise at the roll frequency by "
+        f"{long / short:g}; noise with a $1/T$ law would double",
         Verdict.MISPRINT,
-        otherwise_note="T for f, by the author or the scan; $1/f$ in all other places",
+        otherwise_note="T stands for f, due to the author or the scan; all other places have $1/f$",
     )
 
 
@@ -329,8 +340,8 @@ def sources_4_and_5() -> Finding:
     walks = max(abs(deviation(s, e, e / math.sqrt(400))) for s, e in zip(sizes, theory_sizes, strict=True))
     return answer(
         bool(filters < 4 and walks < 4),
-        f"simulation and theory differ by at most {filters:.1f} standard errors for filters and {walks:.1f} for a roll "
-        "rate that is a random walk; there resetting the phase every 60000 s lowers the error "
-        f"{theory_sizes[0] / theory_sizes[1]:.0f} times",
-        f"{CHAPTER}, sections on filters and on an uneven roll rate",
+        f"simulation and theory differ by at most {filters:.1f} standard errors for filters and "
+        f"{walks:.1f} for a roll rate that is a random walk; for the random walk, resetting the phase "
+        f"every 60000 s reduces the error by a factor of {theory_sizes[0] / theory_sizes[1]:.0f}",
+        f"see the {CHAPTER}, sections on filters and on an uneven roll rate",
     )

@@ -68,7 +68,8 @@ class Judgement:
     def __str__(self) -> str:
         if not self.loose:
             return self.count
-        return f"{self.count}, none of which attains {'the bound' if len(self.loose) == 1 else 'the bounds'}"
+        never = f"{'the bound is' if len(self.loose) == 1 else 'the bounds are'} never attained"
+        return f"{self.count}, {'but' if self.holds else 'and'} {never}"
 
 
 def relations(printed: Statement) -> tuple[Relation, ...]:
@@ -244,7 +245,8 @@ def surveyed(trial: str, bound: str) -> tuple[bool, str]:
     """Whether a survey found no violation of a bound, and its result."""
     found = surveyed_bounds(trial)[bound]
     return found.violations == 0, (
-        f"{found.violations} violations in {found.trials} random trials, largest error over bound {found.largest:.3g}"
+        f"{found.violations} violations in {found.trials} random trials, with a largest ratio of "
+        f"error to bound of {found.largest:.3g}"
     )
 
 

@@ -37,10 +37,14 @@ def approach(printed: Statement) -> Finding:
     bounds = "violated" if strict.violations else tight
     return compare(
         printed.says("statistics") == statistics and printed.says("bounds") == bounds,
-        f"a law that should fail in 1 % fails in {constant:.0%} of the rounded sums of 1000 equal terms, and in "
-        f"{varied:.0%} where the terms vary; the strict bound of an inner product fails in {strict.violations} of "
-        f"{strict.trials} trials, and the median error is {strict.median:.1%} of it",
-        note="statistics fail where the rounding errors have a mean; the bounds hold but are pessimistic",
+        f"a statistical bound designed to fail in 1 % of cases fails in {constant:.0%} of the rounded "
+        f"sums of 1000 equal terms, and in {varied:.0%} if the terms vary; the strict bound for an "
+        f"inner product fails in {strict.violations} of {strict.trials} trials, and the median error "
+        f"is {strict.median:.1%} of the bound",
+        note=(
+            "the statistical bound fails where the mean of the rounding errors is not zero; the strict "
+            "bounds hold but are pessimistic"
+        ),
     )
 
 
@@ -50,8 +54,8 @@ def not_easy(printed: Statement) -> Finding:
     easy = "not easy" if (varied > 0.01) != (constant > 0.01) else "easy"
     return compare(
         printed.says("statistics") == easy,
-        f"a law for independent rounding errors, meant to fail in 1 % of the sums, fails in {varied:.0%} where the "
-        f"terms vary and in {constant:.0%} where they are equal",
+        "a statistical bound for independent rounding errors, designed to fail in 1 % of the sums, "
+        f"fails in {varied:.0%} if the terms vary and in {constant:.0%} if they are equal",
         note="the statistics of the errors depend on the data",
     )
 
@@ -60,13 +64,18 @@ def not_easy(printed: Statement) -> Finding:
 def only_rounding() -> Finding:
     return unverifiable(
         "",
-        "this is about the computers of 1982, and the report names no source; section 4 treats chopping nevertheless",
+        (
+            "the claim is about the computers of 1982, and the report names no source; section 4 "
+            "nevertheless treats chopping"
+        ),
     )
 
 
 @CHECKS.add(*both("s1.claim-background"), *both("s1.claim-main-activity"))
 def background() -> Finding:
-    return unverifiable("", "this is about the literature or the mission's plans, and the report names no source")
+    return unverifiable(
+        "", "the claim is about the literature or the plans for the mission, and the report names no source"
+    )
 
 
 @CHECKS.add(*both("s1.claim-rounding-or-chopping"))
@@ -76,10 +85,10 @@ def rounding_or_chopping(printed: Statement) -> Finding:
     need = "requires" if longer and products else "works without"
     return compare(
         printed.says("need").startswith(need),
-        f"{len(longer)} of {len(samples())} sampled numbers and {len(products)} of {30 * 30} products of numbers of "
-        "four digits have more than four digits",
-        note="other rules exist, such as ties to even, rounding up, or rounding at random; each of them takes a "
-        "neighbouring number, so bound (8) or bound (13) applies to it",
+        f"{len(longer)} of {len(samples())} sampled numbers and {len(products)} of {30 * 30} products "
+        "of four-digit numbers have more than four digits",
+        note="other rules exist, such as ties to even, rounding up, or stochastic rounding; each of them "
+        "returns a neighbouring number, so bound (8) or bound (13) holds",
     )
 
 
@@ -96,10 +105,11 @@ def small_sample(printed: Statement) -> Finding:
     deviation = "a good deal" if min(spread, mean) > 0.25 else "very little"
     return compare(
         printed.says("deviation") == deviation and deviation == "a good deal",
-        f"for {n} normal deviates the sample standard deviation scatters by {spread:.0%} of the true value and the "
-        f"mean by {mean:.0%}; for 1000 deviates, by {scatter(1000):.1%} and {1 / math.sqrt(1000):.1%}",
-        note="true, but no argument against statistics: a probabilistic bound concerns the many roundings of one run, "
-        "not a sample of gyros",
+        f"for {n} normal deviates, the sample standard deviation scatters by {spread:.0%} of the true "
+        f"standard deviation and the sample mean by {mean:.0%}; for 1000 deviates, by "
+        f"{scatter(1000):.1%} and {1 / math.sqrt(1000):.1%}",
+        note="the claim is true but no argument against statistics: a probabilistic bound concerns the "
+        "many roundings of one run, not a sample of gyros",
     )
 
 
@@ -112,8 +122,9 @@ def more_reliable(printed: Statement) -> Finding:
     found = "more reliable" if violations / trials < 0.01 < constant else "less reliable"
     return compare(
         printed.says("reliability") == found,
-        f"the strict bounds of sums, products, inner products and chains fail in {violations} of {trials} trials; a "
-        f"law that should fail in 1 % fails in {constant:.0%} of the sums of equal terms",
-        note=f"true of proved bounds; the printed (31) fails in {chain.violations} of {chain.trials} trials, and this "
-        "report builds on it",
+        f"the strict bounds of sums, products, inner products and chains fail in {violations} of "
+        f"{trials} trials; a statistical bound designed to fail in 1 % of cases fails in "
+        f"{constant:.0%} of the sums of equal terms",
+        note=f"the claim is true of proved bounds; but the printed bound (31) fails in {chain.violations} "
+        f"of {chain.trials} trials, and the report relies on it",
     )

@@ -30,36 +30,37 @@ def vector_norm(vector: Matrix) -> Fraction:
 
 def _matrix(value: object) -> Matrix:
     if not isinstance(value, Matrix):
-        raise TypeError(f"got {value!r}; a norm needs a vector or a matrix")
+        raise TypeError(f"got {value!r}; needed a vector or a matrix")
     return value
 
 
 @CHECKS.add(*both("eq21"))
 def vector_norm_defined() -> Finding:
-    return given("the definition of the norm of a vector: its largest entry")
+    return given("defines the norm of a vector: its largest absolute entry")
 
 
 def _incompatible() -> str:
     a, x = exact([[1, 1], [0, 0]]), exact([1, 1])
     return (
-        f"for rows (1, 1), (0, 0) and $x=(1,1)$, $\\|Ax\\|={max_norm(a @ x)}$, but $\\|A\\|\\|x\\|="
-        f"{column_sum_norm(a) * max_norm(x)}$ by columns and {row_sum_norm(a) * max_norm(x)} by rows"
+        f"for the matrix with rows (1, 1), (0, 0) and $x=(1,1)$, $\\|Ax\\|={max_norm(a @ x)}$, but "
+        f"$\\|A\\|\\|x\\|={column_sum_norm(a) * max_norm(x)}$ with column sums and "
+        f"{row_sum_norm(a) * max_norm(x)} with row sums"
     )
 
 
 @CHECKS.add("hung1984.II.eq22")
 def matrix_norm_defined() -> Finding:
     return given(
-        "the definition of the norm of a matrix: the largest sum over a column. It is not compatible with (21), which "
-        f"needs the sums over rows: {_incompatible()}"
+        "defines the norm of a matrix as the largest column sum. It is not compatible with the "
+        f"vector norm (21), which requires row sums: {_incompatible()}"
     )
 
 
 @CHECKS.add("hung1982.III.eq22")
 def matrix_norm_defined_1982() -> Finding:
     return given(
-        "the definition of the norm of a matrix; the indices are not legible. hung1984 takes the largest sum over a "
-        f"column, which is not compatible with (21): {_incompatible()}"
+        "defines the norm of a matrix; the indices are not legible. hung1984 uses the largest column "
+        f"sum, which is not compatible with the vector norm (21): {_incompatible()}"
     )
 
 
@@ -87,7 +88,7 @@ def _norm_properties(printed: Statement, size: Callable[[Matrix], Fraction], sha
     only = zeros == {False} and "only if" in printed.says("zero")
     return compare(
         found.right and only,
-        f"{found}; the norm is zero for {'zero alone' if zeros == {False} else 'other arrays too'}",
+        f"{found}; the norm is zero {'only for zero' if zeros == {False} else 'for other arrays too'}",
     )
 
 
@@ -109,9 +110,9 @@ def norm_property_v(printed: Statement) -> Finding:
     at_most = sum(left <= right for left, right in products)
     return compare(
         found.right,
-        f"as printed it {found}; with $\\le$ it holds in {at_most}",
+        f"the printed relation {found}; with $\\le$ it holds in {at_most}",
         Verdict.OCR if at_most == len(instances) else Verdict.WRONG,
-        otherwise_note="$\\le$ is meant, and printed in hung1984; the scan reads the $\\le$ of (13) as = too",
+        otherwise_note="$\\le$ is meant, as hung1984 prints it; the scan also shows the $\\le$ of (13) as =",
     )
 
 
@@ -120,7 +121,7 @@ def norm_property_v(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("eq23"))
 def sum_error_defined() -> Finding:
-    return given("the definition of the error matrix of a sum")
+    return given("defines the error matrix of a sum")
 
 
 @cache
@@ -150,7 +151,9 @@ def rounded_sums() -> tuple[dict[str, Any], ...]:
 def matrix_sum(printed: Statement) -> Finding:
     found = judge(relations(printed), rounded_sums())
     holds, text = surveyed("matrix sum", "(24)")
-    return compare(found.right and holds, f"{found}; {text}", note="strict: it holds for each entry, by (16)")
+    return compare(
+        found.right and holds, f"{found}; {text}", note="the bound is strict: by (16), it holds for each entry"
+    )
 
 
 @CHECKS.add(*both("s8.claim-same-as-16"))
@@ -173,6 +176,6 @@ def beta_after_24(printed: Statement) -> Finding:
         found.right,
         f"$\\beta={beta / step}\\,b^{{1-t}}$, measured; the printed formula {found}",
         Verdict.OCR,
-        otherwise_note="hung1982 prints $\\frac12$; this scan reads other figures and letters as $\\epsilon$ too, "
+        otherwise_note="hung1982 prints $\\frac12$; this scan also shows other digits and letters as $\\epsilon$, "
         "such as the l of $fl$ in section 11",
     )

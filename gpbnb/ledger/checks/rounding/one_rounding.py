@@ -42,17 +42,17 @@ def derived() -> bool:
 
 @CHECKS.add(*both("eq4"), "hung1984.II.eq7", "hung1984.II.eq12")
 def error_defined() -> Finding:
-    return given("the definition of an error; the relative errors (7) and (12) need $x\\ne0$")
+    return given("defines an error; the relative errors (7) and (12) require $x\\ne0$")
 
 
 @CHECKS.add("hung1984.II.eq9")
 def chopping_defined() -> Finding:
-    return given("the definition of a chopped number")
+    return given("defines a chopped number")
 
 
 @CHECKS.add("hung1984.II.eq15")
 def operation_error_defined() -> Finding:
-    return given("the definition of the relative error of one operation; (16) bounds it")
+    return given("defines the relative error of one operation, which (16) bounds")
 
 
 @CHECKS.add("hung1984.II.eq5", "hung1984.II.eq6", "hung1984.II.eq8")
@@ -60,7 +60,7 @@ def rounding_bound(printed: Statement) -> Finding:
     found = judge(relations(printed), all_numbers())
     return compare(
         found.right and derived(),
-        f"{found}, and the bound is attained to within 1 %",
+        f"{found}, and the largest error is within 1 % of the bound",
         note="the largest relative error is $\\beta/(1+\\beta)$, so (8) itself is never reached"
         if printed.id.endswith("eq8")
         else "",
@@ -73,7 +73,7 @@ def chopping_bound(printed: Statement) -> Finding:
     bounded = any("<=" in relation.text for relation in relations(printed))
     return compare(
         found.right and derived(),
-        f"{found}{', and the bound is attained to within 1 %' if bounded else ''}",
+        f"{found}{', and the largest error is within 1 % of the bound' if bounded else ''}",
     )
 
 
@@ -82,7 +82,10 @@ def chopping_doubles(printed: Statement) -> Finding:
     found = judge(relations(printed), all_numbers())
     return compare(
         found.right,
-        f"$\\beta_c/\\beta=2$ in {len(FORMATS)} formats, with both measured as the gap above 1 and half of it",
+        (
+            f"$\\beta_c/\\beta=2$ in {len(FORMATS)} formats, with $\\beta_c$ measured as the gap above 1 "
+            "and β as half of this gap"
+        ),
     )
 
 
@@ -98,10 +101,10 @@ def reference_1(printed: Statement) -> Finding:
     u, e = forms[-1]
     return compare(
         cited.holds,
-        f"by (1) alone 765.4 is also ${float(u):g}\\times10^{{{e}}}$; the inequality {by_1.count}, but "
-        f"with the condition $|u|\\ge1/b$ below (2) it {by_2.count}",
+        f"(1) alone would allow 765.4 to be written as ${float(u):g}\\times10^{{{e}}}$; the "
+        f"inequality then {by_1.count}, but with the condition $|u|\\ge1/b$ below (2) it {by_2.count}",
         Verdict.MISPRINT if by_2.holds else Verdict.WRONG,
-        otherwise_note="(2) is meant: (1) has no $u$, and does not say that $d_1\\ne0$",
+        otherwise_note="(2) is meant, because (1) has no $u$ and does not require $d_1\\ne0$",
     )
 
 
@@ -119,7 +122,7 @@ def claim_before_6(printed: Statement) -> Finding:
         literal.right and rest.right and sign,
         f"$u\\ge1/b$ {literal}; $|u|\\ge1/b$ {meant}; each of the other two inequalities {rest}",
         Verdict.MISPRINT if meant.right and rest.right and sign else Verdict.WRONG,
-        otherwise_note="bars are missing: $u$ is negative for negative numbers",
+        otherwise_note="absolute-value bars are missing: $u$ is negative for negative numbers",
     )
 
 
@@ -201,7 +204,7 @@ def example_8_x(printed: Statement) -> Finding:
         terms and judge([number], [names]).holds,
         f"$.7654\\times10^3+.567\\times10^{{-1}}$ is 765.4567; with it {_example_text(names)}",
         Verdict.MISPRINT if terms else Verdict.WRONG,
-        otherwise_note="767 for 765; the lines that follow use 765",
+        otherwise_note="767 is a misprint for 765; the lines that follow use 765",
     )
 
 
@@ -215,7 +218,7 @@ def example_8_1982(printed: Statement) -> Finding:
         rest and judge(found[3:4], [names]).holds,
         _example_text(names),
         Verdict.MISPRINT if rest else Verdict.WRONG,
-        otherwise_note="767 for 765, as in hung1984; the other numbers are those of 765.4567",
+        otherwise_note="767 is a misprint for 765, as in hung1984; the other numbers are correct for 765.4567",
     )
 
 
@@ -226,7 +229,7 @@ def example_13_parameters(printed: Statement) -> Finding:
     meant = judge([base], [names]).holds and judge([exponent], [{"e": names["t"]}]).holds
     return compare(
         judge(relations(printed), [names]).holds,
-        f"the example's number has $e={names['e']}$; $\\beta_c=10^{{1-4}}$ has $t={names['t']}$",
+        f"the number in the example has $e={names['e']}$; $\\beta_c=10^{{1-4}}$ implies $t={names['t']}$",
         Verdict.MISPRINT if meant else Verdict.WRONG,
         otherwise_note="$t=4$ is meant",
     )
@@ -253,8 +256,8 @@ def example_13_1982(printed: Statement) -> Finding:
         rest and judge(found[1:2], [names]).holds,
         f"$e={names['e']}$; {_example_text(names, chopped=True)}",
         Verdict.MISPRINT if rest and judge(found[1:2], [{"e": names["t"]}]).holds else Verdict.WRONG,
-        otherwise_note="$t=4$ is meant, not $e=4$, which the scan reads as 6 = 4 and hung1984 repeats; $.7650$ is the "
-        "scan's, since the next line has $.7654$; the other numbers are right",
+        otherwise_note="$t=4$ is meant, not $e=4$, which the scan shows as 6 = 4 and hung1984 repeats; the scan has "
+        "changed $.7654$, printed in the next line, to $.7650$; the other numbers are right",
     )
 
 
@@ -300,7 +303,7 @@ def all_pairs() -> tuple[int, Fraction]:
         some = true != 0
         count += true.size
         if not np.all(computed[~some] == 0):
-            raise ArithmeticError("a result that should be zero is not")
+            raise ArithmeticError("got a nonzero computed result; needed zero, as the exact result is zero")
         error = abs(computed - true)
         inexact = some & (error != 0)
         largest = max(largest, max(error[inexact] / abs(true[inexact]), default=Fraction(0)))
@@ -314,7 +317,7 @@ def one_operation(printed: Statement) -> Finding:
     return compare(
         found.right and largest <= 1,
         f"{found}; in {count} operations on pairs of two-digit numbers, the error is at most {float(largest):.4f} β",
-        note="where the exact result is zero, so is the computed one; the exponent is unlimited",
+        note="where the exact result is zero, so is the computed result; the exponent range is unlimited",
     )
 
 
@@ -325,6 +328,6 @@ def as_1984(printed: Statement) -> Finding:
     return compare(
         numbers.right and single.right and len(found) == 12,
         f"(5) to (14): {numbers}; (15) and (16): {single}",
-        note="(7) and (12) define errors; the letters are hardly legible, and the equations are those of hung1984, "
-        "with $x_R$ for $\\hat x$ in (7)",
+        note="(7) and (12) define errors; the letters are hardly legible, but the equations are the same "
+        "as in hung1984, with $x_R$ for $\\hat x$ in (7)",
     )

@@ -76,9 +76,9 @@ def three_products(printed: Statement) -> Finding:
     only_hat = bool(rounded) and judge([exact_line], dots((3,))).holds and judge(rounded, hats).holds
     return compare(
         found.right,
-        f"{found}" + ("; with $\\hat I$ for the computed value it holds in all" if only_hat else ""),
+        f"{found}" + ("; with $\\hat I$ for the computed value, it holds in all instances" if only_hat else ""),
         Verdict.MISPRINT if only_hat else Verdict.WRONG,
-        otherwise_note="the hat is missing from the computed value $\\hat I$, so that $I$ stands for two quantities",
+        otherwise_note="the hat is missing on the computed value $\\hat I$, so $I$ stands for two quantities",
     )
 
 
@@ -92,7 +92,7 @@ def dot_error(printed: Statement) -> Finding:
         f"{found}; the weight of $a_2b_2$ is $\\epsilon_2+\\epsilon_3+\\epsilon_5$",
         Verdict.MISPRINT if left_over.holds else Verdict.WRONG,
         note="to first order",
-        otherwise_note="a 1 left over from the line above; the bound that follows is right",
+        otherwise_note="the printed 1 is left over from the line above; the bound that follows is right",
     )
 
 
@@ -115,11 +115,14 @@ def dot_bound(printed: Statement) -> Finding:
     found = judge(relations(printed), dots((3,) if three else (2, 4, 6)), first_order=True)
     holds, text = found_in_survey("dot", "(26)")
     weights = dot_weights(3 if three else 6)
-    restored = "; the scan seems to have $n$ before the brace, and (27) shows that it belongs to the first product"
+    restored = "; the scan seems to show $n$ before the brace, but (27) shows that $n$ belongs to the first product"
     return compare(
         found.right and holds and derived(),
         f"{found}; the weights of {len(weights)} products are {', '.join(map(str, weights))}; {text}",
-        note=f"to first order, not strict: 12 products in three bits can exceed it {worst_twelve():.3f} times"
+        note=(
+            "the bound holds to first order but is not strict: the error of an inner product of 12 "
+            f"products in three bits can be {worst_twelve():.3f} times the bound"
+        )
         + (restored if printed.id == "hung1982.III.eq26" else ""),
     )
 
@@ -137,7 +140,7 @@ def relative_dot() -> Finding:
     return answer(
         bool(holds),
         "$|\\tilde I/I|\\le\\gamma_n\\,|a|^T|b|\\,/\\,|a^Tb|$, $\\gamma_n=n\\beta/(1-n\\beta)$",
-        f"{chapter('rounding')}, section on inner products",
+        f"see the {chapter('rounding')}, section on inner products",
     )
 
 
@@ -187,7 +190,7 @@ def matrix_products() -> tuple[dict[str, Any], ...]:
 @CHECKS.add("hung1984.II.eq27")
 def lost_page() -> Finding:
     return unverifiable(
-        "", "the page with (27) is missing from the scan; hung1982 (27), its counterpart, is verified to first order"
+        "", ("the page with (27) is missing from the scan; its counterpart, hung1982 (27), is verified to first order")
     )
 
 
@@ -204,7 +207,7 @@ def entry_bounds(printed: Statement) -> Finding:
     d = [n, *range(n, 1, -1)]
     return compare(
         found.right and derived(),
-        f"{found}; for $n={n}$, $D$ has the diagonal {', '.join(map(str, d))} and norm {max(d)}",
+        f"{found}; for $n={n}$, the diagonal of $D$ is {', '.join(map(str, d))}, and its norm is {max(d)}",
         note="to first order; the diagonal of $D$ is restored from the weights of (27), since only one entry of it is "
         "legible and the page is missing from hung1984",
     )
@@ -222,7 +225,7 @@ def matmul_bound(printed: Statement) -> Finding:
     return compare(
         found.right and violations == 0,
         f"{found}; {violations} violations in {trials} random products of 11 bits",
-        note="strict, as Jeannerod and Rump proved in 2013",
+        note="the bound is strict, as Jeannerod and Rump proved in 2013",
     )
 
 
@@ -297,8 +300,8 @@ def _chain_claim(printed: Statement, note: str) -> Finding:
     return compare(
         found.right and shortcut,
         (f"{found}; (31) has " if found.instances and relations(printed) else "(31) has ")
-        + f"{survey.violations} violations in {survey.trials} random chains; $1.001\\cdot1.001-1.002\\cdot1$ in four "
-        f"digits exceeds it {worst.ratio('(31)'):.0f} times",
+        + f"{survey.violations} violations in {survey.trials} random chains; the error of "
+        f"$1.001\\cdot1.001-1.002\\cdot1$ in four digits is {worst.ratio('(31)'):.0f} times the bound",
         Verdict.WRONG,
         otherwise_note=note,
         root=ROOT,
@@ -309,8 +312,8 @@ def _chain_claim(printed: Statement, note: str) -> Finding:
 def implied(printed: Statement) -> Finding:
     claim = _chain_claim(
         printed,
-        "(28) bounds a norm; it does not make the error a multiple of the product, which may cancel while the error "
-        "stays",
+        "(28) bounds a norm; it does not make the error a multiple of the product, which may cancel "
+        "while the error remains",
     )
     if claim.agrees and printed.says("step") != "implies":
         return compare(False, claim.recomputed, root=ROOT)
@@ -321,14 +324,16 @@ def implied(printed: Statement) -> Finding:
 def chain_shortcut(printed: Statement) -> Finding:
     return _chain_claim(
         printed,
-        "(28) bounds a norm; it does not make the error a multiple of the product, which may cancel while the error "
-        "stays",
+        "(28) bounds a norm; it does not make the error a multiple of the product, which may cancel "
+        "while the error remains",
     )
 
 
 @CHECKS.add("hung1984.II.eq31", "hung1982.III.eq30-31")
 def chain_error(printed: Statement) -> Finding:
-    return _chain_claim(printed, "follows from (30); besides, a tilde is meant on the left of (31)")
+    return _chain_claim(
+        printed, "the error follows from the error in (30); also, a tilde is missing on the left side of (31)"
+    )
 
 
 @CHECKS.add("hung1982.III.s9-2.cross-reference-to-28")
@@ -337,9 +342,9 @@ def reference_28(printed: Statement) -> Finding:
     cited, meant = CHECKS.get(f"hung1982.III.eq{number}"), CHECKS.get("hung1982.III.eq28")
     return compare(
         cited is matmul_bound,
-        "the bound of a matrix product is (28); (38) is an equation of section 10",
+        "the bound for a matrix product is (28); equation (38) belongs to section 10",
         Verdict.MISPRINT if meant is matmul_bound else Verdict.WRONG,
-        otherwise_note="(28) is meant, and printed in hung1984",
+        otherwise_note="(28) is meant, as hung1984 prints it",
     )
 
 
@@ -352,8 +357,9 @@ def chain_bound(printed: Statement) -> Finding:
     return compare(
         found.right and holds and derived(),
         f"{found}, derived to first order for every $N$; {text}",
-        note="right to first order although (30) and (31) are wrong, because errors add up in norm; not strict, since "
-        f"20 matrices of size 1 × 1 in two digits exceed it {experiment.chain_trial(matrices).ratio('(32)'):.2f} times",
+        note="the bound is right to first order although (30) and (31) are wrong, because the norms of "
+        "the errors add up; it is not strict, since the error for 20 matrices of size 1 × 1 in two "
+        f"digits is {experiment.chain_trial(matrices).ratio('(32)'):.2f} times the bound",
     )
 
 
@@ -394,9 +400,9 @@ def _examples_in_four_digits() -> tuple[bool, str]:
     trial = experiment.example_trial(a, b, one, one * 0)
     corrected = statistics("example")["corrected"].violations
     return found.violations == 0 and not trial.violates("Examples"), (
-        f"the printed bound has {found.violations} violations in {found.trials} random trials, and a worked one by a "
-        f"factor of {trial.ratio('Examples'):.0f}; the corrected bound "
-        f"$\\beta[(m+r)\\|A\\|\\|B\\|\\|C\\|+\\|ABC+D\\|]$ has {corrected}"
+        f"the printed bound fails in {found.violations} of {found.trials} random trials, and by a "
+        f"factor of {trial.ratio('Examples'):.0f} in a constructed example; the corrected bound "
+        f"$\\beta[(m+r)\\|A\\|\\|B\\|\\|C\\|+\\|ABC+D\\|]$ fails in {corrected}"
     )
 
 
@@ -414,8 +420,8 @@ def examples(printed: Statement) -> Finding:
         holds and found.right and said,
         text if "claim" in printed.id else f"{found}; {text}",
         Verdict.WRONG,
-        otherwise_note="built on (31): $\\|ABC\\|$ stands where $\\|A\\|\\|B\\|\\|C\\|$ must; section 12 takes the "
-        "same step from (102) on",
+        otherwise_note="the bound rests on (31): it has $\\|ABC\\|$ where $\\|A\\|\\|B\\|\\|C\\|$ is required; "
+        "section 12 makes the same mistake from (102) on",
         root=ROOT,
     )
 
@@ -431,5 +437,8 @@ def closing_remark(printed: Statement) -> Finding:
     return compare(
         printed.says("addition") == ("does not involve" if same else "involves")
         and printed.says("product") == involved.get(int(ratio), ""),
-        f"for 2 × 3, 3 × 5, 5 × 2 the factor of (32) is $3+5={ratio}$; bound (24) has no such factor",
+        (
+            f"for matrices of size 2 × 3, 3 × 5 and 5 × 2, the factor in (32) is $3+5={ratio}$; bound "
+            "(24) has no such factor"
+        ),
     )

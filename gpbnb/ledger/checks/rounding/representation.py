@@ -37,7 +37,7 @@ def split_is_printed(relation: Relation, names: Names) -> bool:
 
 @CHECKS.add(*both("eq1"))
 def representation() -> Finding:
-    return given("the form of a number: sign, digits, base and exponent; zero has no such form with $d_1\\ne0$")
+    return given("defines the form of a number: sign, digits, base and exponent; zero has no such form with $d_1\\ne0$")
 
 
 RADICANDS = {r"$\sqrt2$": 2, r"$\sqrt4$": 4}
@@ -53,8 +53,9 @@ def infinite_digits(printed: Statement) -> Finding:
     digits = "finite" if finite or sp.sqrt(radicand).is_rational else "infinite"
     return compare(
         printed.says("digits") == digits == "infinite",
-        f"a number of finitely many digits is rational, and $\\sqrt{{{radicand}}}$ is not; no number of fewer than "
-        f"{len(places)} places in base {', '.join(map(str, bases))} has the square {radicand}",
+        f"a number with finitely many digits is rational, but $\\sqrt{{{radicand}}}$ is not; no "
+        f"number with fewer than {len(places)} places in base {', '.join(map(str, bases))} has the "
+        f"square {radicand}",
     )
 
 
@@ -71,10 +72,10 @@ def split(printed: Statement) -> Finding:
     digits = all(_digits(printed, names) for names in all_numbers())
     return compare(
         whole.holds and digits,
-        f"for all numbers it {whole}; where $v\\ne0$ it {rest}",
+        f"for all numbers, the printed condition {whole}; for numbers with $v\\ne0$ it {rest}",
         Verdict.MISPRINT if rest.holds and digits else Verdict.WRONG,
-        otherwise_note="the condition must be $0\\le|v|$: as printed it excludes $v=0$, the case of a number that has "
-        "at most $t$ digits; nothing later uses $v\\ne0$",
+        otherwise_note="the condition must be $0\\le|v|$: the printed condition excludes $v=0$, that is, numbers "
+        "with at most $t$ digits; nothing later uses $v\\ne0$",
     )
 
 
@@ -86,10 +87,12 @@ def split_1982(printed: Statement) -> Finding:
     admitted = [each["v"] for each in shifted if judge(found, [each]).holds and _digits(printed, each)]
     return compare(
         bool(admitted) and all(abs(v) < 1 for v in admitted),
-        f"as printed, {len(admitted)} splits of 765.4567 would do, with $v$ up to {float(max(admitted, default=0)):g}; "
-        "the second condition must bound $v$, not $u$",
+        f"as printed, {len(admitted)} splits of 765.4567 would satisfy the conditions, with $v$ up to "
+        f"{float(max(admitted, default=0)):g}; the second condition must bound $v$, not $u$",
         Verdict.OCR,
-        otherwise_note="the first condition already bounds $u$; hung1984 prints $v$, so the letter is the scan's fault",
+        otherwise_note=(
+            "the first condition already bounds $u$, and hung1984 prints $v$, so the wrong letter is due to the scan"
+        ),
     )
 
 
@@ -103,7 +106,7 @@ def example_2(printed: Statement) -> Finding:
         right,
         f"{split_text(link.left)} for {float(link.left):.9g} in base 10 with four digits",
         Verdict.MISPRINT,
-        otherwise_note="the first power must be $10^{-1}$, in keeping with the printed $e=-1$; corrected in hung1984",
+        otherwise_note="the first power must be $10^{-1}$, to agree with the printed $e=-1$; hung1984 corrects it",
     )
 
 
@@ -117,7 +120,7 @@ def carry(printed: Statement) -> Finding:
         changes == said,
         f"99.996 has $e={FOUR.split(x)[2]}$ and rounds to {power(rounded)}, which has $e={FOUR.split(rounded)[2]}$",
         Verdict.MISPRINT,
-        otherwise_note="a carry past the first digit raises the exponent by one; (3) and (5) hold all the same",
+        otherwise_note="a carry beyond the first digit increases the exponent by one; (3) and (5) still hold",
     )
 
 
@@ -126,8 +129,11 @@ def rounding_rule(printed: Statement) -> Finding:
     found = judge(relations(printed), all_numbers())
     return compare(
         found.right,
-        f"the printed rule gives the nearest number; it {found}",
-        note="a tie goes away from zero; IEEE 754 of 1985 sends it to the even neighbour, with the same bound (5)",
+        f"the printed rule gives the nearest number and {found}",
+        note=(
+            "the rule rounds ties away from zero; IEEE 754 of 1985 rounds them to the even neighbour, "
+            "with the same bound (5)"
+        ),
     )
 
 
@@ -142,8 +148,8 @@ def conventional(printed: Statement) -> Finding:
     numbers = "any number" if sum(covered.values()) == len(all_numbers()) else "positive numbers alone"
     return compare(
         printed.says("numbers") == numbers,
-        f"rule (3) takes a nearest number for {covered['positive']} positive and {covered['negative']} negative "
-        f"numbers of {len(all_numbers())}",
+        f"rule (3) returns a nearest number for {covered['positive']} positive and "
+        f"{covered['negative']} negative numbers out of {len(all_numbers())}",
     )
 
 
@@ -156,7 +162,9 @@ def same_sign(printed: Statement) -> Finding:
     return compare(
         printed.says("signs") == found,
         f"$u$ and $v$ have {found} in the splits of {len(all_numbers())} numbers",
-        note=f"except for $v=0$; (2) alone would also allow $u={float(u):g}$, $v={float(v):g}$ for 765.4567",
+        note=(
+            f"the claim holds unless $v=0$; (2) alone would also allow $u={float(u):g}$, $v={float(v):g}$ for 765.4567"
+        ),
     )
 
 
@@ -178,7 +186,7 @@ def example_3(printed: Statement) -> Finding:
         split_right and follows,
         f"{split_text(x)}; $\\hat x=$ {power(FOUR.round(x))}",
         Verdict.MISPRINT if follows else Verdict.WRONG,
-        otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line and back in the next",
+        otherwise_note="the digit 4 of $-.7654\\times10^3$ is missing in the first line and present in the next",
     )
 
 
@@ -191,6 +199,6 @@ def examples_3_1982(printed: Statement) -> Finding:
         others and cases[2][0],
         "; ".join(f"{split_text(x)}, $x_R=$ {power(FOUR.round(x))}" for _, _, x in cases),
         Verdict.MISPRINT,
-        otherwise_note="the digit 4 of $-.7654\\times10^3$ is lost in the first line of (3c), in both reports, and "
-        "back in the next; $-.7685$ for the result is the scan's",
+        otherwise_note="the digit 4 of $-.7654\\times10^3$ is missing in the first line of (3c) in both reports, "
+        "and present in the next; the result $-.7685$ is due to the scan",
     )

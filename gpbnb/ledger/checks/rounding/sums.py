@@ -21,7 +21,7 @@ from gpbnb.rounding import derivation, experiment, theory
 
 @CHECKS.add(*both("eq17"), *both("s6.order-of-4-terms"), *both("eq19"))
 def defined() -> Finding:
-    return given("the definition of the quantity, and of the order in which it is computed: from left to right")
+    return given("defines the quantity and the order in which it is computed: from left to right")
 
 
 def _sum_names(x: list[Fraction], epsilon: list[Fraction]) -> dict[str, Any]:
@@ -57,7 +57,7 @@ def four_terms(printed: Statement) -> Finding:
     found = judge(relations(printed), instances, first_order=printed.id.endswith("unnumbered-s"))
     return compare(
         found.right,
-        f"{found} of terms and rounding errors, against the sum computed step by step",
+        f"{found} of terms and rounding errors, compared with the sum computed step by step",
         note="to first order" if printed.id.endswith("unnumbered-s") else "",
     )
 
@@ -91,8 +91,8 @@ def sum_bound_1984(printed: Statement) -> Finding:
     return compare(
         found.right and holds and wider and derived(),
         f"{found}, derived to first order for every $n$; {text}",
-        note="to first order, not strict: 100 terms in four digits, "
-        f"$1, \\beta, -\\beta, \\dots, -\\beta$, exceed it by {tie - 1:.1%}",
+        note="the bound holds to first order but is not strict: for 100 terms in four digits, $1, \\beta, "
+        f"-\\beta, \\dots, -\\beta$, the error exceeds it by {tie - 1:.1%}",
     )
 
 
@@ -114,11 +114,13 @@ def sum_bound_1982(printed: Statement) -> Finding:
     violations, count = _like_signs()
     return compare(
         found.right,
-        f"{found}; $(n-1)\\beta$ has {random.violations} violations in {random.trials} random sums, by a factor of up "
-        f"to {random.largest:.2g}, and {violations or 'none'} in {count} sums of terms of one sign",
+        f"{found}; the bound $(n-1)\\beta$ fails in {random.violations} of {random.trials} random "
+        f"sums, by a factor of up to {random.largest:.2g}, and in {violations or 'none'} of {count} "
+        "sums whose terms all have the same sign",
         Verdict.WRONG,
-        otherwise_note="drops $-x_3\\epsilon_1-x_4(\\epsilon_1+\\epsilon_2)$ as if it could only help, which is true "
-        "only of terms of one sign; corrected in hung1984 (18)",
+        otherwise_note="the step drops $-x_3\\epsilon_1-x_4(\\epsilon_1+\\epsilon_2)$ as if this term could only "
+        "reduce the error, which is true only if all terms have the same sign; hung1984 (18) "
+        "corrects it",
         root="sum-bound-ignores-cancellation",
     )
 
@@ -160,7 +162,7 @@ def quotient_example(printed: Statement) -> Finding:
     return compare(
         found.right and bool(sp.expand(error - sum(eps)) == 0),
         f"{found}; the relative error is ${sp.latex(error)}$, at most $2\\beta$",
-        note="to first order" if printed.document == "hung1984" else "of what is legible",
+        note="to first order" if printed.document == "hung1984" else "applies to what is legible",
     )
 
 
@@ -179,14 +181,18 @@ def product_bound(printed: Statement) -> Finding:
     holds, text = surveyed("product", "1982 (20)")
     counted = all(len(derivation.quotient_error(n, m)[1]) == n + m - 1 for n, m in SIZES)
     worst = worst_twenty()
-    exceeded = ", ".join(f"{worst.ratio(f'{year} (20)'):.2f} times for {year}" for year in (1982, 1984))
+    exceeded = ", ".join(f"{worst.ratio(f'{year} (20)'):.2f} times the bound of {year}" for year in (1982, 1984))
     return compare(
         found.right and holds and counted,
-        f"${sp.latex(derivation.product_operations())}$ roundings, so 2 for $x_1x_2/y_1$; the printed bound {found}; "
-        f"of $(n+m-1)\\beta$ {text}",
+        f"there are ${sp.latex(derivation.product_operations())}$ roundings, so 2 for $x_1x_2/y_1$; "
+        f"the printed bound {found}; for $(n+m-1)\\beta$, {text}",
         Verdict.INCONSISTENT if found.holds else Verdict.WRONG,
-        note=f"to first order, not strict: 20 factors of two digits can exceed it ({exceeded})",
-        otherwise_note="too large by 2β: contradicts its own example, $2\\beta$ for $x_1x_2/y_1$, and hung1982 (20); "
-        f"still no strict bound, for 20 factors of two digits can exceed it ({exceeded})",
+        note=(
+            "the bound holds to first order but is not strict: the error for 20 factors of two digits "
+            f"can be {exceeded}"
+        ),
+        otherwise_note="the bound is too large by 2β and contradicts the report's own example, $2\\beta$ for "
+        "$x_1x_2/y_1$, and hung1982 (20); even so it is not strict: the error for 20 factors of two "
+        f"digits can be {exceeded}",
         root="product-roundings-overcounted",
     )

@@ -1,0 +1,156 @@
+"""Numbers in the descriptions of figures are those that the figures show: each is computed here from its source."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.budget import theory as budget
+from gpbnb.geometry import theory as geometry
+from gpbnb.kalman import answers, ensembles, year, year_cases
+from gpbnb.kalman.forms import Form
+from gpbnb.rolling import experiment as rolling_experiment
+from gpbnb.rolling import theory as rolling
+from gpbnb.rounding import experiment as rounding
+
+BOOK = Path(__file__).resolve().parents[1] / "book"
+ARCSEC = math.pi / 180 / 3600
+
+
+@cache
+def alt(page: str, name: str) -> str:
+    """The description of one figure of a page."""
+    for cell in json.loads((BOOK / f"{page}.ipynb").read_text(encoding="utf-8"))["cells"]:
+        shown = cell["metadata"].get("mystnb", {})
+        if shown.get("figure", {}).get("name") == name:
+            return str(shown["image"]["alt"])
+    raise KeyError(f"{page} has no figure {name}")
+
+
+def says(page: str, name: str, *phrases: str) -> None:
+    assert [phrase for phrase in phrases if phrase not in alt(page, name)] == []
+
+
+def test_violations_of_the_kalman_bounds():
+    found = ensembles.load()
+
+    def share(field: str, form: str) -> float:
+        group = [each for each in found if each.form == form]
+        return 100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group)
+
+    forms = [form.name.lower() for form in Form]
+    first, second, third = ([share(f"violations_{n}", form) for form in forms] for n in (105, 108, 125))
+    assert first[0] == first[1] == first[2]
+    says(
+        "kalman",
+        "fig-kalman-violations",
+        f"{first[0]:.0f} percent of the filters violate (105) in the three conventional forms",
+        f"{first[3]:.0f} percent in Joseph's form and {first[4]:.0f} percent with the factors",
+        ", ".join(f"{each:.0f}" for each in second[:4]) + f" and {second[4]:.0f} percent violate (108)",
+        f"{third[0]:.0f} percent violate (125), but {third[1]:.0f} percent with the second gain",
+        f"{third[3]:.0f} percent in Joseph's form",
+    )
+    assert 0 <= third[4] < 1
+
+
+def test_what_rolling_buys():
+    study = rolling_experiment.survey()
+    error = dict(zip(study.periods, study.standard_error(), strict=True))
+    says(
+        "rolling",
+        "fig-rolling-buys",
+        f"{error[77.5]:.2f} milliarcseconds a year at 77.5 seconds",
+        f"{error[600.0]:.2f} at 600, {error[6000.0]:.1f} at 6000",
+        f"Without rolling it is {error[None]:.0f}, above the {rolling.DRIFTS[1]:.0f} of frame dragging",
+    )
+
+
+def test_phase_errors():
+    geodetic, frame = abs(rolling.phase_error_cost((6600.0, 40.0), math.radians(1)))
+    below = abs(rolling.phase_error_cost((6600.0, 40.0), math.radians(0.01)))[1]
+    assert below > 1
+    assert frame > 100
+    assert 65 < frame / geodetic < 70
+    says(
+        "rolling", "fig-phase-cost", "below a hundredth of a degree and 100 at one degree", "nearly seventy times less"
+    )
+
+
+def test_filters_and_resets():
+    density = rolling.FLOWN_DENSITY
+    least = rolling.filtered_error(6600.0, density, rolling.best_bandwidth(6600.0, density))
+    says("rolling", "fig-bandwidth", f"pass a minimum of {math.sqrt(least):.1f} milliarcseconds")
+    intensity = 3e-6 / rolling.YEAR**3
+    free = rolling.rate_walk_error(6600.0, intensity)
+    often, seldom = (rolling.rate_walk_error(6600.0, intensity, reset=p) for p in (6000, 600_000))
+    assert math.log10(often) == pytest.approx(-3, abs=0.3)
+    assert math.log10(seldom) == pytest.approx(-1, abs=0.3)
+    says("rolling", "fig-resets", "every 6000 seconds to a tenth at 600000", f"horizontal lines at {free:.0f} show")
+
+
+def test_budget():
+    example = budget.read(files("gpbnb.budget") / "example.csv").budget
+    shares = sorted(((100 * example.share(each), each.name) for each in example.sources), reverse=True)
+    text = alt("budget", "fig-own")
+    numbers = [f"{share:.0f}" for share, _ in shares]
+    listed = text.partition("percent: ")[2].partition(".")[0].split(", ")
+    assert [each.rpartition(" ")[2] for each in listed] == numbers
+    says(
+        "budget",
+        "fig-own",
+        f"plus and minus {example.total:.1f} for the root-sum-square, {budget.GOAL:.0f} for the goal",
+        f"and {example.worst_case:.1f} milliarcseconds per year for the sum of all errors",
+    )
+    assert budget.equal_error(1.0, 44) == pytest.approx(0.15, abs=0.005)
+    assert pytest.approx(1.25, abs=0.01) == 1.253  # a quarter higher
+    says("budget", "fig-budget", "44 sources with 0.15 each", "a total of 1.253 lies a quarter higher", "down to 0.01")
+
+
+def test_the_year():
+    runs = {run.case: run for run in year.load()}
+    base = year_cases.Case(year_cases.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
+    end = {t: float(np.abs(runs[base._replace(precision=t)].rate[-1]).max()) for t in (18, 24, 32, 40, 53)}
+    assert round(end[18], -3) == 26_000
+    assert 0.8 < end[32] < 1
+    assert [round(math.log10(end[t])) for t in (40, 53)] == [-3, -8]
+    says(
+        "year",
+        "fig-kalman-year",
+        "end at 26000 milliarcseconds a year with 18 bits",
+        f"{end[24]:.0f} with 24, just below 1 with 32, 10⁻³ with 40 and 10⁻⁸ with 53",
+    )
+    says("year", "fig-kalman-125", f"The error rises from 10⁻⁹ to {end[24]:.0f} milliarcseconds a year")
+    # What the ledger's closing example prints.
+    needed = answers.find_answers(1.0)
+    says("year", "fig-kalman-digits", "at {} and {} digits".format(*needed.printed))
+    says("index", "fig-front", "at {} and {} digits".format(*needed.printed))
+
+
+def test_geometry():
+    assert math.hypot(15, 8) == 17
+    says("geometry", "fig-deroll", "15 and minus 8 arcseconds", "between plus and minus 17 arcseconds")
+    crossing = ARCSEC / 1000 / geometry.GEODETIC / ARCSEC  # of |x| |φ|
+    assert float(geometry.small_angle_loss("gamma1", 31 * ARCSEC)) == pytest.approx(ARCSEC / 1000, rel=0.02)
+    says("geometry", "fig-losses", f"crosses one milliarcsecond at {crossing:.0f} arcseconds")
+
+
+def test_rounding():
+    says("rounding", "fig-sawtooth", "just below 0.05, chopping below 0.1", "close to these limits at 1 and 10")
+    assert [float(FloatFormat(10, 2, rule).unit_roundoff) for rule in Rounding.documented()] == [0.05, 0.1]
+    # The figure has every other number of factors.
+    said = (
+        (FloatFormat(10, 1), 8, "With one decimal digit the ratio passes one at eight factors and grows to {:.0f}"),
+        (FloatFormat(10, 2), 10, "with two digits it passes one at ten and reaches {:.0f}"),
+        (FloatFormat(2, 6), 36, "with six bits it passes one at 36 and reaches {:.2f}"),
+    )
+    for fmt, first, phrase in said:
+        before, there, last = (float(rounding.worst_product(fmt, n).ratio("1982 (20)")) for n in (first - 2, first, 40))
+        assert before <= 1 < there
+        says("rounding", "fig-worst-products", phrase.format(last))
