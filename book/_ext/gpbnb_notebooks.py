@@ -3,6 +3,7 @@
 MyST-NB executes one notebook after the other, and its cache does not notice changes in the package.
 """
 
+import copy
 import gc
 import hashlib
 import os
@@ -56,10 +57,16 @@ def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
 
 def keep_numbers(app: Sphinx, env: BuildEnvironment, docnames: list[str]) -> None:
     """Keep the numbers of figures when no page is to be read: Sphinx would load all pages to count them again."""
+    app.gpbnb_numbers = copy.deepcopy(env.toc_fignumbers)
     if not docnames and env.toc_fignumbers:
         for listener in app.events.listeners["env-get-updated"][:]:
             if isinstance(getattr(listener.handler, "__self__", None), TocTreeCollector):
                 app.disconnect(listener.id)
+
+
+def renumbered(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Write all pages again if a figure has another number: Sphinx would not write those that refer to it."""
+    return sorted(env.found_docs) if app.gpbnb_numbers not in ({}, env.toc_fignumbers) else []
 
 
 def keep_contents(app: Sphinx, env: BuildEnvironment) -> list[str]:
@@ -106,6 +113,7 @@ def setup(app: Sphinx) -> dict:
     app.connect("source-read", use_copy)
     app.connect("env-get-outdated", outdated)
     app.connect("env-before-read-docs", keep_numbers, priority=900)
+    app.connect("env-get-updated", renumbered, priority=900)
     app.connect("env-updated", keep_contents)
     app.connect("env-updated", write_in_parallel)
     app.connect("build-finished", remove_old_pages)
