@@ -112,13 +112,14 @@ def greedy(
     steer: Any,
     by_range: bool,
     ramp: float,
+    ahead: bool,
     chosen: Any,
     errors: Any,
 ) -> Any:
     """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
 
-    Most products of a step depend only on the estimate. So each candidate is judged by the error one step later, after
-    a measurement from the middle of the admissible range.
+    Most products of a step depend only on the estimate. So with `ahead`, each candidate is judged by the error one step
+    later, after a measurement from the middle of the admissible range.
 
     Parameters
     ----------
@@ -137,7 +138,7 @@ def greedy(
     exactly = DoubleDouble()
     n, m, steps = Phi.shape[1], HPhi.shape[1], rows.shape[0]
     count = Phi.shape[0]
-    trial, best, ahead = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    trial, best, later = np.empty_like(x), np.empty_like(x), np.empty_like(x)
     values = np.empty((n + m + operations.shape[0], *x.shape[1:]), x.dtype)
     z, taken, tried = (
         np.empty((m, *x.shape[1:]), x.dtype),
@@ -180,7 +181,7 @@ def greedy(
             execute(fmt, operations, outputs, coefficients[at], trial, z, values)
             if excess > 1.0:
                 score = -1e300 * excess
-            elif k + 1 == steps:
+            elif k + 1 == steps or not ahead:
                 score = _worth(fmt, rows[k], trial, following)
             else:
                 tried[:] = z
@@ -195,9 +196,9 @@ def greedy(
                 for i in range(n):
                     s = doubledouble.add(exactly, load(exactly, beyond, i), load(exactly, moved, i))
                     put(exactly, beyond, i, s)
-                ahead[:] = trial
-                execute(fmt, operations, outputs, coefficients[then], ahead, z, values)
-                score = _worth(fmt, rows[k + 1], ahead, beyond)
+                later[:] = trial
+                execute(fmt, operations, outputs, coefficients[then], later, z, values)
+                score = _worth(fmt, rows[k + 1], later, beyond)
                 z[:] = tried
             if score > largest or found < 0:
                 largest, found = score, q
@@ -259,7 +260,8 @@ def attack(
         for plan in range(plans):
             pool = _pool(found, F, state, steps, candidates, plan, by_range, rng)
             steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
-            outcome = run_against(found, rows, pool, steer, by_range, steps / 2 if ramp is None else ramp)
+            rise = steps / 2 if ramp is None else ramp
+            outcome = run_against(found, rows, pool, steer, by_range, rise, ahead=True)
             runs += 1
             allowed = allowed and not outcome[0]
             if outcome[0]:
@@ -302,6 +304,7 @@ def run_against(
     steer: NDArray[np.float64],
     by_range: bool,
     ramp: float = 1.0,
+    ahead: bool = False,
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
     """Run :func:`greedy` once; return the steps outside the limits, measurements in float64, and errors (steps, n)."""
     given, program = found.schedule, found.schedule.program
@@ -326,6 +329,7 @@ def run_against(
         steer,
         by_range,
         ramp,
+        ahead,
         chosen,
         errors,
     )
