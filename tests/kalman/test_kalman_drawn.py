@@ -58,8 +58,8 @@ def digits(precision, chopped=False):
     [
         ("drift", [2.0, 3.0, 0.5], "error of the drift angle (mas)"),
         ("rate", [None, 4.0, 2.0], "error of the drift rate (mas/yr)"),
-        ("gain", [10.0, 12.0, 14.0], "relative error of the gain (no unit)"),
-        ("covariance", [15.0, 18.0, 21.0], "relative error of the covariance (no unit)"),
+        ("gain", [10.0, 12.0, 14.0], "relative gain error (no unit)"),
+        ("covariance", [15.0, 18.0, 21.0], "relative covariance error (no unit)"),
     ],
     ids=["drift", "rate", "gain", "covariance"],
 )
