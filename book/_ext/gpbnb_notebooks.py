@@ -3,6 +3,8 @@
 MyST-NB executes one notebook after the other, and its cache does not notice changes in the package.
 """
 
+import copy
+import gc
 import hashlib
 import os
 import sys
@@ -10,6 +12,7 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
+from sphinx.environment.collectors.toctree import TocTreeCollector
 from sphinx.errors import ExtensionError
 from sphinx.util import logging
 
@@ -52,6 +55,27 @@ def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
         source[0] = copy.read_text(encoding="utf-8")
 
 
+def keep_numbers(app: Sphinx, env: BuildEnvironment, docnames: list[str]) -> None:
+    """Keep the numbers of figures when no page is to be read: Sphinx would load all pages to count them again."""
+    app.gpbnb_numbers = copy.deepcopy(env.toc_fignumbers)
+    if not docnames and env.toc_fignumbers:
+        for listener in app.events.listeners["env-get-updated"][:]:
+            if isinstance(getattr(listener.handler, "__self__", None), TocTreeCollector):
+                app.disconnect(listener.id)
+
+
+def renumbered(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Write all pages again if a figure has another number: Sphinx would not write those that refer to it."""
+    return sorted(env.found_docs) if app.gpbnb_numbers not in ({}, env.toc_fignumbers) else []
+
+
+def keep_contents(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Keep the first page, whose table of contents every page shows: Sphinx would read it for each page again."""
+    first = env.get_doctree(app.config.root_doc)
+    BuildEnvironment.master_doctree = property(lambda _: first)
+    return []
+
+
 def write_in_parallel(app: Sphinx, env: BuildEnvironment) -> list[str]:
     """Let several processes write the pages. sphinx-proof cannot be read in parallel."""
     app.parallel = max(app.parallel, min(os.cpu_count() or 1, MOST_JOBS))
@@ -59,10 +83,10 @@ def write_in_parallel(app: Sphinx, env: BuildEnvironment) -> list[str]:
 
 
 def outdated(app: Sphinx, env: BuildEnvironment, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
-    """Read all pages again if an output has changed: any page may show a number of any notebook."""
+    """Read all pages again if an output has changed, as any page may show a number of any notebook, or one is gone."""
     before, now = getattr(env, "gpbnb_outputs", None), app.config.gpbnb_outputs
     env.gpbnb_outputs = now
-    return [] if before in (None, now) else sorted(env.found_docs)
+    return [] if before in (None, now) and not removed else sorted(env.found_docs)
 
 
 def remove_old_pages(app: Sphinx, error: Exception | None) -> None:
@@ -80,6 +104,7 @@ def remove_old_pages(app: Sphinx, error: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict:
+    gc.set_threshold(200_000, 20, 100)  # the trees of all pages are large, and hardly any of their nodes become garbage
     sources = sorted(Path(__file__).parent.glob("*.py"))
     state = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
     app.add_config_value("gpbnb_extensions", state, "env")  # a change of them changes any page
@@ -87,6 +112,9 @@ def setup(app: Sphinx) -> dict:
     app.connect("builder-inited", execute)
     app.connect("source-read", use_copy)
     app.connect("env-get-outdated", outdated)
+    app.connect("env-before-read-docs", keep_numbers, priority=900)
+    app.connect("env-get-updated", renumbered, priority=900)
+    app.connect("env-updated", keep_contents)
     app.connect("env-updated", write_in_parallel)
     app.connect("build-finished", remove_old_pages)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

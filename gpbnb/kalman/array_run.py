@@ -19,10 +19,10 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.kalman import array_steps
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
+from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import Contraction, contraction_start
 from gpbnb.kalman.filter_run import Checkpoints, Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import advance_bound
 from gpbnb.kalman.model import LinearModel
 
 _HUNG = (Form.HUNG, Form.HUNG_SECOND_GAIN)
@@ -295,7 +295,7 @@ class _StateBound:
         try:
             x, P = self._wide_state(known), self._wide_covariance()
             self.bound = advance_bound(
-                int(Form.INNOVATION),
+                Form.INNOVATION,
                 self.exact,
                 self.plain,
                 double_doubles(z.reshape(1, -1, 1)),

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import Decimal
+from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import advance_bound, widen
-from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED, advance
+from gpbnb.kalman.kernels.bounded import widen
+from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED
 from gpbnb.kalman.model import LinearModel
 
 _BLOCK = 256  # steps whose results are kept for the bound
@@ -85,7 +86,12 @@ class BoundedRun(Run):
             return
         self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
-        values = (packed if self.fmt is None else double_doubles(self.exactly(packed)))[:, :, np.newaxis]
+        if self.fmt is None:
+            values = packed[:, :, np.newaxis]
+        elif packed.ndim == 2:
+            values = np.stack([packed, np.zeros_like(packed)], axis=-1)[:, :, np.newaxis]
+        else:
+            values = double_doubles(self.exactly(packed))[:, :, np.newaxis]
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         for begin in range(0, len(packed), _BLOCK):
             self._take_block(packed[begin : begin + _BLOCK], values[begin : begin + _BLOCK])
@@ -101,9 +107,7 @@ class BoundedRun(Run):
         notes[NEXT_CHECKPOINT] = 0
         failure: ArithmeticError | None = None
         try:
-            advance(
-                self.tag, int(self.form), self.matrices, z, first, self.x, self.P, every, x[1:], K[1:], P[1:], notes
-            )
+            self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
         except (OverflowError, ZeroDivisionError) as error:
             notes[STOPPED], failure = notes[DONE] + 1, error
         done = int(notes[DONE]) - first
@@ -116,21 +120,11 @@ class BoundedRun(Run):
             self.reason = self.stopped_by(failure) if failure else pivot
         if not done:
             return
-        computed = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        x, P, K, UR = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        steps = self.bound, self.checkpoint_steps, at, self.bounds
         try:
-            self.bound = advance_bound(
-                int(self.form),
-                self._exact,
-                self._plain,
-                exact_z[:done],
-                first,
-                *computed,
-                self.bound,
-                self.checkpoint_steps,
-                at,
-                self.bounds,
-            )
-        except (OverflowError, ZeroDivisionError):  # beyond double-double, so there is no bound from here on
+            self.bound = advance_bound(self.form, self._exact, self._plain, exact_z[:done], first, x, P, K, UR, *steps)
+        except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
             self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
 
 

@@ -31,7 +31,7 @@ class History:
     gain, covariance : (c, n, m) and (c, n, n), likewise.
     reference : the reference at the same steps.
     indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
-    stopped : the step that a division by zero, or a number beyond the backend's range, ended, if any.
+    stopped : the step at which a division by zero or a number beyond the backend's range ended the run, if any.
     """
 
     model: LinearModel

@@ -37,8 +37,8 @@ from gpbnb.kalman.year import Year
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",
     "rate": "error of the drift rate (mas/yr)",
-    "gain": "relative error of the gain (no unit)",
-    "covariance": "relative error of the covariance (no unit)",
+    "gain": "relative gain error (no unit)",
+    "covariance": "relative covariance error (no unit)",
 }
 _DIGITS = np.linspace(3.5, 23, 50)
 _MARKERS = {Form.HUNG: "o", Form.HUNG_SECOND_GAIN: "P", Form.INNOVATION: "^", Form.JOSEPH: "s", Form.UD: "D"}

@@ -19,7 +19,17 @@ from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, QUANTITIES, STOPPED, advance, prepare
+from gpbnb.kalman.kernels.step import (
+    DONE,
+    INDEFINITE,
+    NEXT_CHECKPOINT,
+    QUANTITIES,
+    STOPPED,
+    advance,
+    advance_ud,
+    factor_each,
+    invert_each,
+)
 from gpbnb.kalman.model import LinearModel
 
 
@@ -36,12 +46,12 @@ class Run:
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
     compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
         a step over to the next; only for the innovation form and Joseph's.
-    order, block : of the additions in matrix products, as of :func:`gpbnb.linalg.matmul`; any but "left" in bases 2 and
-        16, and not in the UD form, which has few matrix products.
+    order, block : order of the additions in matrix products, as for :func:`gpbnb.linalg.matmul`. Orders other than
+        "left" need base 2 or 16, and a form other than UD, which has few matrix products.
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not rise; compensation or another order of
+    ValueError : a format without compiled loops; checkpoint steps that do not ascend; compensation or another order of
         additions in a form that does not have it.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
@@ -86,7 +96,7 @@ class Run:
         )
         self.notes = np.zeros(4, dtype=np.int64)
         try:
-            definite = prepare(self.tag, int(form), Q, R, self.P, RI, self.UQ, self.UR)
+            definite = self._prepare(Q, R, RI)
         except ZeroDivisionError:
             definite = False
         if not definite:
@@ -97,9 +107,19 @@ class Run:
         increment = self.as_packed(model.Phi - np.eye(n, dtype=int) if compensated else np.zeros((0, n, n)))
         self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
         rest = (identity, increment, np.zeros_like(self.x), self._place)
-        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, self.UQ, self.UR, *rest)
+        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, *rest)
         #: Why the run stopped, if it did.
         self.reason = ""
+
+    def _prepare(self, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
+        """Compute what the form needs beside the model; whether the covariances are definite in this arithmetic."""
+        if self.form is Form.HUNG_SECOND_GAIN:
+            return bool(invert_each(self.tag, R, RI))
+        if self.form is Form.UD:
+            given, self.P = self.P, np.empty_like(self.P)
+            pairs = (Q, self.UQ), (R, self.UR), (given[np.newaxis], self.P[np.newaxis])
+            return all(factor_each(self.tag, *pair) for pair in pairs)
+        return True
 
     @property
     def steps(self) -> int:
@@ -125,9 +145,8 @@ class Run:
         self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        outputs = (self.checkpoint_steps, self.X, self.G, self.C, self.notes)
         try:
-            advance(self.tag, int(self.form), self.matrices, packed, self.steps, self.x, self.P, *outputs)
+            self.advance(packed, (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
         except (OverflowError, ZeroDivisionError) as error:
             self.notes[STOPPED] = self.steps + 1
             self.reason = self.stopped_by(error)
@@ -135,8 +154,28 @@ class Run:
             if self.stopped:
                 self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
 
+    def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
+        """Take one step per packed measurement, (steps, m, columns of x).
+
+        Parameters
+        ----------
+        kept : the checkpoint steps; arrays for estimates, gains and covariances, or factors, at them.
+        notes : the status of the run, which is brought up to date.
+
+        Raises
+        ------
+        OverflowError, ZeroDivisionError : one more step than are noted as done came to that.
+        """
+        if self.form is Form.UD:
+            Phi, _, H, HT, *_ = self.matrices
+            factors = Phi, H, HT, self.UQ, self.UR, self._place
+            advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
+        else:
+            repeated = kept[1][:0], kept[3][:0], self.UR[:0]
+            advance(self.tag, int(self.form), self.matrices, z, self.steps, self.x, self.P, repeated, kept, notes)
+
     def stopped_by(self, error: ArithmeticError) -> str:
-        """Name what ended the last step: "overflow in the gain at step 812"."""
+        """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 

@@ -6,15 +6,19 @@ records are the columns of one matrix. Each record gets the same digits as in a 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.records import advance_records
-from gpbnb.kalman.kernels.step import STOPPED
+from gpbnb.kalman.kernels.records import pairs_as_floats
+from gpbnb.kalman.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, STOPPED
 from gpbnb.kalman.model import LinearModel
+
+_BLOCK = 1024  # steps whose estimates of all records are kept at once
 
 
 class Records(Run):
@@ -76,13 +80,24 @@ class Records(Run):
         out = np.full((len(z), states, self.records), np.nan)
         if self.stopped or not len(z):
             return out
-        before = self.steps
-        kept = (self.checkpoint_steps, (self.X, self.G, self.C), self.notes)
-        try:
-            advance_records(
-                self.tag, int(self.form), self.matrices, self.as_packed(z), before, self.x, self.P, *kept, out
-            )
-        except (OverflowError, ZeroDivisionError):
-            self.notes[STOPPED] = self.steps + 1
-        out[self.steps - before :] = np.nan
+        for begin in range(0, len(z), _BLOCK):
+            self._carry_block(self.as_packed(z[begin : begin + _BLOCK]), out[begin : begin + _BLOCK])
+            if self.stopped:
+                break
         return out
+
+    def _carry_block(self, z: NDArray[Any], out: NDArray[np.float64]) -> None:
+        before, notes = self.steps, self.notes.copy()
+        X, G, C = (np.empty((len(z), *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
+        notes[NEXT_CHECKPOINT] = 0
+        try:
+            self.advance(z, (np.arange(before + 1, before + len(z) + 1), X, G, C), notes)
+        except (OverflowError, ZeroDivisionError):
+            notes[STOPPED] = notes[DONE] + 1
+        self.notes[[DONE, INDEFINITE, STOPPED]] = notes[[DONE, INDEFINITE, STOPPED]]
+        done = slice(0, self.steps - before)
+        estimates = X[done, : out.shape[1]]
+        if estimates.dtype == np.float64:
+            out[done] = estimates if estimates.ndim == 3 else estimates[..., 0]
+        else:
+            pairs_as_floats(estimates, out[done])

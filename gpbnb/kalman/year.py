@@ -75,7 +75,7 @@ def rows(case: Case, found: History) -> list[tuple[str, ...]]:
 class Bounds:
     """The contraction bound of a run, in the same units and norms as the errors of :class:`Year`.
 
-    The errors of a run that has none of its own are at most those against its reference, and the reference's bound:
+    The errors of a run without its own bound are at most its distance from the reference plus the reference's bound:
     :func:`gpbnb.kalman.contraction.companion_bound`.
     """
 

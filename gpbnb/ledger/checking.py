@@ -196,7 +196,7 @@ def counts(rows: Iterable[Row]) -> dict[str, int]:
 
 
 def in_reading_order(rows: Iterable[Row]) -> tuple[Row, ...]:
-    """Sort by document and chapter in order of appearance, then by section number; sections keep their order."""
+    """Sort by document and chapter in order of appearance, then by section; rows of a section keep their order."""
     rows = tuple(rows)
     documents = list(dict.fromkeys(row.statement.document for row in rows))
     chapters = list(dict.fromkeys((row.statement.document, row.statement.chapter) for row in rows))

@@ -80,7 +80,7 @@ def test_distribution(ax):
         (
             (math.sqrt(30), "root-sum-square", BLACK, 1.3),
             (1.0, "goal", GREY, 1.08),  # mas/yr
-            (10.0, "sum of all", BLACK, 0.7),
+            (10.0, "sum of all errors", BLACK, 0.7),
         ),
         strict=True,
     ):

@@ -291,7 +291,7 @@ def test_build_up(ax):
     assert near(names.pop("trapezoidal"), BLUE, (1, 1))
     assert near(names.pop("rectangular"), PINK, (1, 20))
     assert not names
-    assert ax.get_title(loc="left") == r"$\mu = 0.2$; green: theory; dashed: random walk alone"
+    assert ax.get_title(loc="left") == r"$\mu = 0.2$; green: theory; dashed: random walk only"
     return ax.figure
 
 
@@ -303,15 +303,15 @@ def test_rules_first_order(ax):
     assert found["trapezoidal"].get_ydata() == pytest.approx(np.ones(60))
     assert found["Simpson"].get_ydata() == pytest.approx(np.sqrt(1 + np.tanh(mu / 2) / 9 / walk(mu)), rel=1e-6)
     best = [theory.best_possible_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
-    assert found["scaled samples (bound)"].get_ydata() == pytest.approx(np.sqrt(best / walk(mu)), rel=1e-6)
+    assert found["scaled samples (lower bound)"].get_ydata() == pytest.approx(np.sqrt(best / walk(mu)), rel=1e-6)
     assert {name: look(line)[:2] for name, line in found.items()} == {
         "trapezoidal": (GREEN, "-"),
         "Simpson": (BLUE, "-"),
-        "scaled samples (bound)": (BLACK, ":"),
+        "scaled samples (lower bound)": (BLACK, ":"),
     }
     assert near(names.pop("trapezoidal"), GREEN, (mu[0], 1.45))
     assert near(names.pop("Simpson"), BLUE, (mu[15], 1.45))
-    assert near(names.pop("scaled samples"), BLACK, points_of(found["scaled samples (bound)"])[45])
+    assert near(names.pop("scaled samples"), BLACK, points_of(found["scaled samples (lower bound)"])[45])
     assert not names
     return ax.figure
 

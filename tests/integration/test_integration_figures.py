@@ -128,7 +128,7 @@ def test_rules(ax):
     assert line(ax, "trapezoidal").get_ydata() == pytest.approx(np.ones(60))
     mu = line(ax, "Simpson").get_xdata()
     assert line(ax, "Simpson").get_ydata() == pytest.approx(np.sqrt(1 + np.tanh(mu / 2) / 9 / theory.walk_factor(mu)))
-    assert np.all(line(ax, "scaled samples (bound)").get_ydata() < 1)
+    assert np.all(line(ax, "scaled samples (lower bound)").get_ydata() < 1)
     check_labels(ax, "rad", "relative")
 
 

@@ -151,6 +151,16 @@ def test_errors_in_units(kernel):
     same(plain(kernel.covariance_error_bound)(bound), ZETA * (L * (1 + SHARE)) ** 2)
 
 
+def test_errors_of_two_states_go_with_the_rows_of_the_weights(kernel):
+    bound = Contraction(np.array([[2.0, 0.0], [3.0, 4.0]]), float(ETA), float(ZETA), 1.0, np.zeros(1))
+    up = float(1 + SHARE)
+    state = plain(kernel.state_error_bound)(bound)
+    assert state == pytest.approx([2 * float(ETA) * up, 5 * float(ETA) * up], rel=1e-13)
+    square = float(ZETA) * up**2
+    found = plain(kernel.covariance_error_bound)(bound)
+    assert found == pytest.approx(square * np.array([[4.0, 10.0], [10.0, 25.0]]), rel=1e-13)
+
+
 def test_error_of_the_gain(kernel, monkeypatch):
     monkeypatch.setattr(kernels, "_U", 1 / 32)
     bound = Contraction(one(L), float(ETA), float(ZETA), 1.0, array(F(1, 7)))

@@ -58,8 +58,8 @@ def digits(precision, chopped=False):
     [
         ("drift", [2.0, 3.0, 0.5], "error of the drift angle (mas)"),
         ("rate", [None, 4.0, 2.0], "error of the drift rate (mas/yr)"),
-        ("gain", [10.0, 12.0, 14.0], "error / gain, norms (no unit)"),
-        ("covariance", [15.0, 18.0, 21.0], "error / covariance, norms (no unit)"),
+        ("gain", [10.0, 12.0, 14.0], "relative gain error (no unit)"),
+        ("covariance", [15.0, 18.0, 21.0], "relative covariance error (no unit)"),
     ],
     ids=["drift", "rate", "gain", "covariance"],
 )
@@ -219,8 +219,8 @@ def test_headline(ax):
     assert near(names.pop("(125) as printed"), ORANGE, (3.5, printed.get_ydata()[0]))
     x = float(corrected.get_xdata()[12])
     assert near(names.pop("(125) with its faults corrected"), ORANGE, (x, corrected.get_ydata()[12]))
-    assert near(names.pop("goal: one milliarcsecond"), GREY, (3.5, 0.7))
-    assert near(names.pop("as large as the drift of a year"), GREY, (16.9, size))
+    assert near(names.pop("tolerance: one milliarcsecond"), GREY, (3.5, 0.7))
+    assert near(names.pop("as large as the drift in a year"), GREY, (16.9, size))
     assert near(names.pop("9 printed"), ORANGE, (9, size))
     assert near(names.pop("17 printed"), ORANGE, (17, size))
     assert not names

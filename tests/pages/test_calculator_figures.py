@@ -35,7 +35,7 @@ FIGURES = {
         (1, 30),
         "Places of the register t",
         "share lost",
-        {"share of strength lost, one dimension": "lost"},
+        {"share of the signal lost, one dimension": "lost"},
     ),
     "integration": (
         "rate",
@@ -58,14 +58,14 @@ LINES = {
         "its error Δω (rad/s)": ["error"],
         "period of the off-tuned signal, 2π/Δω (years)": ["beat"],
         "phase at the end (rad)": ["phase"],
-        "share of strength lost at the end, one dimension": ["lost"],
-        "drift across, two dimensions (mas a year)": ["across"],
+        "share of the signal lost at the end, one dimension": ["lost"],
+        "cross drift, two dimensions (mas a year)": ["across"],
     },
     "integration": {
         "μ = ω/f": ["mu"],
         "random walk, (35) (u s per √s)": ["exact"],
         "random walk, (39) (u s per √s)": ["printed"],
-        "(39) over (35)": ["ratio"],
+        "(39) / (35)": ["ratio"],
     },
     "kalman": {
         label: [f"a{i}", f"b{i}", f"bound{i}", f"digits{i}"] for i, label in enumerate(FIGURES["kalman"][4], 1) if i < 6

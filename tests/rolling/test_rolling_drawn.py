@@ -75,7 +75,7 @@ def test_residual(ax):
     )
     assert spans_of(measured) == pytest.approx([1, 0.5, 0.4])
     assert (look(measured)[0], look(one)[0], set(one.get_ydata())) == (BLUE, GREEN, {1})
-    assert [measured.get_label(), one.get_label()] == ["measured", "expected of samples"]
+    assert [measured.get_label(), one.get_label()] == ["measured", "expected for the samples"]
     return ax.figure
 
 

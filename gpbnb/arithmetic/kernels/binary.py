@@ -17,9 +17,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import Binary, Hexadecimal
 
 _SIGN = np.int64(-(2**63))
@@ -55,16 +55,16 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
     clear : rounds the integer view of a magnitude, already chopped to 53 bits, to the digits of a format.
     ties : whether the format may have 53 bits, where nothing is cleared but float64 rounds ties to even.
     """
-    clear = njit(forceinline=True)(clear)
+    clear = inner(forceinline=True)(clear)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def fit(fmt: Any, p: Any, shift: Any, exact_zero: Any) -> Any:
         u = bits(p)
         v = clear(fmt, (u & _MAGNITUDE) + shift)
         in_range = ((v >= _LEAST) & (v < _LIMIT)) | (exact_zero & (v == 0))
         return from_bits(v | (u & _SIGN)) if in_range else np.nan
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def direction(fmt: Any, p: Any, r: Any) -> Any:
         """From p, the nearest float64 to the exact p + r, to that with the further digits dropped (or the tie up)."""
         if ties and fmt.precision == 53 and fmt.nearest:
@@ -80,13 +80,13 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         r = (a - (s - c)) + (b - c)
         return fit(fmt, s, direction(fmt, s, r), True)
 
-    add = njit(forceinline=True)(total)
+    add = inner(forceinline=True)(total)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def subtract(fmt: Any, a: Any, b: Any) -> Any:
         return add(fmt, a, 0.0 - b)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def multiply(fmt: Any, a: Any, b: Any) -> Any:
         p = a * b + 0.0  # no negative zero
         zero = (a == 0.0) | (b == 0.0)
@@ -94,7 +94,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
             return fit(fmt, p, np.int64(0), zero)
         return fit(fmt, p, direction(fmt, p, fma(a, b, -p)), zero)
 
-    @njit(error_model="numpy", forceinline=True)
+    @inner(error_model="numpy", forceinline=True)
     def divide(fmt: Any, a: Any, b: Any) -> Any:
         if b == 0.0:
             raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
@@ -108,7 +108,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, q, r)
         return fit(fmt, q, down, a == 0.0)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def sqrt(fmt: Any, a: Any) -> Any:
         if a < 0.0:
             raise ValueError("got the square root of a negative number; needed x >= 0")
@@ -119,7 +119,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, s, fma(-s, s, a))
         return fit(fmt, s, down, a == 0.0)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         return fit(fmt, x + 0.0, np.int64(0), x == 0.0)
 

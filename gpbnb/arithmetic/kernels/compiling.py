@@ -1,4 +1,6 @@
-"""The decorator of compiled functions that callers in Python use, and the cache that keeps what was compiled.
+"""The decorators of compiled functions, and the cache that keeps what was compiled.
+
+:func:`compiled` is for those that callers in Python use, :func:`inner` for those that only they call.
 
 numba's own cache compares the file that defines a function. It does not notice a change in another file whose functions
 are compiled in. The cache here has a key for all files that the defining file imports. Several processes can
@@ -39,11 +41,24 @@ def compiled(function: Callable[..., Any]) -> Any:
 
     It releases the interpreter's lock.
     """
-    dispatcher = njit(nogil=True)(function)
+    dispatcher = njit(nogil=True, no_cfunc_wrapper=True)(function)
     sources = imported(Path(function.__code__.co_filename).resolve())
     if _folder() is not None and not changed_since_import(sources):
         dispatcher._cache = _Cache(function)
     return dispatcher
+
+
+def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+    """Compile a function into the compiled functions that call it.
+
+    It gets no entries for callers in Python and C, whose compilation takes longer than that of a short function.
+
+    Parameters
+    ----------
+    options : of numba's ``njit``.
+    """
+    decorate = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+    return decorate if function is None else decorate(function)
 
 
 @lru_cache(maxsize=1)

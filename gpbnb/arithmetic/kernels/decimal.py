@@ -11,10 +11,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import Away, Down, Even, LimitedDecimal, Odd, Up, Zero
 
 NARROW = 9  # digits up to which the dividend fits into 64 bits
@@ -41,19 +41,19 @@ _NORMAL = np.array([10**k << (63 - n) for k, n in enumerate(_LENGTHS)], np.uint6
 _RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in enumerate(_LENGTHS)], np.uint64)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _power(k: Any) -> Any:
     """10**k; an unsigned index spares the question whether it counts from the end."""
     return POWER[np.uint64(k)]
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _quotient(n: Any, k: Any) -> Any:
     """``n // 10**k`` for n < 2**61, k > 0."""
     return high_product(n, INVERSE[np.uint64(k)]) >> LENGTH[np.uint64(k)]
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _wide_by_power(high: Any, low: Any, k: Any) -> Any:
     """Quotient and remainder by 10**k of a 128-bit number, for a quotient that fits into 64 bits.
 
@@ -78,7 +78,7 @@ def _wide_by_power(high: Any, low: Any, k: Any) -> Any:
     return q1, r >> s
 
 
-@njit
+@inner
 def _wide_by_any(high: Any, low: Any, d: Any) -> Any:
     """Quotient and remainder of a 128-bit number by d < 2**63, for a quotient that fits into 64 bits.
 
@@ -103,14 +103,14 @@ def _wide_by_any(high: Any, low: Any, d: Any) -> Any:
     return q, r >> s
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _digits(n: Any) -> Any:
     """Number of decimal digits of n > 0; one for zero."""
     count = ((64 - leading_zeros(n | _U1)) * 1233) >> 12  # that number or one less
     return count + np.int64(n >= _power(count))
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def check(e: Any) -> None:
     """OverflowError for an exponent that the next operations could not compute with."""
     if e > LARGEST_EXPONENT or e < -LARGEST_EXPONENT:
@@ -124,7 +124,7 @@ def _increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any)
     raise TypeError("got a call of _increment from Python; needed one from a function compiled by numba")
 
 
-@overload(_increment, strict=False, jit_options={"forceinline": True})
+@overload(_increment, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
     if getattr(fmt, "instance_class", None) is not LimitedDecimal:
         return lambda fmt, m, up, tie, inexact, negative: np.uint64(up & fmt.nearest)
@@ -143,7 +143,7 @@ def _within_range(fmt: Any, m: Any, e: Any) -> Any:
     raise TypeError("got a call of _within_range from Python; needed one from a function compiled by numba")
 
 
-@overload(_within_range, strict=False, jit_options={"forceinline": True})
+@overload(_within_range, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_within_range(fmt: Any, m: Any, e: Any) -> Any:
     def anywhere(fmt: Any, m: Any, e: Any) -> Any:
         check(e)
@@ -157,7 +157,7 @@ def _overloaded_within_range(fmt: Any, m: Any, e: Any) -> Any:
     return within if getattr(fmt, "instance_class", None) is LimitedDecimal else anywhere
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
     """The pair of a magnitude of t digits, or one that rounding carried to t + 1."""
     carried = m == _power(fmt.precision)
@@ -165,7 +165,7 @@ def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
     return _within_range(fmt, (-np.int64(m) if negative else np.int64(m)), e + np.int64(carried))
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _filled(fmt: Any, n: Any, e: Any, negative: Any) -> Any:
     """The pair of an exact n of less than t digits."""
     if n == _U0:
@@ -174,7 +174,7 @@ def _filled(fmt: Any, n: Any, e: Any, negative: Any) -> Any:
     return _number(fmt, n * _power(k), e - k, negative)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def add(fmt: Any, a: Any, b: Any) -> Any:
     m1, e1 = a
     m2, e2 = b
@@ -245,12 +245,12 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     return _number(fmt, m, e, negative)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
     return add(fmt, a, (-b[0], b[1]))
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     m1, e1 = a
     m2, e2 = b
@@ -272,7 +272,7 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
     return _number(fmt, m, e1 + e2 + k, negative)
 
 
-@njit
+@inner
 def divide(fmt: Any, a: Any, b: Any) -> Any:
     m1, e1 = a
     m2, e2 = b
@@ -294,7 +294,7 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
     return _number(fmt, m, e1 - e2 - k, negative)
 
 
-@njit
+@inner
 def sqrt(fmt: Any, a: Any) -> Any:
     m, e = a
     if m < 0:
@@ -323,7 +323,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
     return _number(fmt, whole + _increment(fmt, whole, rest > root, False, rest > 0, False), (e - k) // 2, False)
 
 
-@njit
+@inner
 def round_(fmt: Any, x: Any) -> Any:
     """Round ``m * 10**e``, m any int64 but the least."""
     m, e = x
@@ -340,7 +340,7 @@ def round_(fmt: Any, x: Any) -> Any:
     return _number(fmt, q, e + drop, m < 0)
 
 
-@njit
+@inner
 def compare(fmt: Any, a: Any, b: Any) -> Any:
     m1, e1 = a
     m2, e2 = b

@@ -13,27 +13,27 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gpbnb.arithmetic.kernels.bits import fma
+from gpbnb.arithmetic.kernels.compiling import inner
 
 LEAST, LIMIT = 2.0**-850, 2.0**1000
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _two_sum(a: Any, b: Any) -> Any:
     s = a + b
     c = s - a
     return s, (a - (s - c)) + (b - c)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _fast_two_sum(a: Any, b: Any) -> Any:
     s = a + b
     return s, b - (s - a)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _within_range(high: Any, low: Any, exact_zero: Any) -> Any:
     size = abs(high)
     if ((size >= LEAST) & (size < LIMIT)) | (exact_zero & (size == 0.0)):
@@ -41,7 +41,7 @@ def _within_range(high: Any, low: Any, exact_zero: Any) -> Any:
     return np.nan, np.nan
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def add(fmt: Any, a: Any, b: Any) -> Any:
     s, e = _two_sum(a[0], b[0])
     t, f = _two_sum(a[1], b[1])
@@ -50,12 +50,12 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     return _within_range(s, e, True)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
     return add(fmt, a, (-b[0], -b[1]))
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     p = a[0] * b[0]
     e = fma(a[0], b[0], -p)
@@ -64,7 +64,7 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
     return _within_range(p, e, (a[0] == 0.0) | (b[0] == 0.0))
 
 
-@njit(error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def divide(fmt: Any, a: Any, b: Any) -> Any:
     if b[0] == 0.0:
         raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
@@ -76,7 +76,7 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
     return _within_range(q, low, a[0] == 0.0)
 
 
-@njit(error_model="numpy", forceinline=True)
+@inner(error_model="numpy", forceinline=True)
 def sqrt(fmt: Any, a: Any) -> Any:
     if a[0] < 0.0:
         raise ValueError("got the square root of a negative number; needed x >= 0")
@@ -87,13 +87,13 @@ def sqrt(fmt: Any, a: Any) -> Any:
     return _within_range(s, low, False)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def round_(fmt: Any, x: Any) -> Any:
     high, low = _two_sum(x[0], x[1])
     return _within_range(high, low, x[0] == 0.0 and x[1] == 0.0)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def compare(fmt: Any, a: Any, b: Any) -> Any:
     if a[0] != a[0] or b[0] != b[0]:
         raise OverflowError(

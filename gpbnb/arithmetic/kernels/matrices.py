@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     check,
@@ -30,13 +30,13 @@ from gpbnb.arithmetic.kernels.scalar import (
 from gpbnb.arithmetic.kernels.tags import Blocked, Limited, Mixed, Pairwise
 
 
-@njit(nogil=True)
+@inner
 def is_zero(fmt: Any, x: Any) -> Any:
     """Whether a number is zero."""
     return compare(fmt, x, zero(fmt)) == 0
 
 
-@njit(nogil=True)
+@inner
 def copy(fmt: Any, a: Any, c: Any) -> None:
     """c = a."""
     for i in range(a.shape[0]):
@@ -44,7 +44,7 @@ def copy(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (i, j), load(fmt, a, (i, j)))
 
 
-@njit(nogil=True)
+@inner
 def transpose(fmt: Any, a: Any, c: Any) -> None:
     """c = a'; c is not a."""
     for i in range(a.shape[0]):
@@ -52,7 +52,7 @@ def transpose(fmt: Any, a: Any, c: Any) -> None:
             put(fmt, c, (j, i), load(fmt, a, (i, j)))
 
 
-@njit(nogil=True)
+@inner
 def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a + b."""
     for i in range(a.shape[0]):
@@ -60,7 +60,7 @@ def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
             store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
 
 
-@njit(nogil=True)
+@inner
 def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a - b."""
     for i in range(a.shape[0]):
@@ -73,7 +73,7 @@ def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     raise TypeError("got a call of product_in_order from Python; needed one from a function compiled by numba")
 
 
-@njit(nogil=True)
+@inner
 def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> Any:
     # Without recursion, which numba's cache does not survive: product k completes every part that it is the last of.
     count = 0
@@ -90,7 +90,7 @@ def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> An
     return sums[0]
 
 
-@njit(nogil=True)
+@inner
 def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, n: int) -> Any:
     total = zero(fmt)
     for first in range(0, n, fmt.sums.block):
@@ -109,19 +109,19 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     order = limited.types[2].instance_class if getattr(limited, "instance_class", None) is Limited else None
 
     def pairwise(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        inner = fmt.sums if mixed else fmt
+        of_sums = fmt.sums if mixed else fmt
         sums = np.zeros(64)
         for i in range(c.shape[0]):
             for j in range(c.shape[1]):
-                put(fmt, c, (i, j), _pairwise(inner, a, b, i, j, a.shape[1], sums))
+                put(fmt, c, (i, j), _pairwise(of_sums, a, b, i, j, a.shape[1], sums))
         check(fmt, c)
         return True
 
     def blocked(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        inner = fmt.sums if mixed else fmt
+        of_sums = fmt.sums if mixed else fmt
         for i in range(c.shape[0]):
             for j in range(c.shape[1]):
-                put(fmt, c, (i, j), _blocked(inner, a, b, i, j, a.shape[1]))
+                put(fmt, c, (i, j), _blocked(of_sums, a, b, i, j, a.shape[1]))
         check(fmt, c)
         return True
 
@@ -130,7 +130,7 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return blocked if order is Blocked else lambda fmt, a, b, c: False
 
 
-@njit(nogil=True)
+@inner
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right, over the entries of a that are not zero; c is neither a nor b."""
     if product_in_order(fmt, a, b, c):
@@ -154,7 +154,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """As :func:`product`, with the same digits, over the entries of b that are not zero."""
     if product_in_order(fmt, a, b, c):
@@ -178,7 +178,7 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def inverse(fmt: Any, a: Any, c: Any) -> Any:
     """c = the inverse of a, by elimination without exchange of rows, which a covariance does not need; a is used up.
 
@@ -211,7 +211,7 @@ def inverse(fmt: Any, a: Any, c: Any) -> Any:
     return answer
 
 
-@njit(nogil=True)
+@inner
 def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
     """u = the factors of a covariance a = U D U', D on the diagonal of u and U, with ones there, above; a is used up.
 

@@ -14,10 +14,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gpbnb.arithmetic.kernels.binary import LEAST
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.rules import DRAW_BITS
 from gpbnb.arithmetic.kernels.tags import Away, Down, Even, Odd, Random, Sixteen, Two, Up, Zero
 
@@ -96,10 +96,10 @@ _DROPPED = {Two: _dropped_binary, Sixteen: _dropped_hexadecimal}
 @cache
 def operations(digits: Any, mode: Any) -> dict[str, Any]:
     """The scalar operations for the classes of the digits and of the rounding mode."""
-    dropped = njit(forceinline=True)(_DROPPED[digits])
-    round_magnitude = njit(forceinline=True)(_MODES[mode])
+    dropped = inner(forceinline=True)(_DROPPED[digits])
+    round_magnitude = inner(forceinline=True)(_MODES[mode])
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def fit(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
         """Round the exact p + r, of whose r only the sign counts; p is its nearest float64."""
         negative = p < 0.0
@@ -117,23 +117,23 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         y = fmt.under if y < fmt.lowest else y
         return y if a == a else np.nan
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def add(fmt: Any, a: Any, b: Any) -> Any:
         s = a + b
         c = s - a
         return fit(fmt, s, (a - (s - c)) + (b - c), True)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def subtract(fmt: Any, a: Any, b: Any) -> Any:
         return add(fmt, a, 0.0 - b)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def multiply(fmt: Any, a: Any, b: Any) -> Any:
         p = a * b
         zero = (a == 0.0) | (b == 0.0)
         return fit(fmt, p, 0.0 if fmt.precision <= EXACT_PRODUCT else fma(a, b, -p), zero)
 
-    @njit(error_model="numpy", forceinline=True)
+    @inner(error_model="numpy", forceinline=True)
     def divide(fmt: Any, a: Any, b: Any) -> Any:
         if b == 0.0:
             raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
@@ -141,19 +141,19 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         r = fma(-q, b, a)
         return fit(fmt, q, -r if b < 0.0 else r, a == 0.0)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def sqrt(fmt: Any, a: Any) -> Any:
         if a < 0.0:
             raise ValueError("got the square root of a negative number; needed x >= 0")
         s = math.sqrt(a)
         return fit(fmt, s, fma(-s, s, a), a == 0.0)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         y = fit(fmt, x, 0.0, x == 0.0)
         return y if abs(x) < np.inf else np.nan
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
         w, rest, zero = _fused_sum(a, b, c)
         return fit(fmt, w, rest, zero)
@@ -169,7 +169,7 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
     }
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _round_even(fmt: Any, x: Any) -> Any:
     """Round a float64 in as few vector instructions as there can be; the result is that of the general way.
 
@@ -189,14 +189,14 @@ def _round_even(fmt: Any, x: Any) -> Any:
     return y + (x - x)  # NaN for infinities
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _two_sum(a: Any, b: Any) -> Any:
     s = a + b
     c = s - a
     return s, (a - (s - c)) + (b - c)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _fused_sum(a: Any, b: Any, c: Any) -> Any:
     """a * b + c as the nearest float64 w and a rest of the right sign, and whether it is exactly zero.
 
@@ -217,51 +217,51 @@ def _fused_sum(a: Any, b: Any, c: Any) -> Any:
 # -- by the machine ----------------------------------------------------------------------------------
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _single(x: Any) -> Any:
     y = np.float64(np.float32(x)) + 0.0  # no negative zero
     return y if abs(y) <= _LARGEST_32 else np.nan
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _double(x: Any) -> Any:
     y = x + 0.0
     return y if abs(y) < np.inf else np.nan
 
 
 def _machine(rounded: Any) -> dict[str, Any]:
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def add(fmt: Any, a: Any, b: Any) -> Any:
         return rounded(a + b)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def subtract(fmt: Any, a: Any, b: Any) -> Any:
         return rounded(a - b)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def multiply(fmt: Any, a: Any, b: Any) -> Any:
         return rounded(a * b)
 
-    @njit(error_model="numpy", forceinline=True)
+    @inner(error_model="numpy", forceinline=True)
     def divide(fmt: Any, a: Any, b: Any) -> Any:
         if b == 0.0:
             raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
         return rounded(a / b)
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def sqrt(fmt: Any, a: Any) -> Any:
         if a < 0.0:
             raise ValueError("got the square root of a negative number; needed x >= 0")
         return rounded(math.sqrt(a))
 
-    @njit(forceinline=True)
+    @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         return rounded(x)
 
     return {"add": add, "subtract": subtract, "multiply": multiply, "divide": divide, "sqrt": sqrt, "round_": round_}
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _fused_single(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     # The product is exact. The sum is rounded to odd, and so its second rounding comes out right.
     s, r = _two_sum(a * b, c)
@@ -270,7 +270,7 @@ def _fused_single(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return _single(odd if s >= 0.0 else 0.0 - odd)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _fused_double(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return _double(fma(a, b, c))
 

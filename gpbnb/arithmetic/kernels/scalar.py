@@ -24,10 +24,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels import binary, decimal, doubledouble, processor, shortdecimal
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
@@ -44,7 +45,7 @@ from gpbnb.arithmetic.kernels.tags import (
     ShortDecimal,
 )
 
-_INLINE = {"forceinline": True}
+_INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
 _MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, LimitedDecimal: decimal, DoubleDouble: doubledouble}
 _MACHINE = {Hardware32: processor.SINGLE, Hardware64: processor.DOUBLE}
 
@@ -186,32 +187,32 @@ def settle(fmt: Any, c: Any) -> None:
 # -- plain float64 -----------------------------------------------------------------------------------
 
 
-@njit
+@inner
 def _double_add(fmt: Any, a: Any, b: Any) -> Any:
     return a + b
 
 
-@njit
+@inner
 def _double_subtract(fmt: Any, a: Any, b: Any) -> Any:
     return a - b
 
 
-@njit
+@inner
 def _double_multiply(fmt: Any, a: Any, b: Any) -> Any:
     return a * b
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _double_divide(fmt: Any, a: Any, b: Any) -> Any:
     return a / b
 
 
-@njit
+@inner
 def _double_sqrt(fmt: Any, a: Any) -> Any:
     return math.sqrt(a)
 
 
-@njit
+@inner
 def _double_round(fmt: Any, x: Any) -> Any:
     return x
 
@@ -454,7 +455,7 @@ def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
 # -- sums of products --------------------------------------------------------------------------------
 
 
-@njit(nogil=True)
+@inner
 def dot(fmt: Any, x: Any, y: Any) -> Any:
     """Inner product from left to right; the first product is not added to zero."""
     n = len(x)
@@ -466,7 +467,7 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
     return stored_sum(fmt, s)
 
 
-@njit(nogil=True)
+@inner
 def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry the :func:`dot` of a row and a column; c is neither a nor b.
 
@@ -488,7 +489,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def check(fmt: Any, c: Any) -> None:
     """Settle the matrix c; OverflowError if a number in it has left the range of its backend."""
     settle(fmt, c)

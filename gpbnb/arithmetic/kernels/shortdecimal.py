@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros, select
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.decimal import HALF, INVERSE, LENGTH, POWER, check, compare, divide, round_, sqrt
 
 __all__ = ["add", "compare", "divide", "multiply", "multiply_add", "round_", "sqrt", "subtract"]
@@ -28,7 +28,7 @@ _SPARE = np.array([max(_DIGITS - len(str(2 ** (64 - zeros) - 1)), 0) for zeros i
 _SHIFT = np.array([10**k for k in _SPARE.tolist()], np.uint64)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _rule(fmt: Any, digits: Any) -> Any:
     """How to round so many digits, or one less, to t. Asked before any branch: then a loop asks only once."""
     cut, nearest = np.uint64(digits - fmt.precision), np.uint64(fmt.nearest)
@@ -37,7 +37,7 @@ def _rule(fmt: Any, digits: Any) -> Any:
     return limit, HALF[cut * nearest], INVERSE[cut], LENGTH[cut]
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _rounded(rule: Any, n: Any, e: Any, negative: Any) -> Any:
     """The pair of n by its rule, unchecked; e is the exponent for all digits. Of n = 0, only the significand holds."""
     limit, half, inverse, length = rule
@@ -47,14 +47,14 @@ def _rounded(rule: Any, n: Any, e: Any, negative: Any) -> Any:
     return select(negative, -m, m), e - np.int64(short)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _product(fmt: Any, rule: Any, a: Any, b: Any) -> Any:
     """The product, unchecked: of 2t digits or one less, and at most (10**t - 1)**2, which is not carried."""
     p = a[0] * b[0]
     return _rounded(rule, np.uint64(abs(p)), a[1] + fmt.precision + b[1], p < 0)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _sum(fmt: Any, rule: Any, a: Any, b: Any) -> Any:
     """Of two numbers; a zero among them may have any exponent."""
     t = fmt.precision
@@ -79,7 +79,7 @@ def _sum(fmt: Any, rule: Any, a: Any, b: Any) -> Any:
     return m, e
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def _checked(m: Any, e: Any) -> Any:
     if m == 0:
         return _ZERO
@@ -87,23 +87,23 @@ def _checked(m: Any, e: Any) -> Any:
     return m, e
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def add(fmt: Any, a: Any, b: Any) -> Any:
     return _sum(fmt, _rule(fmt, _DIGITS), a, b)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def subtract(fmt: Any, a: Any, b: Any) -> Any:
     return add(fmt, a, (-b[0], b[1]))
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def multiply(fmt: Any, a: Any, b: Any) -> Any:
     m, e = _product(fmt, _rule(fmt, 2 * fmt.precision), a, b)
     return _checked(m, e)
 
 
-@njit(forceinline=True)
+@inner(forceinline=True)
 def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     """fl(c + fl(a * b)); of the exponents only that of the sum is checked, which no product out of range escapes."""
     product, total = _rule(fmt, 2 * fmt.precision), _rule(fmt, _DIGITS)

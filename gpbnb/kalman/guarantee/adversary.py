@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
@@ -54,14 +53,14 @@ def number(fmt: Any, x: Any) -> Any:
     raise TypeError("got a call of number from Python; needed one from a function compiled by numba")
 
 
-@overload(number, strict=False, jit_options={"forceinline": True})
+@overload(number, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_number(fmt: Any, x: Any) -> Any:
     if getattr(fmt, "instance_class", None) in (Decimal, ShortDecimal):
         return lambda fmt, x: round_(fmt, _scaled(x))
     return lambda fmt, x: round_(fmt, x)
 
 
-@njit
+@inner
 def _scaled(x: float) -> Any:
     e = 0
     while x != 0.0 and abs(x) < 1e15:
@@ -73,7 +72,7 @@ def _scaled(x: float) -> Any:
     return np.int64(x), np.int64(e)
 
 
-@njit(nogil=True)
+@inner
 def _times(a: Any, x: Any, c: Any) -> None:
     """Compute c = a x for a matrix and a column in double-double."""
     exactly = DoubleDouble()
@@ -85,7 +84,7 @@ def _times(a: Any, x: Any, c: Any) -> None:
         put(exactly, c, i, s)
 
 
-@njit(nogil=True)
+@inner
 def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
     """Return the weighted error of an estimate."""
     exactly, total = DoubleDouble(), 0.0
@@ -113,13 +112,14 @@ def greedy(
     steer: Any,
     by_range: bool,
     ramp: float,
+    ahead: bool,
     chosen: Any,
     errors: Any,
 ) -> Any:
     """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
 
-    Most products of a step depend only on the estimate. So each candidate is judged by the error one step later, after
-    a measurement from the middle of the admissible range.
+    Most products of a step depend only on the estimate. So with `ahead`, each candidate is judged by the error one step
+    later, after a measurement from the middle of the admissible range.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def greedy(
     exactly = DoubleDouble()
     n, m, steps = Phi.shape[1], HPhi.shape[1], rows.shape[0]
     count = Phi.shape[0]
-    trial, best, ahead = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    trial, best, later = np.empty_like(x), np.empty_like(x), np.empty_like(x)
     values = np.empty((n + m + operations.shape[0], *x.shape[1:]), x.dtype)
     z, taken, tried = (
         np.empty((m, *x.shape[1:]), x.dtype),
@@ -181,7 +181,7 @@ def greedy(
             execute(fmt, operations, outputs, coefficients[at], trial, z, values)
             if excess > 1.0:
                 score = -1e300 * excess
-            elif k + 1 == steps:
+            elif k + 1 == steps or not ahead:
                 score = _worth(fmt, rows[k], trial, following)
             else:
                 tried[:] = z
@@ -196,9 +196,9 @@ def greedy(
                 for i in range(n):
                     s = doubledouble.add(exactly, load(exactly, beyond, i), load(exactly, moved, i))
                     put(exactly, beyond, i, s)
-                ahead[:] = trial
-                execute(fmt, operations, outputs, coefficients[then], ahead, z, values)
-                score = _worth(fmt, rows[k + 1], ahead, beyond)
+                later[:] = trial
+                execute(fmt, operations, outputs, coefficients[then], later, z, values)
+                score = _worth(fmt, rows[k + 1], later, beyond)
                 z[:] = tried
             if score > largest or found < 0:
                 largest, found = score, q
@@ -260,7 +260,8 @@ def attack(
         for plan in range(plans):
             pool = _pool(found, F, state, steps, candidates, plan, by_range, rng)
             steer = _steering(found, center) if by_range else np.zeros((m, n + 1))
-            outcome = run_against(found, rows, pool, steer, by_range, steps / 2 if ramp is None else ramp)
+            rise = steps / 2 if ramp is None else ramp
+            outcome = run_against(found, rows, pool, steer, by_range, rise, ahead=True)
             runs += 1
             allowed = allowed and not outcome[0]
             if outcome[0]:
@@ -303,6 +304,7 @@ def run_against(
     steer: NDArray[np.float64],
     by_range: bool,
     ramp: float = 1.0,
+    ahead: bool = False,
 ) -> tuple[int, NDArray[np.float64], NDArray[np.float64]]:
     """Run :func:`greedy` once; return the steps outside the limits, measurements in float64, and errors (steps, n)."""
     given, program = found.schedule, found.schedule.program
@@ -327,6 +329,7 @@ def run_against(
         steer,
         by_range,
         ramp,
+        ahead,
         chosen,
         errors,
     )

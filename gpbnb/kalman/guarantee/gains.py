@@ -203,7 +203,7 @@ def packed_coefficients(
     rows : indices of the run's checkpoints; the first checkpoint is for step `before` + 1.
     """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H, identity = run.matrices[0], run.matrices[2], run.matrices[9]
+    Phi, H, identity = run.matrices[0], run.matrices[2], run.matrices[7]
     K = np.ascontiguousarray(run.G[:last])
     tail = K.shape[3:]
 

@@ -19,11 +19,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, put, store, subtract
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
@@ -215,7 +214,7 @@ def controller_program() -> Program:
 # -- execution --------------------------------------------------------------------------------------------------------
 
 
-@njit(nogil=True)
+@inner
 def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, z: Any, values: Any) -> None:
     """Take one step in the arithmetic of a tag: x becomes the next state; `values` is a workspace."""
     n, m = x.shape[0], z.shape[0]

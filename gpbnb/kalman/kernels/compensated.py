@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.matrices import copy, difference, matrix_sum, product
 
 
-@njit(nogil=True)
+@inner
 def compensated_update(
     fmt: Any, increment: Any, h: Any, K: Any, z: Any, x: Any, carried: Any, d: Any, u: Any, y: Any, g: Any
 ) -> None:

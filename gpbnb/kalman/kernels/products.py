@@ -9,11 +9,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.binary import SAFE_TWICE
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
+from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.matrices import product_in_order
 from gpbnb.arithmetic.kernels.scalar import (
     add,
@@ -33,7 +33,7 @@ _MAGNITUDE = np.int64(2**63 - 1)
 _LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
 
 
-@njit(nogil=True)
+@inner
 def _is_moderate(a: Any) -> Any:
     """Whether all numbers are zero or from 2**-400 to 2**400 in magnitude."""
     least, largest = _LARGEST, np.int64(0)
@@ -74,7 +74,7 @@ def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return of_binary if getattr(fmt, "instance_class", None) is Binary else lambda fmt, a, b, c: False
 
 
-@njit(nogil=True)
+@inner
 def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a b, each entry summed from left to right over the entries of a that are not zero; c is neither a nor b."""
     if product_in_order(fmt, a, b, c):
@@ -101,7 +101,7 @@ def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """As :func:`product_with_units`, with the same digits, column after column of a.
 
@@ -121,7 +121,7 @@ def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
     check(fmt, c)
 
 
-@njit(nogil=True)
+@inner
 def add_transposed(fmt: Any, a: Any, c: Any) -> None:
     """c = c + a', over the entries of a that are not zero."""
     for i in range(a.shape[0]):

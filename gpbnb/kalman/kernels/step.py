@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.matrices import (
     copy,
     difference,
@@ -39,7 +38,7 @@ from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.compensated import compensated_update
 from gpbnb.kalman.kernels.products import add_transposed, product_by_columns, product_with_units
 
-_HUNG, _HUNG_SECOND_GAIN, _INNOVATION, _JOSEPH, _UD = (int(each) for each in Form)
+_HUNG, _HUNG_SECOND_GAIN, _JOSEPH = (int(each) for each in (Form.HUNG, Form.HUNG_SECOND_GAIN, Form.JOSEPH))
 
 #: Entries of the status of a run: steps done, the next checkpoint, the first step with a variance or pivot that is
 #: not positive, and the step that a division by zero ended.
@@ -58,7 +57,7 @@ QUANTITIES = (
 _PREDICTED, _OF_INNOVATION, _INVERSE, _GAIN, _COVARIANCE, _ESTIMATE, _FACTORS = range(len(QUANTITIES))
 
 
-@njit(nogil=True)
+@inner
 def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: Any) -> Any:
     """Thornton's modified weighted Gram-Schmidt: the factors of Phi U D U' Phi' + UQ DQ UQ', in place of U."""
     n = U.shape[0]
@@ -102,7 +101,7 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
     return definite
 
 
-@njit(nogil=True)
+@inner
 def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any, F: Any, G: Any) -> Any:
     """Bierman's update by one measurement z of h' x with variance r; its gain becomes column i of K.
 
@@ -152,7 +151,7 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
     return answer
 
 
-@njit(nogil=True)
+@inner
 def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
     """c = the inverse of U times a, by back substitution, U being that of R = U D U'."""
     for j in range(a.shape[1]):
@@ -166,38 +165,28 @@ def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
 
 
 @compiled
-def prepare(fmt: Any, form: int, Q: Any, R: Any, P: Any, RI: Any, UQ: Any, UR: Any) -> Any:
-    """What a form needs beside the model, computed in its arithmetic: the inverses of R, the factors of Q, R and P."""
-    T, S = np.empty_like(P), np.empty_like(R[0])
+def invert_each(fmt: Any, R: Any, RI: Any) -> Any:
+    """RI = the inverse of each R; whether all pivots are positive."""
+    S = np.empty_like(R[0])
     definite = True
-    if form == _HUNG_SECOND_GAIN:
-        for k in range(R.shape[0]):
-            copy(fmt, R[k], S)
-            definite = inverse(fmt, S, RI[k]) > 0 and definite
-    if form == _UD:
-        for k in range(Q.shape[0]):
-            copy(fmt, Q[k], T)
-            definite = factor_ud(fmt, T, UQ[k]) and definite
-        for k in range(R.shape[0]):
-            copy(fmt, R[k], S)
-            definite = factor_ud(fmt, S, UR[k]) and definite
-        copy(fmt, P, T)
-        definite = factor_ud(fmt, T, P) and definite
+    for k in range(R.shape[0]):
+        copy(fmt, R[k], S)
+        definite = inverse(fmt, S, RI[k]) > 0 and definite
     return definite
 
 
-@njit(nogil=True)
-def workspace(x: Any, P: Any, K: Any, KT: Any, R: Any, y: Any) -> Any:
-    """Matrices for what a step computes on its way."""
-    square = np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P)
-    tall = np.empty_like(K), np.empty_like(K), np.empty_like(K)
-    small = np.empty_like(R), np.empty_like(R), np.empty_like(R)
-    stacked = np.concatenate((P, P), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
-    columns = np.empty_like(y), np.empty_like(y), np.empty_like(x), np.empty_like(x)
-    return square, tall, (np.empty_like(KT), np.empty_like(KT)), small, columns, stacked
+@compiled
+def factor_each(fmt: Any, a: Any, U: Any) -> Any:
+    """U = the factors of each a; whether all come out definite."""
+    T = np.empty_like(a[0])
+    definite = True
+    for k in range(a.shape[0]):
+        copy(fmt, a[k], T)
+        definite = factor_ud(fmt, T, U[k]) and definite
+    return definite
 
 
-@njit(nogil=True)
+@inner
 def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F: Any, W: Any) -> None:
     """W = I - K H; KT becomes K', and T and F are used up."""
     transpose(fmt, K, KT)
@@ -206,34 +195,18 @@ def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F:
     difference(fmt, identity, F, W)
 
 
-@njit(nogil=True)
-def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
+@inner(inline="always")
+def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
     """Take step k + 1, from x and P to x and P, with the measurement z; the gain is left in the workspace.
 
     Returns 1 if all variances and pivots are positive, -1 if one is not, 0 if one is zero: x is then void.
     """
-    Phi, PhiT, H, HT, Q, R, RI, UQ, UR, identity, increment, carried, place = model
-    (V, T, W, F, WT), (K, PHt, B), (KT, HD), (S, SI, pivots), (y, g, u, v), stacked = work
+    Phi, PhiT, H, HT, Q, R, RI, identity, increment, carried, place = model
+    V, T, W, F, WT, K, PHt, B, KT, HD, S, SI, pivots, y, g, u, v = work
     phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
     phiT, hT = PhiT[k % Phi.shape[0]], HT[k % H.shape[0]]
-    answer = 1
-    place[0] = _PREDICTED
-    if form == _UD:
-        if not _predict_ud(fmt, phi, UQ[k % Q.shape[0]], P, stacked[0], stacked[1], stacked[2], T):
-            answer = -1
-        place[0] = _FACTORS
-        product(fmt, phi, x, u)
-        copy(fmt, u, x)
-        ur = UR[k % R.shape[0]]
-        decorrelate(fmt, ur, h, HD)
-        decorrelate(fmt, ur, z, y)
-        for i in range(z.shape[0]):
-            found = _observe_ud(fmt, i, HD[i], load(fmt, y, (i, 0)), load(fmt, ur, (i, i)), x, P, K, u, v)
-            if found == 0:
-                return 0
-            answer = min(answer, found)
-        return answer
     # Products whose right factor is sparse are formed transposed, with the same digits.
+    place[0] = _PREDICTED
     product_with_units(fmt, phi, P, T)
     transpose(fmt, T, F)
     product_with_units(fmt, phi, F, W)
@@ -247,55 +220,53 @@ def filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any,
     place[0] = _INVERSE
     copy(fmt, S, pivots)
     answer = inverse(fmt, pivots, SI)
-    if answer == 0:
-        return 0
-    place[0] = _GAIN
-    transpose(fmt, SI, pivots)
-    product_with_units(fmt, pivots, HD, KT)
-    transpose(fmt, KT, K)
-    place[0] = _COVARIANCE
-    _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
-    if form == _JOSEPH:
-        transpose(fmt, W, WT)
-        product(fmt, W, V, T)
-        product(fmt, T, WT, F)
-        product_by_sparse(fmt, K, r, B)
-        product(fmt, B, KT, T)
-        matrix_sum(fmt, F, T, P)
-    else:
-        product_by_columns(fmt, W, V, P)
-    if form == _HUNG_SECOND_GAIN:
+    if answer != 0:
         place[0] = _GAIN
-        product_by_sparse(fmt, P, hT, B)
-        product(fmt, B, RI[k % R.shape[0]], K)
+        transpose(fmt, SI, pivots)
+        product_with_units(fmt, pivots, HD, KT)
+        transpose(fmt, KT, K)
+        place[0] = _COVARIANCE
         _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
-    place[0] = _ESTIMATE
-    if increment.shape[0] > 0:
-        compensated_update(fmt, increment[k % Phi.shape[0]], h, K, z, x, carried, v, u, y, g)
-    else:
-        if form in (_HUNG, _HUNG_SECOND_GAIN):
+        if form == _JOSEPH:
             transpose(fmt, W, WT)
-            product_with_units(fmt, phiT, WT, T)
-            transpose(fmt, T, F)
-            product(fmt, F, x, u)
-            product(fmt, K, z, v)
+            product(fmt, W, V, T)
+            product(fmt, T, WT, F)
+            product_by_sparse(fmt, K, r, B)
+            product(fmt, B, KT, T)
+            matrix_sum(fmt, F, T, P)
         else:
-            product_with_units(fmt, phi, x, u)
-            product(fmt, h, u, y)
-            difference(fmt, z, y, g)
-            product(fmt, K, g, v)
-        matrix_sum(fmt, u, v, x)
-    for i in range(x.shape[0]):
-        if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
-            answer = -1
+            product_by_columns(fmt, W, V, P)
+        if form == _HUNG_SECOND_GAIN:
+            place[0] = _GAIN
+            product_by_sparse(fmt, P, hT, B)
+            product(fmt, B, RI[k % R.shape[0]], K)
+            _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
+        place[0] = _ESTIMATE
+        if increment.shape[0] > 0:
+            compensated_update(fmt, increment[k % Phi.shape[0]], h, K, z, x, carried, v, u, y, g)
+        else:
+            if form in (_HUNG, _HUNG_SECOND_GAIN):
+                transpose(fmt, W, WT)
+                product_with_units(fmt, phiT, WT, T)
+                transpose(fmt, T, F)
+                product(fmt, F, x, u)
+                product(fmt, K, z, v)
+            else:
+                product_with_units(fmt, phi, x, u)
+                product(fmt, h, u, y)
+                difference(fmt, z, y, g)
+                product(fmt, K, g, v)
+            matrix_sum(fmt, u, v, x)
+        for i in range(x.shape[0]):
+            if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
+                answer = -1
     return answer
 
 
-@njit(nogil=True)
-def record_step(
-    fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, checkpoint_steps: Any, X: Any, G: Any, C: Any, notes: Any
-) -> Any:
+@inner
+def _record_step(fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, kept: Any, notes: Any) -> Any:
     """Record the result of step k + 1 if it is a checkpoint step; return whether the run continues."""
+    checkpoint_steps, X, G, C = kept
     if answer == 0:
         notes[STOPPED] = k + 1
         return False
@@ -313,24 +284,60 @@ def record_step(
 
 @compiled
 def advance(
-    fmt: Any,
-    form: int,
-    model: Any,
-    z: Any,
-    first: int,
-    x: Any,
-    P: Any,
-    checkpoint_steps: Any,
-    X: Any,
-    G: Any,
-    C: Any,
-    notes: Any,
+    fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, repeated: Any, kept: Any, notes: Any
 ) -> None:
-    """Take one step per row of z, from the step `first`; save x, gain and P in X, G and C at the checkpoint steps."""
+    """Take one step per row of z, in any form but UD.
+
+    Parameters
+    ----------
+    first : how many steps were taken before.
+    x, P : state and covariance, before the first step and after the last.
+    repeated : None of each, or where each step is to begin, and then the innovation covariance of each: (steps, n, 1),
+        (steps, n, n) and (steps, m, m).
+    kept : the checkpoint steps; where to save state, gain and covariance at them.
+    notes : the status of the run.
+    """
     if z.shape[0] == 0:
         return
-    work = workspace(x, P, model[3][0], model[2][0], model[5][0], z[0])
+    x0, P0, innovation = repeated
+    K, KT, S, y = np.empty_like(model[3][0]), np.empty_like(model[2][0]), np.empty_like(model[5][0]), z[:1].copy()
+    square = np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P)
+    tall = K, np.empty_like(K), np.empty_like(K), KT, np.empty_like(KT)
+    small = S, np.empty_like(S), np.empty_like(S)
+    work = (*square, *tall, *small, y[0], np.empty_like(y[0]), np.empty_like(x), np.empty_like(x))
     for step in range(z.shape[0]):
-        answer = filter_step(fmt, form, model, first + step, z[step], x, P, work)
-        if not record_step(fmt, first + step, answer, x, work[1][0], P, checkpoint_steps, X, G, C, notes):
+        if x0.shape[0] > 0:
+            copy(fmt, x0[step], x)
+            copy(fmt, P0[step], P)
+        answer = _filter_step(fmt, form, model, first + step, z[step], x, P, work)
+        if x0.shape[0] > 0:
+            copy(fmt, S, innovation[step])
+        if not _record_step(fmt, first + step, answer, x, K, P, kept, notes):
+            return
+
+
+@compiled
+def advance_ud(fmt: Any, model: Any, z: Any, first: int, x: Any, U: Any, kept: Any, notes: Any) -> None:
+    """Take one step per row of z in the UD form, as :func:`advance`; U holds the factors of the covariance."""
+    if z.shape[0] == 0:
+        return
+    Phi, H, HT, UQ, UR, place = model
+    K, HD, y, u, v = np.empty_like(HT[0]), np.empty_like(H[0]), z[:1].copy(), np.empty_like(x), np.empty_like(x)
+    T, W, D, C = np.empty_like(U), np.concatenate((U, U), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
+    for step in range(z.shape[0]):
+        k = first + step
+        place[0] = _PREDICTED
+        phi = Phi[k % Phi.shape[0]]
+        answer = 1 if _predict_ud(fmt, phi, UQ[k % UQ.shape[0]], U, W, D, C, T) else -1
+        place[0] = _FACTORS
+        product(fmt, phi, x, u)
+        copy(fmt, u, x)
+        ur = UR[k % UR.shape[0]]
+        decorrelate(fmt, ur, H[k % H.shape[0]], HD)
+        decorrelate(fmt, ur, z[step], y[0])
+        for i in range(HD.shape[0]):
+            if answer != 0:
+                found = _observe_ud(fmt, i, HD[i], load(fmt, y[0], (i, 0)), load(fmt, ur, (i, i)), x, U, K, u, v)
+                answer = min(answer, found) if found != 0 else 0
+        if not _record_step(fmt, k, answer, x, K, U, kept, notes):
             return

@@ -175,7 +175,7 @@ def identifiable(amplitude: float) -> bool:
 
 @cache
 def filtered_noise() -> tuple[float, float, int]:
-    """Return error of a Kalman filter for a constant in white noise / error of one reading, √(1/N), and the trials."""
+    """Return error of a filter for a constant in white noise / error of one reading, expected √(1/N), trials."""
     rng = np.random.default_rng(44)
     readings, trials = 400, 2000
     estimate, variance = np.zeros(trials), 1e12
