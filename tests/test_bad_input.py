@@ -191,7 +191,7 @@ def test_budgets(text):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"z": "1e999999"}, "got a single number; needed one for each of the 3 steps"),
+        ({"z": "1e999999"}, "got a single number; needed one measurement for each of the 3 steps"),
         ({"z": np.full((3, 1), np.inf)}, "got inf for measurement 0 of step 1"),
     ],
 )

@@ -84,7 +84,7 @@ def test_the_steps_taken_from_the_chapters_hold():
 def test_a_step_is_found_by_its_beginning_or_not_at_all():
     steps = rounding.one_rounding()
     assert step(steps, "(13)").right == step(steps, "(13): the same").right
-    with pytest.raises(ValueError, match="got 0 steps that begin with 'nothing'; needed one"):
+    with pytest.raises(ValueError, match="got 0 steps that begin with 'nothing'; needed exactly one; give more"):
         step(steps, "nothing")
     with pytest.raises(ValueError, match="got 4 steps"):
         step(steps, "")

@@ -58,9 +58,7 @@ def _tag(fmt: Any) -> Any:
 
 
 def _fuses(fmt: Any) -> bool:
-    if _tag(fmt) is not Limited:
-        return False
-    sums = fmt.types[2]
+    sums = fmt.types[2] if _tag(fmt) is Limited else fmt
     return _tag(sums.types[1] if _tag(sums) is Blocked else sums) is Fused
 
 
