@@ -176,7 +176,7 @@ class FloatFormat:
         ----------
         fused : whether sums of products use fused multiply-add.
         sums : the format that keeps sums of products until they are stored; by default this one.
-        order, block : of the additions in sums of products, as of :func:`gpbnb.linalg.matmul`.
+        order, block : of the additions in sums of products, as of :func:`gpbnb.arithmetic.linalg.matmul`.
 
         Raises
         ------

@@ -46,8 +46,8 @@ class Run:
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
     compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
         a step over to the next; only for the innovation form and Joseph's.
-    order, block : order of the additions in matrix products, as for :func:`gpbnb.linalg.matmul`. Orders other than
-        "left" need base 2 or 16, and a form other than UD, which has few matrix products.
+    order, block : order of the additions in matrix products, as for :func:`gpbnb.arithmetic.linalg.matmul`. Orders
+        other than "left" need base 2 or 16, and a form other than UD, which has few matrix products.
 
     Raises
     ------

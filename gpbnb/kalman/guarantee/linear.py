@@ -115,8 +115,8 @@ class Enclosure(NamedTuple):
 def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
     r"""Return the worst-case peak gain :math:`|D| + \sum_{l\ge0}|CA^lB|`, in ball arithmetic; (p, m).
 
-    Balls grow with each product by the norm of |A| instead of that of A. The bits are therefore doubled until both ends
-    agree to 2**-40.
+    Balls grow with each product by the norm of :math:`|A|` instead of that of A. The bits are therefore doubled until
+    both ends agree to 2**-40.
 
     Raises
     ------

@@ -4,15 +4,12 @@ The certificate of :mod:`gpbnb.kalman.guarantee.envelope` goes back from one ste
 filter that needs 30,000 steps to settle, this would take a billion of them. Here one forward pass serves every
 step. The error after a step lies in the Minkowski sum of
 
-* **segments**: the columns of the disturbances of the latest steps, each times its limit, propagated by the closed
-loops
-  of the steps since. They are exact, up to rounding in float64;
-* **ellipsoids** :math:`\{x: |a x| \le \sqrt{a M a^T}\ \text{for all}\ a\}`, one for each part of the bound. They
-contain
-  the segments of earlier steps.
+* **segments**: the columns of the disturbances of the latest steps, each times its limit, propagated by the
+  closed loops of the steps since. They are exact, up to rounding in float64;
+* **ellipsoids** :math:`\{x: |a x| \le \sqrt{a M a^T}\ \text{for all}\ a\}`, one for each part of the
+  bound. They contain the segments of earlier steps.
 
-An ellipsoid absorbs segments :math:`g_j` by the Cauchy-Schwarz inequality. For any positive :math:`t, t_j` of
-sum s,
+An ellipsoid absorbs segments :math:`g_j` by the Cauchy-Schwarz inequality. For any positive :math:`t, t_j` of sum s,
 
 .. math:: \Big(\sqrt{aMa^T} + \sum_j|a g_j|\Big)^2 \le a\,s\Big(\frac Mt + \sum_j\frac{g_jg_j^T}{t_j}\Big)a^T.
 
