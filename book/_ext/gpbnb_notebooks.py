@@ -95,7 +95,7 @@ def remove_old_pages(app: Sphinx, error: Exception | None) -> None:
         return
     root = Path(app.outdir)
     kept = {app.builder.get_target_uri(name) for name in app.env.found_docs}
-    kept |= {f"{name}.html" for name in ("index", "genindex", "search", "py-modindex", "_modules/index")}
+    kept |= {f"{name}.html" for name in ("index", "search", "py-modindex", "_modules/index")}
     kept |= {f"_modules/{name.replace('.', '/')}.html" for name in getattr(app.env, "_viewcode_modules", {})}
     for page in root.rglob("*.html"):
         name = page.relative_to(root).as_posix()
