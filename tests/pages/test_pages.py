@@ -308,7 +308,7 @@ def test_a_page_can_be_read_before_all_its_formulas_are_typeset(open_page, addre
     """Counts, which do not depend on the machine, and a limit of time far above what an idle one takes."""
     with open_page(address) as page:
         near, shown = page.evaluate("[window.formulas.near, window.formulas.shown]")
-        every = page.locator("article .math").count()
+        every = page.locator(".math").count()
         assert every > 200
         assert near["count"] < shown["count"] / 4
         assert shown["count"] <= every
