@@ -168,6 +168,9 @@ window.formulasTypeset = new Promise((resolve) => {
   });
 });
 
+// Until its fonts are there a formula may be too wide for its cell.
+document.fonts.addEventListener("loadingdone", () => markScrolling());
+
 // What was collapsed had no width to break its formulas at. On paper everything is open.
 document.addEventListener(
   "toggle",
