@@ -53,9 +53,10 @@ book: .venv/made-for ## execute the notebooks and build the HTML book; what has 
 	@printf '\nThe book is ready. Open it in a browser, no network needed:\n  %s\n  file://%s\n' \
 		'$(HTML)/index.html' '$(HERE)/$(HTML)/index.html'
 
-test: .venv/made-for ## unit and property tests, and every notebook against its stored outputs
+test: .venv/made-for ## unit and property tests, the examples in docstrings, and every notebook against its stored outputs
 	$(PY) scripts/execute_notebooks.py --check
-	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder --ignore=tests/pages --doctest-modules tests gpbnb
+	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder --ignore=tests/pages tests
+	$(PY) -m pytest -q --doctest-modules gpbnb
 
 test-pages: .venv/made-for ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
