@@ -29,17 +29,22 @@ class Row(NamedTuple):
 
 
 def medians(works: dict[str, Callable[[], object]], turns: int, once: frozenset[str] = frozenset()) -> dict[str, float]:
-    """Median wall seconds of each work over `turns` turns, after one that is not counted; `once`: the slow ones."""
+    """Median wall seconds of each work over `turns` turns, after one that is not counted; `once`: the slow ones.
+
+    Each turn begins with another work, since a work also pays for the memory that the one before it gave back.
+    """
     times: dict[str, list[float]] = {name: [] for name in works}
     for name, work in works.items():
         if name not in once:
             work()
+    names = list(works)
     for turn in range(turns):
-        for name, work in works.items():
+        first = turn % len(names)
+        for name in names[first:] + names[:first]:
             if name in once and turn:
                 continue
             start = time.perf_counter()
-            work()
+            works[name]()
             times[name].append(time.perf_counter() - start)
     return {name: statistics.median(values) for name, values in times.items()}
 
