@@ -9,7 +9,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 
 from benchmarks.timing import Row
-from gpbnb.display.style import BOUND, OBSERVED, STRICT, figure, label, legend
+from gpbnb.display.style import BLACK, OBSERVED, REFERENCE, figure, label, legend
 
 
 def draw(table: Sequence[Row], path: Path) -> None:
@@ -31,8 +31,8 @@ def draw(table: Sequence[Row], path: Path) -> None:
     with mpl.rc_context({"svg.hashsalt": "gpbnb"}):
         fig, (ax,) = figure(height=0.27 * place + 0.9)
         ax.plot(ratios, places, "o", color=OBSERVED, label="measured")
-        ax.plot(*zip(*reaches, strict=True), "|", color=BOUND, ms=12, mew=1.6, label="to be reached")
-        ax.axvline(1.0, color=STRICT, lw=1, label="gpbnb")
+        ax.plot(*zip(*reaches, strict=True), "|", color=BLACK, ms=12, mew=1.6, label="to be reached")
+        ax.axvline(1.0, color=REFERENCE, lw=1, label="gpbnb")
         for ratio, place in zip(ratios, places, strict=True):
             ax.annotate(amount(ratio), (ratio, place), (8, 0), textcoords="offset points", va="center", fontsize=8.5)
         for place, task in tasks:
