@@ -78,16 +78,16 @@ def _cells() -> tuple[Cell, ...]:
         Cell(deviation, 2, "nearest", "hung", (26,), 100, 200),
         Cell(absolute, 2, "nearest", "hung", (33,), 100, 200),
         Cell(absolute, 2, "chop", "hung", (36,), 0, 30),
-        Cell(deviation, 10, "nearest", "innovation", (9,)),
-        Cell(absolute, 10, "nearest", "innovation", (11,)),
-        Cell(absolute, 2, "nearest", "innovation", (32, 33)),
+        Cell(absolute, 10, "nearest", "innovation", (9, 11), 0, 30),
+        Cell(deviation, 10, "nearest", "innovation", (7, 9), 0, 30),
+        Cell(absolute, 2, "chop", "hung", (34, 35), 0, 30),
+        Cell(deviation, 2, "chop", "hung", (29,), 0, 30),
+        Cell(deviation, 10, "nearest", "innovation", (8,), 30, 270),
+        Cell(absolute, 10, "nearest", "innovation", (10,), 30, 270),
         Cell(deviation, 2, "nearest", "innovation", (25, 26)),
+        Cell(absolute, 2, "nearest", "innovation", (32, 33)),
         Cell(absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
         Cell(deviation, 2, "nearest", "hung", (22, 23, 28, 29, 30)),
-        Cell(absolute, 10, "nearest", "innovation", (8, 9)),
-        Cell(deviation, 10, "nearest", "innovation", (10, 11)),
-        Cell(absolute, 10, "nearest", "hung", (10, 11)),
-        Cell(deviation, 10, "nearest", "hung", (8, 9)),
     ]
     return tuple(cells)
 
