@@ -8,8 +8,7 @@ gives the same digits.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,8 @@ from gpbnb.kalman import array_steps
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import Contraction, contraction_start
-from gpbnb.kalman.filter_run import Checkpoints, Run
+from gpbnb.kalman.factors import combined_gain, covariance_of_factors
+from gpbnb.kalman.filter_run import Checkpoints, Run, check_compiled
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
@@ -58,10 +58,7 @@ class ArrayRun:
                 f"got known inputs in the {form} form, which is not defined with them; needed another "
                 'form, such as "innovation"'
             )
-        if not isinstance(fmt.backend, Compiled):
-            raise ValueError(
-                f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
-            )
+        check_compiled(fmt)
         self.model, self.fmt, self.form = model, fmt, form
         self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
         self.steps, self.reason = 0, ""
@@ -87,9 +84,7 @@ class ArrayRun:
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
-            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
-        self.model.check_steps(self.steps + len(z))
+        self.model.check_measurements(z, self.steps)
         for measured in self.fmt.array(z):
             if self.stopped is not None:
                 return
@@ -126,8 +121,7 @@ class ArrayRun:
         if self.form in _ROOTS:
             return np.asarray(given @ given.T)
         if self.form is Form.UD:
-            triangle = np.triu(given, 1) + np.array(_unit_matrix(len(given)), dtype=object)
-            return np.asarray((triangle * given.diagonal()) @ triangle.T)
+            return covariance_of_factors(given)
         return given
 
     def known_state(self, k: int) -> NDArray[Any] | None:
@@ -172,17 +166,15 @@ class ArrayRun:
         return K, definite and bool(np.all(np.diagonal(P) > 0))
 
     def _predicted_state(self, k: int, Phi: FloatArray) -> FloatArray:
-        ahead = Phi @ self.x
+        return self._with_inputs(k, Phi @ self.x)
+
+    def _with_inputs(self, k: int, x: FloatArray) -> FloatArray:
         if self._given["B"]:
-            ahead = ahead + self._at("B", k) @ self._at("u", k)
-        return ahead + self._at("b", k) if self._given["b"] else ahead
+            x = x + self._at("B", k) @ self._at("u", k)
+        return x + self._at("b", k) if self._given["b"] else x
 
     def _compensated(self, k: int, H: FloatArray, K: FloatArray, z: FloatArray) -> FloatArray:
-        change = self._at("increment", k) @ self.x
-        if self._given["B"]:
-            change = change + self._at("B", k) @ self._at("u", k)
-        if self._given["b"]:
-            change = change + self._at("b", k)
+        change = self._with_inputs(k, self._at("increment", k) @ self.x)
         change = change + K @ (z - H @ (self.x + change))
         change = change - self._carried
         x = self.x + change
@@ -231,28 +223,15 @@ class ArrayRun:
             self.P, self._given["UQ"] = first, list(Q)
 
     def _unpacked(self, packed: NDArray[Any]) -> FloatArray:
-        backend = self.fmt.backend
-        if not isinstance(backend, Compiled):
-            raise TypeError(f"got {self.fmt}; needed a format with compiled loops")
+        backend = cast(Compiled, self.fmt.backend)
         return FloatArray.from_components(backend, backend.unpack(packed), self.fmt)
 
     def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
         """Return the gain for all measurements together, from those of the decorrelated measurements one by one."""
         if not isinstance(gain, list):
             return np.asarray(gain.to_fractions(), dtype=object)
-        UR = self._at("UR", k).to_fractions()
-        m = len(UR)
-        inverse_upper = np.array(_unit_matrix(m), dtype=object)
-        for i in range(m - 1, -1, -1):
-            for j in range(i + 1, m):
-                inverse_upper[i] = inverse_upper[i] - UR[i, j] * inverse_upper[j]
-        rows = inverse_upper @ self._at("H", k).to_fractions()
-        columns = [each.to_fractions() for each in gain]
-        whole = np.array(columns, dtype=object).T
-        for i in range(m):
-            for j in range(i):
-                whole[:, j] -= columns[i] * (rows[i] @ whole[:, j])
-        return np.asarray(whole @ inverse_upper)
+        UR, H = (self._at(letter, k).to_fractions() for letter in ("UR", "H"))
+        return combined_gain([each.to_fractions() for each in gain], UR, H)
 
 
 class _StateBound:
@@ -330,7 +309,3 @@ def _double_doubles(a: FloatArray) -> NDArray[np.float64]:
         high = np.asarray(a.to_float(), dtype=np.float64)  # exact: at most 53 bits
         return np.stack([high, np.zeros_like(high)], axis=-1)
     return double_doubles(a.to_fractions())
-
-
-def _unit_matrix(n: int) -> list[list[Fraction]]:
-    return [[Fraction(int(i == j)) for j in range(n)] for i in range(n)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from gpbnb.arithmetic.kernels.tags import Decimal
 from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
+from gpbnb.kalman.factors import covariance_of_factors
 from gpbnb.kalman.filter_run import Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.bounded import widen
@@ -68,23 +68,15 @@ class BoundedRun(Run):
         self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
         zero_n, size = np.zeros(n), np.zeros((n, n))
         if self.form is Form.UD:  # the first factors may have errors
-            size = np.abs((self._covariance() - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
+            stored = covariance_of_factors(self.exactly(self.P))
+            size = np.abs((stored - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
         self.bound = contraction_start(given["P0"], zero_n, size)
-
-    def _covariance(self) -> NDArray[Any]:
-        U = self.exactly(self.P)
-        triangle = np.triu(U, 1) + np.array(
-            [[Fraction(int(i == j)) for j in range(len(U))] for i in range(len(U))], dtype=object
-        )
-        return np.asarray((triangle * U.diagonal()) @ triangle.T)
 
     def take(self, z: Any) -> None:
         """Go on by as many steps as there are measurements, (steps, m)."""
-        if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
-            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
+        self.model.check_measurements(z, self.steps)
         if self.stopped or not len(z):
             return
-        self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
         if self.fmt is None:
             values = packed[:, :, np.newaxis]

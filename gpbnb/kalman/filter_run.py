@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.factors import combined_gain, covariance_of_factors
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.step import (
     DONE,
@@ -75,10 +76,8 @@ class Run:
             raise ValueError(
                 f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
             )
-        if fmt is not None and not isinstance(fmt.backend, Compiled):
-            raise ValueError(
-                f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
-            )
+        if fmt is not None:
+            check_compiled(fmt)
         if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
         if order != "left" and form == Form.UD:
@@ -88,7 +87,7 @@ class Run:
         Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
-        identity = self.as_packed(np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object))
+        identity = self.as_packed(np.eye(n, dtype=int))
         self.x, self.P = self.as_packed(model.x0.reshape(n, 1)), self.as_packed(model.P0)
         RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
         self.X, self.G, self.C = (
@@ -138,11 +137,9 @@ class Run:
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        if np.ndim(z) != 2 or np.shape(z)[1] != self.model.m:
-            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m})")
+        self.model.check_measurements(z, 0 if self.stopped else self.steps)
         if self.stopped:
             return
-        self.model.check_steps(self.steps + len(z))
         packed = self.as_packed(z)
         packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         try:
@@ -216,31 +213,24 @@ class Run:
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return gains and covariances from factors and from the gains of one measurement after the other."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
-        H, UR, n = self.exactly(self.matrices[2]), self.exactly(self.UR), self.model.n
-        unit = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
+        H, UR = self.exactly(self.matrices[2]), self.exactly(self.UR)
         for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
-            h, ur = H[step % len(H)], UR[step % len(UR)]
-            upper = np.triu(ur, 1) + np.array([[Fraction(int(i == j)) for j in range(len(ur))] for i in range(len(ur))])
-            inverse_upper = _unit_upper_inverse(upper)
-            rows = inverse_upper @ h
-            whole = K[at].copy()
-            for i in range(self.model.m):
-                for j in range(i):
-                    whole[:, j] -= K[at][:, i] * (rows[i] @ whole[:, j])
-            gains[at] = whole @ inverse_upper
-            d = U[at].diagonal()
-            triangle = np.triu(U[at], 1) + unit
-            covariances[at] = (triangle * d) @ triangle.T
+            gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
+            covariances[at] = covariance_of_factors(U[at])
         return gains, covariances
 
 
-def _unit_upper_inverse(upper: NDArray[Any]) -> NDArray[Any]:
-    m = len(upper)
-    result = np.array([[Fraction(int(i == j)) for j in range(m)] for i in range(m)], dtype=object)
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            result[i] = result[i] - upper[i, k] * result[k]
-    return result
+def check_compiled(fmt: FloatFormat) -> None:
+    """Reject a format without compiled loops.
+
+    Raises
+    ------
+    ValueError : the base or the number of digits has none.
+    """
+    if not isinstance(fmt.backend, Compiled):
+        raise ValueError(
+            f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
+        )
 
 
 @dataclass(frozen=True, eq=False)

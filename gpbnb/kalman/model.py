@@ -213,6 +213,21 @@ class LinearModel:
                 'required_precision with basis "emulation" or "bound"'
             )
 
+    def check_measurements(self, z: Any, first: int) -> None:
+        """Reject measurements of another shape than (steps, m), or of more steps than the model describes.
+
+        Parameters
+        ----------
+        first : how many steps come before them.
+
+        Raises
+        ------
+        ValueError : another shape; more than `steps` steps altogether.
+        """
+        if np.ndim(z) != 2 or np.shape(z)[1] != self.m:
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.m})")
+        self.check_steps(first + len(z))
+
     def check_steps(self, count: int) -> None:
         """Reject a run that is longer than the model describes.
 

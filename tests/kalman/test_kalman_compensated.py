@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
+from tests.array_filter import estimates
 
 STEPS = 40
 
@@ -38,36 +39,6 @@ def model(**changes: Any) -> LinearModel:
 MEASURED = np.random.default_rng(3).normal(size=(STEPS, 1)) + 2
 
 
-def by_arrays(fmt: Any, sums: Any, compensated: bool) -> list[list[Fraction]]:
-    """The innovation form written with arrays and ``linalg.matmul``, each estimate exact."""
-    given = model()
-    Phi, H, Q, R = (fmt.array(each[0]) for each in (given.Phi, given.H, given.Q, given.R))
-    increment = fmt.array(given.Phi[0] - np.eye(2, dtype=int))
-    x, P = fmt.array(given.x0.reshape(2, 1)), fmt.array(given.P0)
-    carried, identity = fmt.array(np.zeros((2, 1))), fmt.array(np.eye(2))
-
-    def times(a: Any, b: Any) -> Any:
-        return linalg.matmul(a, b, sums=sums)
-
-    estimates = []
-    for z in MEASURED:
-        V = times(times(Phi, P), Phi.T) + Q
-        S = times(H, times(V, H.T)) + R
-        K = times(times(V, H.T), fmt.array([[1]]) / S)
-        P = times(identity - times(K, H), V)
-        d = times(increment, x) if compensated else None
-        u = x + d if compensated else times(Phi, x)
-        v = times(K, fmt.array([z]) - times(H, u))
-        if compensated:
-            d = (d + v) - carried
-            t = x + d
-            carried, x = (t - x) - d, t
-        else:
-            x = u + v
-        estimates.append(x[:, 0].to_fractions().tolist())
-    return estimates
-
-
 @pytest.mark.parametrize("compensated", [False, True])
 @pytest.mark.parametrize(
     ("fmt", "sums"),
@@ -82,7 +53,8 @@ def by_arrays(fmt: Any, sums: Any, compensated: bool) -> list[list[Fraction]]:
 def test_a_run_is_what_arrays_compute(fmt: Any, sums: Any, compensated: bool) -> None:
     run = Run(model(), fmt, Form.INNOVATION, range(1, STEPS + 1), sums=sums, compensated=compensated)
     run.take(MEASURED)
-    assert run.checkpoints().x.tolist() == by_arrays(fmt, sums, compensated)
+    times = partial(linalg.matmul, sums=sums)
+    assert np.array_equal(run.checkpoints().x, estimates(model(), MEASURED, fmt, times, compensated))
 
 
 def test_sums_in_a_wider_format_change_digits() -> None:

@@ -3,55 +3,24 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
 from gpbnb.wordlength import examples, processors
 from gpbnb.wordlength.processors import Processor
+from tests.array_filter import estimates
 
 STEPS = 60
 MEASURED = examples.tilt_measurements(STEPS)
-
-
-def by_arrays(model: LinearModel, z: Any, processor: Processor) -> NDArray[Any]:
-    """The innovation form written with arrays, with blocks of two products; (steps, n), exact Fractions."""
-    fmt, n = processor.fmt, model.n
-    Phi, H, Q, R = ([fmt.array(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R))
-    increments = [fmt.array(each - np.eye(n, dtype=int)) for each in model.Phi]
-    x, P = fmt.array(model.x0.reshape(n, 1)), fmt.array(model.P0)
-    carried, identity = fmt.array(np.zeros((n, 1))), fmt.array(np.eye(n))
-
-    def times(a: FloatArray, b: FloatArray) -> FloatArray:
-        return linalg.matmul(a, b, processor.order, processor.fused, 2, processor.sums)
-
-    estimates = []
-    for k, measured in enumerate(fmt.array(z)):
-        phi, h, q, r = (each[k % len(each)] for each in (Phi, H, Q, R))
-        V = times(times(phi, P), phi.T) + q
-        PHt = times(V, h.T)
-        K = times(PHt, linalg.inv(times(h, PHt) + r))
-        P = times(identity - times(K, h), V)
-        if processor.compensated:
-            d = times(increments[k % len(increments)], x)
-            d = (d + times(K, measured[:, np.newaxis] - times(h, x + d))) - carried
-            total = x + d
-            carried, x = (total - x) - d, total
-        else:
-            u = times(phi, x)
-            x = u + times(K, measured[:, np.newaxis] - times(h, u))
-        estimates.append(x[:, 0].to_fractions())
-    return np.array(estimates, dtype=object)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +49,8 @@ def test_arrays_and_compiled_runs_give_the_same_digits(processor: Processor) -> 
         2,
     )
     run.take(MEASURED)
-    assert np.array_equal(by_arrays(model, MEASURED, processor), run.checkpoints().x)
+    times = partial(linalg.matmul, order=processor.order, fused=processor.fused, block=2, sums=processor.sums)
+    assert np.array_equal(estimates(model, MEASURED, processor.fmt, times, processor.compensated), run.checkpoints().x)
 
 
 def test_the_order_of_sums_changes_digits_and_little_else() -> None:

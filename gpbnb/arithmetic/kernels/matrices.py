@@ -74,13 +74,13 @@ def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @inner
-def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> Any:
+def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
     # Without recursion, which numba's cache does not survive: product k completes every part that it is the last of.
     count = 0
-    for k in range(n):
+    for k in range(a.shape[1]):
         sums[count] = multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)))
         count += 1
-        first, end = 0, n
+        first, end = 0, a.shape[1]
         while end - first > 1:
             if k == end - 1:
                 count -= 1
@@ -91,43 +91,34 @@ def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, n: int, sums: Any) -> An
 
 
 @inner
-def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, n: int) -> Any:
-    total = zero(fmt)
-    for first in range(0, n, fmt.sums.block):
+def _blocked(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
+    for first in range(0, a.shape[1], fmt.sums.block):
         s = multiply(fmt, load(fmt, a, (i, first)), load(fmt, b, (first, j)))
-        for k in range(first + 1, min(first + fmt.sums.block, n)):
+        for k in range(first + 1, min(first + fmt.sums.block, a.shape[1])):
             s = multiply_add(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)), s)
-        total = s if first == 0 else add(fmt, total, s)
-    return total
+        sums[0] = s if first == 0 else add(fmt, sums[0], s)
+    return sums[0]
 
 
 @overload(product_in_order, strict=False)
 def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    kind = getattr(fmt, "instance_class", None)
-    mixed = kind is Mixed
+    mixed = getattr(fmt, "instance_class", None) is Mixed
     limited = fmt.types[1] if mixed else fmt
     order = limited.types[2].instance_class if getattr(limited, "instance_class", None) is Limited else None
+    if order not in (Pairwise, Blocked):
+        return lambda fmt, a, b, c: False
+    entry = _pairwise if order is Pairwise else _blocked
 
-    def pairwise(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    def in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
         of_sums = fmt.sums if mixed else fmt
         sums = np.zeros(64)
         for i in range(c.shape[0]):
             for j in range(c.shape[1]):
-                put(fmt, c, (i, j), _pairwise(of_sums, a, b, i, j, a.shape[1], sums))
+                put(fmt, c, (i, j), entry(of_sums, a, b, i, j, sums))
         check(fmt, c)
         return True
 
-    def blocked(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        of_sums = fmt.sums if mixed else fmt
-        for i in range(c.shape[0]):
-            for j in range(c.shape[1]):
-                put(fmt, c, (i, j), _blocked(of_sums, a, b, i, j, a.shape[1]))
-        check(fmt, c)
-        return True
-
-    if order is Pairwise:
-        return pairwise
-    return blocked if order is Blocked else lambda fmt, a, b, c: False
+    return in_order
 
 
 @inner
