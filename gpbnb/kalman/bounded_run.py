@@ -57,7 +57,7 @@ class BoundedRun(Run):
     """
 
     def __init__(
-        self, model: LinearModel, fmt: FloatFormat | None, form: Form, checkpoint_steps: Sequence[int]
+        self, model: LinearModel, fmt: FloatFormat | None, form: Form | str, checkpoint_steps: Sequence[int]
     ) -> None:
         super().__init__(model, fmt, form, checkpoint_steps)
         self.stored = model if fmt is None else model.rounded(fmt)
@@ -135,7 +135,7 @@ def emulate_with_bound(
     model: LinearModel,
     z: Any,
     fmt: FloatFormat,
-    form: Form = Form.INNOVATION,
+    form: Form | str = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
 ) -> BoundedHistory:
     """Run the filter rounded, in double-double, and with its contraction bound; for the arguments, see ``emulate``."""

@@ -32,6 +32,7 @@ from gpbnb.kalman.kernels.step import (
     invert_each,
 )
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import compiled_form
 
 
 class Run:
@@ -41,7 +42,7 @@ class Run:
     ----------
     model : n states, m measurements.
     fmt : the format in which everything is stored and computed; None for double-double.
-    form : form in which a step is computed.
+    form : form in which a step is computed, or its name, such as "UD".
     checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in ascending order.
     fused : whether products are added by fused multiply-add; base 2 or 16.
     sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
@@ -52,8 +53,8 @@ class Run:
 
     Raises
     ------
-    ValueError : a format without compiled loops; checkpoint steps that do not ascend; compensation or another order of
-        additions in a form that does not have it.
+    ValueError : a format or form without compiled loops; checkpoint steps that do not ascend; compensation or another
+        order of additions in a form that does not have it.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -61,7 +62,7 @@ class Run:
         self,
         model: LinearModel,
         fmt: FloatFormat | None,
-        form: Form,
+        form: Form | str,
         checkpoint_steps: Sequence[int],
         fused: bool = False,
         sums: FloatFormat | FixedFormat | None = None,
@@ -70,7 +71,7 @@ class Run:
         block: int = 32,
     ) -> None:
         model.refuse_inputs("a run in compiled loops")
-        self.model, self.fmt, self.form = model, fmt, Form(form)
+        self.model, self.fmt, self.form = model, fmt, compiled_form(form)
         self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
         if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
             raise ValueError(
@@ -78,9 +79,11 @@ class Run:
             )
         if fmt is not None:
             check_compiled(fmt)
-        if compensated and form not in (Form.INNOVATION, Form.JOSEPH):
-            raise ValueError(f"got compensated summation in the {form} form; needed the innovation form or Joseph's")
-        if order != "left" and form == Form.UD:
+        if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
+            raise ValueError(
+                f"got compensated summation in the {self.form} form; needed the innovation form or Joseph's"
+            )
+        if order != "left" and self.form is Form.UD:
             raise ValueError(f"got {order} sums in the UD form; needed another form")
         #: The arithmetic of the compiled loops.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
@@ -256,7 +259,9 @@ def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
     return tuple(sorted({int(k) for k in grid if k <= steps} | {steps}))
 
 
-def reference(model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form: Form = Form.INNOVATION) -> Checkpoints:
+def reference(
+    model: LinearModel, z: Any, checkpoint_steps: Sequence[int], form: Form | str = Form.INNOVATION
+) -> Checkpoints:
     """Run the filter in double-double, whose operations have relative errors below 2**-102.
 
     Parameters

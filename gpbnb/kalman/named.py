@@ -37,6 +37,19 @@ def form_named(form: AnyForm | str) -> AnyForm:
     raise ValueError(f"got form {form!r}; needed one of {names}, or a member of Form or ArrayForm")
 
 
+def compiled_form(form: AnyForm | str) -> Form:
+    """Return a form that has compiled loops, or the one with this name.
+
+    Raises
+    ------
+    ValueError : no such form, or an :class:`~gpbnb.kalman.array_forms.ArrayForm`.
+    """
+    found = form_named(form)
+    if isinstance(found, ArrayForm):
+        raise ValueError(f"got the {found} form; needed one with compiled loops: {', '.join(map(str, Form))}")
+    return found
+
+
 def rounding_named(rounding: Rounding | str) -> Rounding:
     """Return a rounding, or the rounding with this name.
 

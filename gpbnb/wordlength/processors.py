@@ -86,7 +86,11 @@ class Outcome(NamedTuple):
 
 
 def outcome(
-    model: LinearModel, z: Any, processor: Processor, form: Form = Form.INNOVATION, true: Checkpoints | None = None
+    model: LinearModel,
+    z: Any,
+    processor: Processor,
+    form: Form | str = Form.INNOVATION,
+    true: Checkpoints | None = None,
 ) -> Outcome:
     """Run a filter on a processor and compare it with the given filter in double-double.
 
@@ -119,7 +123,7 @@ def typical_errors(
     model: LinearModel,
     records: Sequence[Any],
     processors: Sequence[Processor],
-    form: Form = Form.INNOVATION,
+    form: Form | str = Form.INNOVATION,
 ) -> NDArray[np.float64]:
     """Return the rms over records of each state's largest error, (processors, n), infinite if a filter fails."""
     squares = np.zeros((len(processors), model.n))

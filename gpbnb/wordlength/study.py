@@ -140,7 +140,7 @@ def update_stagnation(
     z: NDArray[Any],
     state: int,
     formats: Sequence[FloatFormat],
-    form: Form = Form.INNOVATION,
+    form: Form | str = Form.INNOVATION,
     last: int = 200,
 ) -> tuple[UpdateStagnation, ...]:
     """Measure how much the updates of a slow state stagnate in several formats.

@@ -583,3 +583,11 @@ def test_a_year_of_gravity_probe_b_begins_like_the_exact_filter():
         slow.step(k, [Fraction(float(v)) for v in z[k]], Form.HUNG)
         assert [[v] for v in checkpoints.x[k]] == slow.x
         assert checkpoints.P[k].tolist() == slow.P
+
+
+def test_forms_are_given_by_name():
+    given, z = model(), measurements()
+    named, member = run(FloatFormat(2, 24), "joseph", given, z), run(FloatFormat(2, 24), Form.JOSEPH, given, z)
+    assert named.form is Form.JOSEPH and np.array_equal(named.x, member.x)
+    with pytest.raises(ValueError, match="Potter form; needed one with compiled loops: Hung"):
+        run(FloatFormat(2, 24), "potter", given, z)

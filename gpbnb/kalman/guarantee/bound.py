@@ -116,7 +116,7 @@ def guarantee(
     model: LinearModel,
     fmt: FloatFormat,
     within: Limits,
-    form: Form = Form.INNOVATION,
+    form: Form | str = Form.INNOVATION,
     most: int = 20_000,
     horizon: int = 1_000,
     budget: float = BUDGET,

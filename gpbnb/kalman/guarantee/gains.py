@@ -27,6 +27,7 @@ from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.enclosure import enclose
 from gpbnb.kalman.guarantee.program import Program, innovation_program, loop_program, sequential_program
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import compiled_form
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,7 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
 
 
 def schedule(
-    model: LinearModel, fmt: FloatFormat, form: Form, most: int = 20_000, horizon: int | None = None
+    model: LinearModel, fmt: FloatFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
 ) -> Schedule:
     """Find the coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
 
@@ -117,8 +118,9 @@ def schedule(
 
     Raises
     ------
-    ValueError : the format has no compiled loops, or a covariance is not definite in it.
+    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it.
     """
+    form = compiled_form(form)
     stored = replace(model.rounded(fmt), x0=np.array([Fraction(0)] * model.n, dtype=object))
     run, repeat, period = _emulated(stored, fmt, form, most)
     bad = run.stopped or run.indefinite
@@ -146,7 +148,7 @@ def schedule(
             why = f"the exact gain did not settle within {len(K)} steps"
     steps = len(K)
     rows = _rows(steps, repeat, period)
-    program, packed = packed_coefficients(run, fmt, form, rows)
+    program, packed = packed_coefficients(run, rows)
     phases = np.arange(steps)
     Phi = double_doubles(stored.Phi)[phases % len(stored.Phi)]
     cycle = np.lcm(len(stored.H), len(stored.Phi))
@@ -193,10 +195,8 @@ def _emulated(stored: LinearModel, fmt: FloatFormat, form: Form, most: int) -> t
         steps = min(most, 4 * steps)
 
 
-def packed_coefficients(
-    run: Run, fmt: FloatFormat, form: Form, rows: NDArray[np.int64], before: int = 0
-) -> tuple[Program, NDArray[Any]]:
-    """Return the program of a form and its coefficients, row by row, from a run.
+def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> tuple[Program, NDArray[Any]]:
+    """Return the program of a run and its coefficients, row by row.
 
     Parameters
     ----------
@@ -214,11 +214,11 @@ def packed_coefficients(
     def of_cycle(matrices: NDArray[Any]) -> NDArray[Any]:
         return matrices[(before + rows) % len(matrices)].reshape(len(rows), -1, *tail)
 
-    if form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
+    if run.form in (Form.HUNG, Form.HUNG_SECOND_GAIN):
         F = np.empty((last, n, n, *tail), K.dtype)
         _stored_loops(run.tag, K, np.roll(H, -before, axis=0), np.roll(Phi, -before, axis=0), identity, F)
         return loop_program(n, m), np.concatenate([flat(F), flat(K)], axis=1)
-    if form == Form.UD:
+    if run.form is Form.UD:
         cycle = int(np.lcm(len(H), len(run.UR)))
         D = np.empty((cycle, m, n, *tail), K.dtype)
         _decorrelated(run.tag, run.UR, H, D)

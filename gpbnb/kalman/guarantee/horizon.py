@@ -82,7 +82,7 @@ def bounds_in_blocks(
     within: Sequence[Limits],
     assumed: Sequence[Any],
     steps: int,
-    form: Form = Form.INNOVATION,
+    form: Form | str = Form.INNOVATION,
     block: int | None = None,
     window: int = 8,
     saved: Path | None = None,
@@ -138,7 +138,7 @@ def bounds_in_blocks(
                 )
         rows = np.arange(count)
         at = (done + rows) % cycle
-        program, packed = packed_coefficients(run, fmt, form, rows, done)
+        program, packed = packed_coefficients(run, rows, done)
         coefficients = widened_array(packed)
         arrays = (
             coefficients,
