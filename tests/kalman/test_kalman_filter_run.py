@@ -588,6 +588,7 @@ def test_a_year_of_gravity_probe_b_begins_like_the_exact_filter():
 def test_forms_are_given_by_name():
     given, z = model(), measurements()
     named, member = run(FloatFormat(2, 24), "joseph", given, z), run(FloatFormat(2, 24), Form.JOSEPH, given, z)
-    assert named.form is Form.JOSEPH and np.array_equal(named.x, member.x)
+    assert named.form is Form.JOSEPH
+    assert np.array_equal(named.x, member.x)
     with pytest.raises(ValueError, match="Potter form; needed one with compiled loops: Hung"):
         run(FloatFormat(2, 24), "potter", given, z)
