@@ -121,6 +121,20 @@ def precise_tracker() -> LinearModel:
     )
 
 
+def turns(steps: int) -> NDArray[np.float64]:
+    """Return what three gyroscopes add to an attitude quaternion, (steps, 4, 4), in steps of 10 ms.
+
+    Each matrix holds half of the measured angles, rounded to 2**-20 rad, and multiplies the quaternion; the product is
+    added to the quaternion. The vehicle turns at 0.3 rad/s about one axis and swings about the other two.
+    """
+    t = np.arange(steps) * 0.01
+    rates = np.stack([0.2 * np.sin(t), 0.1 * np.cos(0.7 * t), np.full(steps, 0.3)])
+    x, y, z = np.rint(rates * 0.01 * 2**20) / 2**21
+    o = np.zeros(steps)
+    rows = (o, -x, -y, -z), (x, o, z, -y), (y, -z, o, x), (z, y, -x, o)
+    return np.array(rows).transpose(2, 0, 1)
+
+
 def normal_matrix(degree: int, times: Sequence[int]) -> NDArray[Any]:
     r"""Exact normal matrix :math:`A^TA`, :math:`A_{ij} = t_i^j`, of a polynomial fit; (degree + 1, degree + 1).
 

@@ -504,3 +504,13 @@ def test_overview(ax):
     assert ax.yaxis_inverted()  # the first on top
     with pytest.raises(ValueError, match=r"got the kinds \['guess'\]; needed some of emulation"):
         figures.overview({"tilt": {"guess": 3}}, ax)
+
+
+def test_a_turn_multiplies_the_quaternion_by_its_half_angles():
+    # Hamilton's product of (a, b, c, d) and (0, x, y, z).
+    a, b, c, d = 0.5, -0.25, 0.75, 0.125
+    for turn in examples.turns(3):
+        x, y, z = turn[1:, 0]
+        product = [-b * x - c * y - d * z, a * x + c * z - d * y, a * y + d * x - b * z, a * z + b * y - c * x]
+        assert np.array_equal(turn @ [a, b, c, d], product)
+        assert z == round(0.3 * 0.01 * 2**20) / 2**21
