@@ -1,0 +1,529 @@
+"""Every term of the guarantee, in exact fractions: none can be dropped unseen.
+
+The allowances for roundings of float64 are powers of two between 1e-27 and 1e-12. Where they are constants of the
+module, larger ones stand in their place here; where they are not, the numbers cancel until what is left is as small.
+"""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction as F
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.kalman.guarantee import envelope, reach
+from gpbnb.kalman.guarantee.envelope import Limits, units
+from gpbnb.kalman.guarantee.program import ADD, MULTIPLY, Builder, Program, innovation_program
+from gpbnb.kalman.guarantee.reach import Reach
+
+UNIT, UP = F(1, 64), 1 + F(1, 32)
+"""In the place of 2**-53 and of 1 + 2**-40."""
+
+
+def plain(function):
+    """The function as Python runs it."""
+    return getattr(function, "py_func", function)
+
+
+def same(found, expected, rel=1e-13):
+    """Compare arrays, or numbers, entry by entry."""
+    found, expected = np.asarray(found, dtype=np.float64), np.asarray(expected, dtype=object)
+    assert found.shape == expected.shape
+    for at in np.ndindex(found.shape):
+        assert found[at] == pytest.approx(float(expected[at]), rel=rel, abs=0), at
+
+
+def fractions(values):
+    return np.vectorize(F, otypes=[object])(np.asarray(values))
+
+
+# -- units ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rounding", Rounding.documented())
+@pytest.mark.parametrize("base", [2, 10, 16])
+def test_units_are_rounded_outwards(base: int, rounding: Rounding) -> None:
+    table, digits = units(FloatFormat(base, 5, rounding)), 5
+    most = (len(table.powers) - 1) // 2
+    assert base**most > 2**840
+    share = 2 if rounding is Rounding.NEAREST else 1
+    inexact = 0
+    for k, power, error, (high, low) in zip(range(-most, most + 1), *table, strict=True):
+        true = F(base) ** k
+        assert true * (1 - F(1, 2**52)) < F(power) <= true
+        size = true / base**digits / share
+        assert size <= F(error) < size * (1 + F(1, 2**51))
+        assert abs(F(high) + F(low) - true) <= true / 2**105
+        inexact += F(power) != true
+    assert (inexact > most) is (base == 10)
+
+
+def test_the_error_of_a_result_is_that_of_the_next_power() -> None:
+    largest, table = plain(envelope._largest_error), units(FloatFormat(10, 3))
+    for size, power in ((0.0999, 0.1), (1.0, 1.0), (1.001, 10.0), (10.0, 10.0), (99.0, 100.0)):
+        assert largest(table, size) == pytest.approx(power / 2000, rel=1e-15)
+    assert largest(table, 0.0) == 0
+    assert largest(table, 1e300) == np.inf
+    assert largest(table, 1e-300) == table.errors[0]
+
+
+def test_products_with_powers_of_the_base_are_exact() -> None:
+    is_power, table = plain(envelope._is_power), units(FloatFormat(10, 3))
+    third = F(1, 1000)
+    low = float(third - F(1e-3))
+    for high, rest, expected in (
+        (0.0, 0.0, True), (100.0, 0.0, True), (-100.0, 0.0, True), (1e-3, low, True), (-1e-3, -low, True),
+        (1e-3, 0.0, False), (1e-3, -low, False), (20.0, 0.0, False), (1e305, 0.0, False),
+    ):  # fmt: skip
+        assert is_power(table, high, rest) is expected
+
+
+# -- disturbances of a step -------------------------------------------------------------------------------------------
+
+
+def steps(program: Program, coefficients: Any, given: Any, *, positive: bool = False, off: int = -1) -> list[F]:
+    """All values of a step in exact fractions; with all signs positive, or with an error of 1 in an operation."""
+    values = list(given)
+    for o, (code, a, b) in enumerate(program.operations.tolist()):
+        left = (abs(coefficients[a]) if positive else coefficients[a]) if code == MULTIPLY else values[a]
+        right = values[b] if code in (MULTIPLY, ADD) or positive else -values[b]
+        values.append((left * right if code == MULTIPLY else left + right) + (o == off))
+    return values
+
+
+def linear(program: Program, coefficients: Any, *, positive: bool = False) -> np.ndarray:
+    """The linear function that each value is; row by row, in fractions."""
+    first = program.n + program.m
+    columns = [steps(program, coefficients, [F(i == j) for i in range(first)], positive=positive) for j in range(first)]
+    return np.array(columns, dtype=object).T
+
+
+def effect(program: Program, coefficients: Any, o: int, *, positive: bool = False) -> np.ndarray:
+    """What an error of 1 in an operation does to the results."""
+    nothing = [F(0)] * (program.n + program.m)
+    values = steps(program, coefficients, nothing, positive=positive, off=o)
+    return np.array([values[each] for each in program.outputs], dtype=object)
+
+
+def as_pairs(values: Any) -> np.ndarray:
+    """Double-double."""
+    high = np.vectorize(float, otypes=[float])(values)
+    return np.stack([high, np.vectorize(lambda v, h: float(v - F(h)), otypes=[float])(values, high)], axis=-1)
+
+
+def largest_error(fmt: FloatFormat, size: F) -> F:
+    """Half a unit in the last place below the next power, or a unit for chopping."""
+    if size == 0:
+        return F(0)
+    power = F(1)
+    while power < size:
+        power *= fmt.base
+    while power / fmt.base >= size:
+        power /= fmt.base
+    return power / fmt.base**fmt.precision / (2 if fmt.rounding is Rounding.NEAREST else 1)
+
+
+def expected(program, fmt, C, offsets, Phi, HPhi, K, dK, limits, b, caps, unit, up):
+    """The formula of a step, from the recursion of the error."""
+    n, m = program.n, program.m
+    X, V, Z = (fractions(each) for each in limits)
+    rows, sizes = linear(program, C), linear(program, C, positive=True)
+    tiny = F(1, 2**90)
+    of_state, of_input = rows[:, :n], rows[:, n:]
+    off, drift, none = [F(0)] * (n + m), [F(0)] * (n + m), [False] * (n + m)
+    largest = [(X[j] + b[j]) * up for j in range(n)]
+    largest += [min(Z[i], (V[i] + sum(abs(HPhi[i, j]) * X[j] for j in range(n))) * up) for i in range(m)]
+    h_of = []
+    outputs = program.outputs.tolist()
+    for o, (code, a, c) in enumerate(program.operations.tolist()):
+        v = n + m + o
+        nonzero = [(abs(of_state[v, j]) + tiny * sizes[v, j]) * (of_state[v, j] != 0) for j in range(n)]
+        inputs = [abs(of_input[v, i]) + tiny * sizes[v, n + i] for i in range(m)]
+        moved = [
+            abs(of_state[v, j] + sum(of_input[v, i] * HPhi[i, j] for i in range(m)))
+            + F(1, 2**50) * (sizes[v, j] + sum(abs(of_input[v, i] * HPhi[i, j]) for i in range(m)))
+            for j in range(n)
+        ]
+        seen = sum(s * x for s, x in zip(nonzero, X, strict=True)) + sum(s * z for s, z in zip(inputs, Z, strict=True))
+        known = sum(s * x for s, x in zip(moved, X, strict=True)) + sum(s * e for s, e in zip(inputs, V, strict=True))
+        size = min(seen, known, caps[o])
+        size += sum((abs(of_state[v, j]) + tiny * sizes[v, j]) * b[j] for j in range(n))
+        if code == MULTIPLY:
+            before = abs(C[a]) * off[c]
+            moving = abs(C[a]) * drift[c] + offsets[a] * largest[c]
+            none.append(none[c] or (C[a] == 0 and offsets[a] == 0))
+            power = C[a] == 0 or abs(C[a]) == F(fmt.base) ** round(math.log(abs(C[a]), fmt.base))
+            exact = none[v] or (offsets[a] == 0 and power)
+        else:
+            before, moving = off[a] + off[c], drift[a] + drift[c]
+            none.append(none[a] and none[c])
+            exact = none[a] or none[c]
+        drift.append(moving * up)
+        size = (size + before + drift[v]) * up
+        if v in outputs:
+            i = outputs.index(v)
+            size = min(size, (X[i] + b[i]) * up)
+        h = F(0) if exact else largest_error(fmt, size)
+        h_of.append(h)
+        off.append((before + h) * up)
+        largest.append((size + h) * up)
+    groups = [
+        sum(h for h, group in zip(h_of, program.groups.tolist(), strict=True) if group == g) * up
+        for g in range(len(program.roots))
+    ]
+    G = np.array([effect(program, C, int(root)) for root in program.roots], dtype=object).T
+    count = 6 * len(h_of) + 2 * n + 16
+    effects = [effect(program, C, int(root), positive=True) for root in program.roots]
+    slack = [sum(count * unit * each[i] * h for each, h in zip(effects, groups, strict=True)) for i in range(n)]
+    closed, spread, loop, gain = (np.zeros(shape, dtype=object) for shape in ((n, n), (n, n), (n, n), (n, m)))
+    for i, v in enumerate(outputs):
+        slack[i] += drift[v]
+        for j in range(n):
+            closed[i, j] = of_state[v, j]
+            spread[i, j] = (n + 4) * unit * abs(closed[i, j]) + F(1, 2**89) * sizes[v, j]
+            loop[i, j] = closed[i, j] - Phi[i, j] + sum(of_input[v, r] * HPhi[r, j] for r in range(m))
+            size = sizes[v, j] + abs(Phi[i, j]) + 2 * sum(sizes[v, n + r] * abs(HPhi[r, j]) for r in range(m))
+            slack[i] += ((n + 4) * unit * abs(loop[i, j]) + F(1, 2**86) * size) * X[j]
+        for r in range(m):
+            gain[i, r] = of_input[v, r] - K[i, r]
+            size = sizes[v, n + r] + abs(K[i, r])
+            slack[i] += ((n + 4) * unit * abs(gain[i, r]) + F(1, 2**86) * size + dK[i, r]) * V[r]
+    return {
+        "F": closed,
+        "spread": spread,
+        "G": np.hstack([G, loop, gain]),
+        "limits": np.array([*groups, *X, *V], dtype=object),
+        "slack": np.array(slack, dtype=object) * up,
+        "K": of_input[outputs],
+        "loop": loop,
+        "gain": gain,
+    }
+
+
+def small_program() -> Program:
+    """Two states of which one result is used again; a value without a rounding, and a sum with zero."""
+    build = Builder(2, 1)
+    x, y = build.states
+    (z,) = build.inputs
+    u = build.subtract(build.multiply(0, x), build.multiply(1, y))
+    v = build.add(build.multiply(2, u), build.multiply(3, z))
+    w = build.add(build.multiply(4, y), build.multiply(5, x))  # the coefficient 5 is zero
+    return build.finish([build.add(u, v), build.subtract(v, build.multiply(6, w))], 7)
+
+
+GENERIC = (
+    small_program(),
+    [F(3, 4), F(-5, 8), F(7, 16), F(3, 8), F(5, 4), F(0), F(2)],
+    [F(0), F(1, 64), F(0), F(1, 32), F(0), F(0), F(0)],
+    [[F(1, 2), F(-1, 4)], [F(1, 8), F(3, 4)]],
+    [[F(5, 8), F(-3, 8)]],
+    [[F(1, 4)], [F(5, 16)]],
+    [[F(1, 128)], [F(3, 256)]],
+    ([3.0, 5.0], [0.75], [2.5]),
+    [F(1, 16), F(3, 32)],
+)
+TINY, HALF = F(1, 2**70), F(1, 2)
+CANCELLING = (  # 1 - KH of the program is 2**-70, and K and Φ are those of the exact filter to the last digit
+    innovation_program(1, 1),
+    [F(1), F(1), 1 - TINY],
+    [F(0)] * 3,
+    [[F(1)]],
+    [[F(1)]],
+    [[1 - TINY]],
+    [[F(0)]],
+    ([1.0], [2.0**-60], [2.0**-75]),
+    [F(0)],
+)
+
+
+def found_disturbances(monkeypatch, fmt, case, caps, unit, up):
+    program, C, offsets, Phi, HPhi, K, dK, within, b = case
+    for name in ("_largest_error", "_is_power", "_minus", "_plus_product", "_two_sum", "_two_product", "effects"):
+        monkeypatch.setattr(envelope, name, plain(getattr(envelope, name)))
+
+    def functionals(_operations, _coefficients, _first, rows, sizes):
+        rows[:], sizes[:] = as_pairs(linear(program, C)), linear(program, C, positive=True)
+
+    monkeypatch.setattr(envelope, "functionals", functionals)
+    monkeypatch.setattr(envelope, "_U", float(unit))
+    monkeypatch.setattr(envelope, "_UP", float(up))
+    Phi, HPhi, K, dK = (np.array(each, dtype=object) for each in (Phi, HPhi, K, dK))
+    limits = Limits(*(np.array(each) for each in within))
+    found = plain(envelope.disturbances)(
+        program.operations, program.outputs, program.groups, program.roots, as_pairs(np.array(C))[None],
+        np.array([offsets], dtype=float), units(fmt), as_pairs(Phi)[None], as_pairs(HPhi)[None], as_pairs(K)[None],
+        np.array([dK], dtype=float), limits, np.array(b, dtype=float), np.array(caps, dtype=float),
+    )  # fmt: skip
+    exactly = expected(
+        program, fmt, C, offsets, Phi, HPhi, K, dK, limits, b, [F(c) if c < 1e9 else F(10**9) for c in caps], unit, up
+    )
+    return found, exactly
+
+
+@pytest.mark.parametrize("cap", [np.inf, 0.5])
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 7), FloatFormat(2, 5, Rounding.CHOP), FloatFormat(10, 3)], ids=str)
+def test_disturbances(monkeypatch, fmt: FloatFormat, cap: float) -> None:
+    caps = [cap] * len(GENERIC[0].operations)
+    found, exactly = found_disturbances(monkeypatch, fmt, GENERIC, caps, UNIT, UP)
+    for name, value in exactly.items():
+        same(getattr(found, name)[0], value)
+
+
+@pytest.mark.parametrize("innovation", [2.0**-60, 4.0])
+def test_disturbances_where_everything_cancels(monkeypatch, innovation: float) -> None:
+    """Of the state's part of the result 2**-70 is left, and nothing of what separates the program from the filter."""
+    case = (*CANCELLING[:7], ([1.0], [innovation], [2.0**-75]), [F(0)])
+    caps, fmt = [np.inf] * len(case[0].operations), FloatFormat(2, 300)
+    found, exactly = found_disturbances(monkeypatch, fmt, case, caps, F(1, 2**120), 1 + F(1, 2**30))
+    for name in exactly.keys() - {"G"}:  # effects are float64; the slack makes up for their roundings
+        same(getattr(found, name)[0], exactly[name])
+    assert exactly["loop"] == 0
+    assert exactly["gain"] == 0
+    assert F(1, 2**84) < exactly["slack"][0] < F(1, 2**80)
+
+
+# -- sums over all earlier steps --------------------------------------------------------------------------------------
+
+
+PERIODIC = tuple(
+    np.array(each)
+    for each in (
+        [[[0.5, -0.25], [0.0, 0.75]], [[0.25, 0.5], [-0.5, 0.5]], [[0.75, 0.0], [0.125, -0.5]]],
+        [[[2**-6, 2**-8], [2**-7, 2**-6]], [[2**-9, 2**-6], [0.0, 2**-7]], [[2**-8, 2**-7], [2**-5, 2**-9]]],
+        [[[1.0, 0.5, 2.0], [-1.5, 0.25, 1.0]], [[0.5, -1.0, 1.0], [2.0, 1.0, 0.0]], [[1, 1, -1.0], [0.5, -0.5, 3.0]]],
+        [[0.5, 0.25, 1.0], [0.0, 1.0, 0.75], [1.5, 0.5, 0.25]],
+        [[0.25, 0.125], [0.0625, 0.5], [0.125, 0.375]],
+        [envelope.GAIN, envelope.ROUNDING, envelope.LOOP],
+    )
+)  # fmt: skip
+
+
+def certificate(starts, k, first, steady, most):
+    """The sums of a certificate in fractions, with the allowance for their roundings."""
+    loops, spread, G, limits, slack, part = (fractions(each) for each in PERIODIC)
+    rows = len(loops)
+    out = []
+    for start in fractions(starts):
+        c, sums, residual, lags, begun = start, [F(0)] * 4, fractions(np.zeros(2)), 0, fractions(np.zeros(2))
+        for lag in range(most):
+            if not steady and k - lag <= 0:
+                break
+            at = first + (k - lag - 1) % (rows - first) if steady else k - lag - 1
+            at = at if at < rows else first + (at - first) % (rows - first)
+            sums[envelope.ROUNDING] += abs(c) @ slack[at]
+            for g in range(3):
+                sums[part[g].numerator] += abs(c @ G[at, :, g]) * limits[at, g]
+            residual = residual + abs(c) @ spread[at]
+            c, lags = c @ loops[at], lag + 1
+        if not steady and lags == k:
+            begun, c = abs(c), c * 0
+        allowance = 1 + (lags + 64) * 4 * UNIT
+        out.append(([s * allowance for s in sums], residual * allowance, abs(c), begun))
+    return out, lags
+
+
+@pytest.mark.parametrize(
+    ("k", "first", "steady", "most"),
+    [(1, 1, True, 5), (2, 1, True, 4), (3, 0, True, 7), (6, 1, False, 9), (5, 1, False, 3)],
+)
+def test_certificate(monkeypatch, k: int, first: int, steady: bool, most: int) -> None:
+    monkeypatch.setattr(envelope, "_U", float(UNIT))
+    starts = np.array([[1.0, 0.0], [0.5, -2.0]])
+    found = plain(envelope.certify)(*PERIODIC, starts, k, first, steady, most, np.ones(2), 0.0)
+    exactly, lags = certificate(starts, k, first, steady, most)
+    for i, (sums, residual, tail, begun) in enumerate(exactly):
+        same(found.sums[i], sums, 1e-15)
+        same(found.residual[i], residual, 1e-15)
+        same(found.tail[i], tail, 1e-15)
+        same(found.start[i], begun, 1e-15)
+    assert found.lags == lags
+    assert (found.start.any(), found.tail.any()) == ((True, False) if not steady and most > k else (False, True))
+
+
+def test_a_certificate_ends_once_its_rows_are_small() -> None:
+    """Half of it each step, in units of 4: below 0.3 after the fourth, whose disturbance is not in the sum any more."""
+    loop, none = np.array([[[0.5]]]), np.zeros((1, 1))
+    given = (loop, none[None], np.ones((1, 1, 1)), np.ones((1, 1)), none, np.zeros(1, np.int64))
+    found = plain(envelope.certify)(*given, np.eye(1), 1, 0, True, 50, np.full(1, 4.0), 0.3)
+    assert found.lags == 4
+    assert found.tail == 0.0625
+    assert found.sums[0, 0] == pytest.approx(1.875, rel=1e-13)
+
+
+def test_peaks(monkeypatch) -> None:
+    """State and innovation before the first step, in the first steps, and in a period."""
+    monkeypatch.setattr(envelope, "_U", 0.0)
+    monkeypatch.setattr(envelope, "_UP", float(UP))
+    monkeypatch.setattr(envelope, "certify", plain(envelope.certify))
+    HPhi = np.array([[[0.5, -2.0]], [[1.0, 0.25]], [[-0.75, 1.5]]])
+    X, Z, x0 = np.array([2.0, 3.0]), np.array([0.125]), np.array([0.25, 0.5])
+    peak_x, peak_v = plain(envelope.peaks)(*PERIODIC, HPhi, X, np.zeros(1), Z, x0, 1, 4, True, 3, np.ones(2), 0.0)
+    monkeypatch.setitem(globals(), "UNIT", F(0))
+    most_x, most_v = fractions(x0), [(fractions(Z)[0] + abs(fractions(HPhi[0, 0])) @ fractions(x0)) * UP]
+    for k, first, steady, following in ((1, 1, False, 1), (2, 1, False, 2), (3, 1, False, 1), (4, 1, False, 2),
+                                        (1, 1, True, 2), (2, 1, True, 1)):  # fmt: skip
+        starts = np.vstack([np.eye(2), HPhi[following]])
+        totals = [
+            sum(sums) + (residual + tail) @ fractions(X) + begun @ fractions(x0)
+            for sums, residual, tail, begun in certificate(starts, k, first, steady, 3)[0]
+        ]
+        most_x = np.maximum(most_x, np.array(totals[:2]) * UP)
+        seen = totals[2] + F(1, 2**50) * abs(fractions(HPhi[following, 0])) @ fractions(X)
+        most_v.append((fractions(Z)[0] + seen) * UP)
+    same(peak_x, most_x)
+    same(peak_v, [max(most_v)], 1e-15)
+
+
+# -- sets that contain the error --------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def sets(monkeypatch):
+    for name in ("take_in", "_length", "_move_ellipsoid", "support", "width", "_join"):
+        monkeypatch.setattr(reach, name, plain(getattr(reach, name)))
+    monkeypatch.setattr(reach, "_U", float(UNIT))
+    monkeypatch.setattr(reach, "_UP", float(UP))
+    return reach
+
+
+SIZE = np.array([1.0, 2.0])
+
+
+def test_an_ellipsoid_takes_in_segments(sets) -> None:
+    """The lengths are 5 for the ellipsoid, in units of the scales, and 5 and 13 for the segments."""
+    segments = np.array([[[3.0, 8.0], [9.0, 9.0]], [[0.0, 0.0], [5.0, -24.0]]])
+    M = np.array([[[9.0, 1.5], [1.5, 64.0]], [[2.0, 0.5], [0.5, 3.0]]])
+    ellipsoids = M.copy()
+    # The second column of the first step belongs to no ellipsoid here.
+    sets.take_in(segments[:, :1], np.array([0]), ellipsoids[:1], SIZE)
+    total = 10 * UP
+    first = total / 5 * fractions(M[0]) + total / 5 * np.outer(*[fractions([3, 8])] * 2)
+    for i in range(2):
+        first[i, i] *= 1 + 2 * (2 * 1 + 16) * 4 * UNIT
+    same(ellipsoids[0], first, 1e-15)
+    ellipsoids = M.copy()
+    ellipsoids[1] = 0
+    sets.take_in(segments[1:], np.array([0, 1]), ellipsoids, SIZE)
+    assert (ellipsoids[0] == M[0]).all()
+    second = UP * np.outer(*[fractions([5, -24])] * 2)
+    for i in range(2):
+        second[i, i] *= 1 + 2 * (1 * 2 + 16) * 4 * UNIT
+    same(ellipsoids[1], second, 1e-15)
+
+
+def test_an_ellipsoid_moves(sets) -> None:
+    M, loop = np.array([[9.0, -3.0], [-3.0, 4.0]]), np.array([[0.5, -1.0], [2.0, 0.25]])
+    moved = M.copy()
+    sets._move_ellipsoid(loop, moved)
+    exactly = fractions(loop) @ fractions(M) @ fractions(loop).T
+    reached = abs(fractions(loop)) @ fractions([3, 2])
+    for i in range(2):
+        exactly[i, i] += 2 * (2 + 4) * 8 * UNIT * reached[i] ** 2
+    same(moved, exactly, 1e-15)
+
+
+def test_the_width_of_an_ellipsoid(sets, monkeypatch) -> None:
+    M, a = np.array([[9.0, -3.0], [-3.0, 4.0]]), np.array([0.5, -2.0])
+    reached = F(1, 2) * 3 + 2 * 2
+    exactly = F(9, 4) + 6 + 16
+    root = math.sqrt(exactly + (2 + 4) * 8 * UNIT * reached**2)
+    assert sets.width(M, a) == pytest.approx(root * float(UP) + 2.0**-48 * float(reached), rel=1e-15)
+    monkeypatch.setattr(sets, "_U", 0.0)
+    flat = np.array([[4.0, -2.0], [-2.0, 1.0]])
+    assert sets.width(flat, np.array([1.0, 2.0])) == 2.0**-48 * 4
+    flat[0, 0] = np.nextafter(4.0, 0)  # a root of what rounding made negative
+    assert sets.width(flat, np.array([1.0, 2.0])) == pytest.approx(2.0**-48 * 4, rel=1e-12)
+
+
+def test_two_ellipsoids_join(sets) -> None:
+    M, other = np.array([[9.0, 1.5], [1.5, 64.0]]), np.array([[25.0, -2.0], [-2.0, 576.0]])
+    joined = M.copy()
+    sets._join(joined, np.zeros((2, 2)), SIZE)
+    assert (joined == M).all()
+    sets._join(joined, other, SIZE)  # 5 and 13
+    exactly = 18 * UP * (fractions(M) / 5 + fractions(other) / 13)
+    alone = np.zeros((2, 2))
+    sets._join(alone, other, SIZE)
+    only = UP * fractions(other)
+    for i in range(2):
+        exactly[i, i] *= 1 + 2 * 32 * UNIT
+        only[i, i] *= 1 + 2 * 32 * UNIT
+    same(joined, exactly, 1e-15)
+    same(alone, only, 1e-15)
+
+
+def test_the_support_of_a_set(sets) -> None:
+    segments = np.array([[[1.0, 2.0], [0.5, 0.25]], [[-3.0, 1.0], [1.0, 1.0]]])
+    ellipsoids = np.array([np.diag([9.0, 4.0]), np.diag([1.0, 16.0]), np.zeros((2, 2))])
+    a, out = np.array([2.0, -0.5]), np.full(4, 0.125)
+    sets.support(Reach(segments, np.array([2, 0]), ellipsoids), a, out)
+    allowance = (2 + 4) * UNIT
+    sums = {
+        2: 1 + allowance * 3 + F(13, 2) + allowance * F(13, 2),
+        0: F(7, 8) + F(3, 2) + allowance * (F(9, 8) + F(5, 2)),
+    }
+    widths = [sets.width(M, a) for M in ellipsoids]
+    assert widths[0] > 6
+    same(out, [0.125 + float(sums[0]) + widths[0], 0.125 + widths[1], 0.125 + float(sums[2]) + widths[2], 0.125], 1e-15)
+
+
+def test_a_pass_forward(sets) -> None:
+    """One state, two steps in the window: the first step's segments are in the ellipsoid from the third step on."""
+    loop, spread, slack = (np.array(each) for each in ([0.5, -0.75, 0.25], [0.0625, 0.125, 0.25], [0.5, 0.25, 1.0]))
+    G, limits = np.array([[2.0, -1.0], [1.0, 0.0], [-0.5, 4.0]]), np.array([[0.5, 0.25], [1.5, 1.0], [2.0, 0.5]])
+    given = loop.reshape(3, 1, 1), spread.reshape(3, 1, 1), G.reshape(3, 1, 2), limits, slack.reshape(3, 1)
+    kind = np.array([envelope.GAIN, envelope.LOOP])
+    bounds, parts = plain(sets.forward)(*given, sets.nothing(2, kind, 1), 0, 3, np.array([0.125]), np.ones(1))
+    last, history = F(1, 8), []
+    allowance = 1 + (2 * 3 + 64) * 4 * UNIT
+    old = [F(0)] * 3  # the radius of each ellipsoid
+    for k in range(3):
+        columns = abs(fractions(G[k]) * fractions(limits[k]))
+        own = (F(slack[k]) + 2 * F(spread[k]) * last + 2 * UNIT * sum(columns)) * UP
+        new = {envelope.GAIN: columns[0], envelope.LOOP: columns[1], envelope.ROUNDING: own}
+        if k == 2:  # radii of one state: the roots of what take_in and _move_ellipsoid add to their squares
+            grown = 1 + (1 * 3 + 16) * 4 * UNIT
+            old = [
+                math.sqrt(history[0][p] ** 2 * UP * grown * (F(loop[2]) ** 2) * (1 + 1 * 5 * 8 * UNIT))
+                for p in range(3)
+            ]
+            # What was taken in had moved with the second step.
+            old = [each * abs(loop[1]) for each in old]
+            live = {p: new[p] + abs(F(loop[2])) * history[1][p] for p in range(3)}
+        elif k == 1:
+            live = {p: new[p] + abs(F(loop[1])) * history[0][p] for p in range(3)}
+        else:
+            live = dict(new)
+        history.append(new)
+        each = [float(live[p]) + float(old[p]) for p in range(3)]
+        same(parts[k, 0], [*each, 0.0], 1e-14)
+        same(bounds[k, 0], sum(each) * float(allowance), 1e-14)
+        last = F(float(bounds[k, 0]))
+
+
+def test_steps_after_the_gain_has_settled(sets) -> None:
+    """One state that halves: sums over the period and over the set before it, asked for anew as long as it matters."""
+    loop, spread, slack, b = 0.5, 0.0625, 0.25, 3.0
+    given = (np.full((1, 1, 1), loop), np.full((1, 1, 1), spread), np.array([[[2.0, -1.0]]]), np.array([[0.5, 0.25]]))
+    before = Reach(np.array([[[4.0]]]), np.array([envelope.LOOP]), np.array([[[9.0]], [[1.0]], [[0.0]]]))
+    part = np.array([envelope.GAIN, envelope.LOOP])
+    bounds, parts = plain(sets.onward)(*given, np.full((1, 1), slack), part, 0, 6, before, np.ones(1), np.array([b]))
+    whole = np.zeros((1, 1, 1))
+    sets.take_in(before.segments, np.zeros(1, np.int64), whole, np.ones(1))
+    for M in before.ellipsoids:
+        sets._join(whole[0], M, np.ones(1))
+    assert math.sqrt(whole[0, 0, 0]) > 4 + 3 + 1
+    c, sums, residual = 1.0, np.zeros(4), 0.0
+    for lag in range(6):
+        sums += c * np.array([slack, 0.25, 1.0, 0.0])[[0, 1, 2, 3]]
+        residual += c * spread * b
+        c *= loop
+        value = np.zeros(4)
+        sets.support(before, np.array([c]), value)
+        expected_parts = sums + value
+        expected_parts[3] = residual
+        same(parts[lag, 0], expected_parts, 1e-14)
+        same(bounds[lag, 0], expected_parts.sum() * (1 + (6 + 1 + 64) * 4 * float(UNIT)), 1e-14)
