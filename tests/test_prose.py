@@ -1,17 +1,41 @@
-"""Numerals in the text of the book: computed ones come by glue; all others are in typed_numerals.csv with a reason."""
+"""Numbers in the text of the book: computed ones come by glue; all others are listed in a table with a reason.
+
+Numerals of the text are in typed_numerals.csv, those of formulas in formula_numerals.csv, and quantities in words, such
+as "nearly three", in number_words.csv. A typed number whose reason is `computed` is computed here.
+"""
 
 from __future__ import annotations
 
 import ast
 import csv
 import json
+import math
 import re
+from collections.abc import Callable
+from fractions import Fraction
+from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+import sympy as sp
+from scipy.integrate import quad
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.budget import theory as budget
+from gpbnb.integration import theory as integration
+from gpbnb.kalman import probability, report_bounds, threshold, year, year_cases
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.gravity_probe_b import YEAR
+from gpbnb.rolling import experiment as rolling_experiment
+from gpbnb.rolling import flicker
+from gpbnb.rolling import theory as rolling
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "book").glob("*.ipynb"), *(ROOT / "book").glob("*.md")])
+WRITTEN = [*(page for page in PAGES if not page.stem.startswith("ledger-")), ROOT / "README.md"]
 NOT_PROSE = re.compile(
     "|".join(
         (
@@ -33,8 +57,13 @@ NUMERAL = re.compile(r"(?<![\w-])\.?\d[\d.,]*")
 
 #: Phrases with a numeral that was not computed: what a document printed, what a computation was given, what follows
 #: from these by counting (exact), formats and names, and facts from a cited source (cited).
-TYPED = list(csv.DictReader((ROOT / "tests" / "typed_numerals.csv").read_text(encoding="utf-8").splitlines()))
+TYPED, FORMULAS, WORDED = (
+    list(csv.DictReader((ROOT / "tests" / f"{name}.csv").read_text(encoding="utf-8").splitlines()))
+    for name in ("typed_numerals", "formula_numerals", "number_words")
+)
 REASONS = {"printed", "given", "exact", "formats", "names", "cited"}
+#: Besides: a quantity that the notebook itself asserts, and one that was measured once, at too high a price for a test.
+WORD_REASONS = REASONS | {"computed", "asserted", "measured"}
 #: Sentences of the README, which cannot glue: what it says, and the number in the book, rounded to so many places.
 README = {
     "known to 31 arcseconds,": ("rolling", "rolling_limit", 31, 0),
@@ -43,8 +72,28 @@ README = {
 }
 
 
-def prose(page: Path) -> str:
-    """Text and captions of a page, without what is no prose; white space as single blanks."""
+_SMALL = (
+    "two|three|four|five|six|seven|eight|nine|ten|eleven|twelve|fifteen|sixteen|twenty|thirty|forty|fifty|sixty|eighty"
+)
+_LARGE = "hundred|thousand|million|billion|dozen"
+_PART = "thirds?|quarters?|fifths?|tenths?|hundredths?|thousandths?"
+#: Quantities in words: a number of hundreds or more, a number after a word that compares, a multiple, a share.
+WORDS = re.compile(
+    rf"\b(?:(?:{_SMALL}|some|a|an|of|several) )?(?:{_LARGE})s?\b"
+    rf"|\b(?:(?:nearly|almost) one|(?:nearly|about|almost|roughly|than|at least|at most|around) (?:{_SMALL}))\b"
+    rf"|\b(?:{_SMALL})(?: times|fold| decades| orders| per ?cent)\b|\bfactor of (?:{_SMALL}|½)\b"
+    rf"|\b(?:a|{_SMALL}) (?:{_PART})\b|\b(?:[Tt]wice|thrice|triple[sd]?)\b"
+    r"|\b(?:[Hh]alf|[Aa] quarter)(?= (?:of|as|what|larger|smaller|the)\b)"
+)
+
+
+def formulas(page: Path) -> str:
+    """The formulas of a page, one a line."""
+    return "\n".join(" ".join(each.split()) for each in re.findall(r"\$\$.*?\$\$|\$[^$]*\$", source(page), re.DOTALL))
+
+
+def source(page: Path) -> str:
+    """Text and captions of a page as they are written."""
     text = page.read_text(encoding="utf-8")
     if page.suffix == ".ipynb":
         parts = []
@@ -52,7 +101,12 @@ def prose(page: Path) -> str:
             figure = cell["metadata"].get("mystnb", {}).get("figure", {})
             parts.append("".join(cell["source"]) if cell["cell_type"] == "markdown" else figure.get("caption", ""))
         text = "\n\n".join(parts)
-    return strip(text)
+    return text
+
+
+def prose(page: Path) -> str:
+    """Text and captions of a page, without what is no prose; white space as single blanks."""
+    return strip(source(page))
 
 
 def strip(text: str) -> str:
@@ -70,6 +124,157 @@ def glued(page: str, key: str) -> float:
             if output.get("metadata", {}).get("scrapbook", {}).get("name") == key:
                 return float(ast.literal_eval("".join(output["data"]["application/papermill.record/text/plain"])))
     raise KeyError(f"{page} glues no {key}")
+
+
+# -- what is computed here --------------------------------------------------------------------------------------------
+
+
+def printed(page: str, code: str) -> list[float]:
+    """The numbers that a cell printed."""
+    for cell in json.loads((ROOT / "book" / f"{page}.ipynb").read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code" and code in "".join(cell["source"]):
+            text = "".join("".join(output.get("text", "")) for output in cell["outputs"])
+            return [float(each) for each in re.findall(r"\d+\.\d+", text)]
+    raise KeyError(f"{page} has no cell with {code}")
+
+
+def error_of_integration(rounding: Rounding) -> float:
+    """Least total error with 24 bits, an hour and 100 Hz."""
+    fmt, omega = FloatFormat(2, 24, rounding), 200 * math.pi
+    return integration.two_errors(1.0, omega, integration.best_rate(omega, 3600.0, fmt), 3600.0, fmt).total
+
+
+def decades_a_digit() -> float:
+    """Decades that each decimal digit takes off the error of the drift rate after a year, on average."""
+    base = year_cases.Case(year_cases.MODELS[0], 10, 8, Rounding.NEAREST, Form.HUNG)
+    runs = {run.case: run for run in year.load()}
+    ends = [float(np.abs(runs[base._replace(precision=t)].rate[-1]).max()) for t in (8, 16)]
+    return math.log10(ends[0] / ends[1]) / 8
+
+
+def median_ratios() -> list[float]:
+    """Median error of a year over that with one bit more, for a hundred records of the same filter."""
+    found = [each for each in probability.shares(threshold.SWEEP.load()) if each.fmt.base == 2 and each.records >= 100]
+    median = {
+        (each.setting, each.states, each.form, each.fmt.rounding, each.fmt.precision): each.quantile(0.5)
+        for each in found
+    }
+    return [
+        high / median[*key, precision + 1]
+        for (*key, precision), high in median.items()
+        if (*key, precision + 1) in median
+    ]
+
+
+def false_drift(resets: bool) -> sp.Expr:
+    """Variance of a fitted slope of the ramp times the phase, whose rate is a random walk, for k = q = T = 1.
+
+    A step of the rate at u adds t - u to the phase, or, with a reset every P, half of P from then on.
+    """
+    t, u = sp.symbols("t u")
+    slope = sp.integrate(12 * (t - sp.Rational(1, 2)) * t * (1 if resets else t - u), (t, u, 1))
+    return sp.integrate(sp.expand(slope**2), (u, 0, 1))
+
+
+def stored_guarantee(name: str, column: str) -> float:
+    table = files("gpbnb.wordlength") / "guarantees.csv"
+    lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return next(float(row[column]) for row in csv.DictReader(lines) if row["name"] == name)
+
+
+def half_of_a_cycle() -> bool:
+    """nL less the error variance stays below L/2 for every μ and n."""
+    for mu in (1e-6, 0.1, 1.0, 10.0, 1e4):
+        rate, n = float(integration.walk_factor(mu)), np.array([1, 2, 10, 1000, 10**7])
+        if not (n * rate - integration.error_variance(n, mu) < rate / 2 * (1 + 1e-9)).all():
+            return False
+    return True
+
+
+def near(number: float) -> Any:
+    """Within 1 %."""
+    return pytest.approx(number, rel=0.01)
+
+
+def relative_error(number: str) -> float:
+    exactly = Fraction(number)
+    return float(abs(FloatFormat(10, 3).round(exactly) - exactly) / exactly)
+
+
+def mean_square_of_a_rounding() -> sp.Expr:
+    """Over numbers whose logarithm is uniformly distributed, from b**(t-1) to b**t, whose spacing is 1."""
+    b, t, x = sp.symbols("b t x", positive=True)
+    mean = sp.integrate(1 / (12 * x**2) / x, (x, b ** (t - 1), b**t)) / sp.log(b)
+    return sp.simplify(mean - (b**2 - 1) / (24 * sp.log(b)) * b ** (-2 * t))
+
+
+def lag_of_a_filter() -> float:
+    """Noise bandwidth times lag of a single pole: 1/4."""
+    return quad(lambda f: 1 / (1 + (2 * math.pi * f) ** 2), 0, math.inf)[0]
+
+
+def steepness_at_the_best_bandwidth() -> sp.Expr:
+    k, noise, width = sp.symbols("k N_0 B", positive=True)
+    error = k**2 / (16 * width**2) + noise * width
+    return sp.simplify(sp.diff(error, width).subs(width, sp.cbrt(k**2 / (8 * noise))))
+
+
+def actual_rate_error() -> float:
+    """Error of the roll rate of 600 s in six digits, over the worst case."""
+    six = FloatFormat(10, 6)
+    return abs(float(rolling_experiment.rounded_rate_error(600, six))) / float(rolling.worst_rate_error(600, six))
+
+
+MU = sp.Symbol("mu")
+SERIES = MU / 6 - MU**3 / 360 + MU**5 / 15120
+
+#: By page and phrase. For formulas, each function computes the number in another way than by the formula.
+COMPUTED: dict[tuple[str, str], Callable[[], Any]] = {
+    ("budget", "be a quarter larger"): lambda: budget.equal_error(1.253, 44) / budget.equal_error(1, 44) == near(1.25),
+    ("geometry", "more than a hundred times as"): lambda: 6.6 / 0.04 > 100,
+    ("guarantee", "tens of thousands of steps"): lambda: stored_guarantee("altimeter", "repeat") > 10_000,
+    ("guarantee", "more than half of the"): lambda: min(printed("guarantee", "outcome.ratios")) > 0.5,
+    ("index", "about ten decimal digits"): lambda: glued("mission", "mission_bits") * math.log10(2) == near(10),
+    ("integration", "half of its variance"): lambda: (
+        2 / math.pi * quad(lambda s: 1 / (1 + s * s), 1, math.inf)[0] == pytest.approx(0.5)
+    ),
+    ("integration", "never exceeds half of what"): half_of_a_cycle,
+    ("integration", "after hundreds of cycles"): lambda: 100 < glued("integration", "settled_rectangle") < 1000,
+    ("integration", "more than a hundred times as"): lambda: (
+        error_of_integration(Rounding.CHOP) > 100 * error_of_integration(Rounding.NEAREST)
+    ),
+    ("kalman", "more than three million steps"): lambda: 3e6 < YEAR < 3.5e6,
+    ("mission", "a factor of two"): lambda: min(median_ratios()) > 2,
+    ("processors", "far more than sixteen bits"): lambda: glued("wordlength", "span") > 32,
+    ("rolling", "about a hundred decays"): lambda: 70 < len(flicker.exponentials()[0]) < 140,
+    ("rolling", "about half of the"): lambda: 0.45 < actual_rate_error() < 0.55,
+    ("rolling", "or nearly three"): lambda: 2.7 < math.sqrt(600 / 77.5) < 3,
+    ("rounding", "is ten times smaller"): lambda: relative_error("1.005") / relative_error("9.985") == near(10),
+    ("year", "by about fifteen on"): lambda: 10 ** decades_a_digit() == pytest.approx(15, abs=0.5),
+    ("year", "only about four"): lambda: round(6606 / YEAR * 2**11) == 4,
+    ("integration", r"\tfrac1{360}\mu^3 + \tfrac1{15120}\mu^5"): lambda: (
+        sp.expand(sp.series(sp.coth(MU / 2) - 2 / MU, MU, 0, 7).removeO() - SERIES) == 0
+    ),
+    ("integration", r"\mu^2/120"): lambda: (
+        float(integration.approximation_ratio(0.01)) - 1 == pytest.approx(0.01**2 / 120, rel=1e-4)
+    ),
+    ("integration", r"{24\ln b}"): lambda: mean_square_of_a_rounding() == 0,
+    ("kalman", "7n+3m+6 = 82"): lambda: report_bounds.coefficients(1, 10, 2)[0] == 82,
+    ("kalman", r"1/(16R\beta)"): lambda: report_bounds.coefficients(1, 1, 1)[0] == 16,
+    ("notation", r"4.85\times10^{-9}"): lambda: f"{math.pi / 180 / 3600 / 1000:.2e}" == "4.85e-09",
+    ("rolling", r"{16B^2}"): lambda: lag_of_a_filter() ** 2 == pytest.approx(1 / 16),
+    ("rolling", r"{8N_0}"): lambda: steepness_at_the_best_bandwidth() == 0,
+    ("rolling", r"\tfrac{383}{1260}"): lambda: false_drift(resets=False) == sp.Rational(383, 1260),
+    ("rolling", r"\tfrac{38}{35}"): lambda: false_drift(resets=True) / 4 == sp.Rational(38, 35) / 4,
+    ("year", r"6606/3{,}153{,}600 \approx 0.0021"): lambda: f"{6606 / YEAR:.4f}" == "0.0021",
+    ("year", r"2^{-11} \approx 0.0005"): lambda: (
+        f"{2.0 ** (math.floor(math.log2(6606)) - 23):.4f}" == f"{2.0**-11:.4f}" == "0.0005"
+    ),
+    ("year", r"47\beta"): lambda: report_bounds.gain_count(10, 2) == 47,
+    ("year", r"34\beta"): lambda: report_bounds.covariance_count(10, 2) == 34,
+    ("arithmetic", r"2^{-850}"): lambda: doubledouble.LEAST == 2.0**-850,
+    ("arithmetic", r"2^{1000}"): lambda: doubledouble.LIMIT == 2.0**1000,
+}
 
 
 def test_a_typed_numeral_is_found_and_what_is_no_prose_is_passed_over():
@@ -94,6 +299,44 @@ def test_each_line_of_the_list_has_a_page_a_reason_and_a_numeral():
     assert {row["page"] for row in TYPED} <= {page.stem for page in PAGES}
     assert {row["reason"] for row in TYPED} == REASONS
     assert [row for row in TYPED if not NUMERAL.search(row["phrase"])] == []
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
+def test_no_result_is_written_in_words(page):
+    text = prose(page)
+    for row in WORDED:
+        if row["page"] == page.stem:
+            assert row["phrase"] in text, (row, "is no longer there: drop it from the list")
+            text = text.replace(row["phrase"], " ")
+    assert WORDS.findall(text) == [], "list each quantity in tests/number_words.csv, with the reason"
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
+def test_no_result_is_typed_in_a_formula(page):
+    """Numbers of two digits or more; the coefficients of one digit belong to the algebra, which other tests derive."""
+    text = formulas(page)
+    for row in FORMULAS:
+        if row["page"] == page.stem:
+            assert row["phrase"] in text, (row, "is no longer there: drop it from the list")
+            text = text.replace(row["phrase"], " ")
+    numbers = re.findall(r"(?<![\w.])\d(?:[\d.]|\{,\})*\d", text)
+    assert numbers == [], "list each number in tests/formula_numerals.csv, with the reason"
+
+
+@pytest.mark.parametrize("rows", [FORMULAS, WORDED], ids=["formulas", "words"])
+def test_each_typed_quantity_has_a_reason(rows):
+    assert {row["page"] for row in rows} <= {page.stem for page in WRITTEN}
+    assert {row["reason"] for row in rows} <= WORD_REASONS
+
+
+def test_every_quantity_that_is_to_be_computed_is_computed():
+    listed = {(row["page"], row["phrase"]) for row in (*FORMULAS, *WORDED) if row["reason"] == "computed"}
+    assert listed == set(COMPUTED)
+
+
+@pytest.mark.parametrize(("page", "phrase"), COMPUTED)
+def test_a_typed_quantity_is_what_is_computed(page, phrase):
+    assert COMPUTED[page, phrase]()
 
 
 @pytest.mark.parametrize("phrase", README)
