@@ -82,12 +82,6 @@ def _cells() -> tuple[Cell, ...]:
         Cell(deviation, 10, "nearest", "innovation", (7, 9), 0, 30),
         Cell(absolute, 2, "chop", "hung", (34, 35), 0, 30),
         Cell(deviation, 2, "chop", "hung", (29,), 0, 30),
-        Cell(deviation, 10, "nearest", "innovation", (8,), 30, 270),
-        Cell(absolute, 10, "nearest", "innovation", (10,), 30, 270),
-        Cell(deviation, 2, "nearest", "innovation", (25, 26)),
-        Cell(absolute, 2, "nearest", "innovation", (32, 33)),
-        Cell(absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
-        Cell(deviation, 2, "nearest", "hung", (22, 23, 28, 29, 30)),
     ]
     return tuple(cells)
 
