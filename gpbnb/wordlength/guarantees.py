@@ -94,7 +94,7 @@ CASES = (
     Case(px4_landing_target, (10, 3), 1, center=(9, 0)),
     Case(dyer_mcreynolds, (10, 10, 10), 0.02, steps=1, horizon=1),
     Case(dynamax_tracking, (100, 100, 10, 10), 8, center=(80, 80, 0, 0)),
-    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000),
+    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000, budget=2e9),
     Case(tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000),
     Case(lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), measurement=1.0),
     Case(lambda: controller("0.999", "0.01", "2", "5"), measurement=1.0),

@@ -82,7 +82,7 @@ def compute(seed: int) -> Row:
             pool = np.broadcast_to(Z * rng.uniform(-1, 1, m), (STEPS, 1, m)).copy()
         else:
             pool = Z * rng.uniform(-1, 1, (STEPS, 30, m))
-        _, _, errors = run_against(found, rows, pool * (1 - 2.0**-5), steer, False)
+        _, _, errors = run_against(found, rows, pool * (1 - 2.0**-5), steer, False, ahead=kind == 2)
         worst[kind] = max(worst[kind], float((np.abs(errors).max(axis=0) / found.bound).max()))
     ratios = [f"{each:.4g}" for each in worst]
     return Row(seed, n, m, base, precision, fmt.rounding.value, f"{found.radius:.4f}", len(kinds), *ratios)
