@@ -23,23 +23,23 @@ See [one](one.md), [its ledger](one.md#the-ledger), {ref}`two-ledger` and {eq}`s
 
 ```{toctree}
 one
-two
+page-two
 ```
 """,
     "one": """# One
 
 ## The ledger
 
-Two's is [there](two.md#the-ledger); this is [here](#the-ledger). [^a] To the [book](index.md).
+Two's is [there](page-two.md#the-ledger); this is [here](#the-ledger). [^a] To the [book](index.md).
 
 [^a]: A note.
 
 ```{raw} html
-<p><a href="two.html#row.2">a row</a> <a href="one.html">one page, raw</a>
-<a href="two.html#the-ledger">two ledger, raw</a></p>
+<p><a href="page-two.html#row.2">a row</a> <a href="one.html">one page, raw</a>
+<a href="page-two.html#the-ledger">two ledger, raw</a></p>
 ```
 """,
-    "two": """# Two
+    "page-two": """# Two
 
 (two-ledger)=
 ## The ledger
@@ -92,14 +92,15 @@ def test_every_link_leads_to_its_place_within_the_page(single):
     assert {link[1:] for link in links} <= set(ids)
     # Those that could be mistaken have names that stand once, and as many as there are places.
     led = [link[1:] for link in links if link.startswith("#book/")]
-    assert sorted(set(led)) == [f"book/{page}-{name}" for page in ("one", "two") for name in ("a", "id1", "the-ledger")]
+    names = ("a", "id1", "the-ledger")
+    assert sorted(set(led)) == [f"book/{page}-{name}" for page in ("one", "page-two") for name in names]
     assert all(ids.count(name) == 1 for name in led)
 
 
 def test_each_way_to_link_is_mended(single):
     text = {t: h for h, t in re.findall(r'<a [^>]*href="#([^"]+)">(?:<span[^>]*>)*([^<]+)<', single)}
     assert text["its ledger"] == text["here"] == text["one ledger"] == "book/one-the-ledger"
-    assert text["there"] == text["two ledger, raw"] == "book/two-the-ledger"
+    assert text["there"] == text["two ledger, raw"] == "book/page-two-the-ledger"
     assert text["The ledger"] == "two-ledger"
     assert (text["(1)"], text["a row"], text["one page, raw"]) == ("equation-square", "row.2", "document-book/one")
     assert (text["one"], text["book"]) == ("document-book/one", "book")

@@ -149,7 +149,7 @@ def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
     folder = Path(docname).parent
     for node in doctree.findall(nodes.raw):
         mended = re.sub(
-            r'href="(\w+)\.html(?:#([^"]+))?"',
+            r'href="([\w-]+)\.html(?:#([^"]+))?"',
             lambda match: f'href="#{within((folder / match[1]).as_posix(), match[2] or "")}"',
             node.astext(),
         )
