@@ -168,13 +168,11 @@ window.formulasTypeset = new Promise((resolve) => {
 // Until its fonts are there a formula may be too wide for its cell.
 document.fonts.addEventListener("loadingdone", () => markScrolling());
 
-// What was collapsed had no width to break its formulas at. On paper everything is open.
+// What was collapsed had no width. Only boxes within it are measured: a print opens hundreds at once, and for each of them
+// the whole page would be laid out again. Its formulas are typeset, and broken into lines, once they are seen.
 document.addEventListener(
   "toggle",
-  ({ target }) => {
-    breakFormulas(target.querySelectorAll("mjx-container"));
-    markScrolling();
-  },
+  ({ target }) => markScrolling([...target.querySelectorAll("div, pre, mjx-container")]),
   true,
 );
 window.addEventListener("beforeprint", () => {
