@@ -300,19 +300,57 @@ def test_no_page_is_too_high(page):
     assert page.evaluate("document.documentElement.scrollHeight") <= tools.HIGHEST
 
 
+def test_the_front_page_shows_claim_doors_and_figure_at_once(open_page):
+    with open_page("book/index.html") as page:
+        page.set_viewport_size({"width": 1440, "height": 900})
+        page.wait_for_function("document.querySelector('#fig-front img').complete")
+        for part in ("article p strong", "article table", "#fig-front img"):
+            box = page.locator(part).first.bounding_box()
+            assert box["y"] >= 0
+            assert box["y"] + box["height"] <= 900
+
+
+def test_what_was_collapsed_is_ready_once_opened(open_page):
+    with open_page("book/inversion.html", "phone") as page:
+        part = page.locator("details.derivation").first
+        assert part.locator("mjx-container").count() == 0
+        part.locator("summary").click()
+        unset = "part => !part.querySelector('.math:not(:has(mjx-container))')"
+        page.wait_for_function(unset, arg=part.element_handle())
+        page.wait_for_timeout(100)
+        boxes = part.locator("mjx-container").evaluate_all(
+            "all => all.map(e => ({ stop: e.tabIndex === 0,"
+            " scrolls: e.scrollWidth > e.clientWidth && getComputedStyle(e).overflowX === 'auto' }))"
+        )
+        assert boxes
+        assert all(box["stop"] == box["scrolls"] for box in boxes)
+
+
 LONG_PAGES = ("book/kalman.html", "book/inversion.html", "book/ledger-1984-3.html")
+CHAPTERS = [each for each in PAGES if each.startswith("book/") and not each.startswith("book/api/")]
 
 
 @pytest.mark.parametrize("address", LONG_PAGES)
 def test_a_page_can_be_read_before_all_its_formulas_are_typeset(open_page, address):
-    """Counts, which do not depend on the machine, and a limit of time far above what an idle one takes."""
     with open_page(address) as page:
         near, shown = page.evaluate("[window.formulas.near, window.formulas.shown]")
         every = page.locator(".math").count()
         assert every > 200
         assert near["count"] < shown["count"] / 4
         assert shown["count"] <= every
-        assert near["time"] < shown["time"] < 60_000  # ms
+
+
+@pytest.mark.parametrize("address", CHAPTERS)
+def test_a_page_is_readable_and_complete_in_time(open_page, address):
+    """Of several loads the fastest counts, because other programs delay some of them."""
+    fastest = dict.fromkeys(tools.LONGEST, 60_000.0)
+    for _ in range(tools.LOADS):
+        with open_page(address) as page:
+            fastest = {name: min(time, fastest[name]) for name, time in page.evaluate(tools.TIMES).items()}
+        slow = {name: time for name, time in fastest.items() if time > tools.LONGEST[name]}
+        if not slow:
+            break
+    assert slow == {}
 
 
 def test_formulas_far_away_are_typeset_at_once_when_scrolled_to(open_page):
