@@ -116,7 +116,9 @@ function take(formulas) {
 function settle(formulas) {
   const boxes = formulas.map((formula) => formula.querySelector("mjx-container")).filter(Boolean);
   breakFormulas(boxes);
-  markScrolling(boxes);
+  // A formula that gets its width changes that of the others in its table.
+  const tables = new Set(formulas.map((formula) => formula.closest("table")).filter(Boolean));
+  markScrolling([...boxes, ...[...tables].flatMap((table) => [...table.querySelectorAll("mjx-container")])]);
 }
 function typeset(formulas) {
   const taken = take(formulas);
@@ -143,6 +145,7 @@ async function typesetShown() {
     await pause();
     await typeset(rest.splice(0, batch));
   }
+  markScrolling();
   window.formulas.shown = { time: performance.now(), count: window.formulas.count() };
 }
 
