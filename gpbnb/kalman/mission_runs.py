@@ -74,7 +74,7 @@ class Cell:
 
 
 def _cells() -> tuple[Cell, ...]:
-    usual, *_, flown = SETTINGS
+    usual = next(iter(SETTINGS))
     absolute, deviation = STATES
     cells = [
         Cell(usual, deviation, 2, "nearest", "hung", (25, 26, 27)),
@@ -83,17 +83,6 @@ def _cells() -> tuple[Cell, ...]:
         Cell("known roll phase", deviation, 2, "nearest", "hung", (26,), 0, 10),
         Cell(usual, deviation, 2, "nearest", "hung", (27,), RECORDS, SHOWN - RECORDS),
         Cell(usual, absolute, 2, "nearest", "hung", (31,)),
-        Cell(usual, absolute, 2, "nearest", "hung", (32, 33), RECORDS, SHOWN - RECORDS),
-        Cell("no occultation", deviation, 2, "nearest", "hung", (26,), 0, 10),
-        Cell("no annual aberration", deviation, 2, "nearest", "hung", (26,), 0, 10),
-        Cell("a tenth of the readout noise", deviation, 2, "nearest", "hung", (26,), 0, 10),
-        Cell(usual, deviation, 2, "nearest", "innovation", (26,), 0, 10),
-        Cell(usual, deviation, 2, "chop", "hung", (30,), 0, 10),
-        Cell(flown, deviation, 2, "nearest", "hung", (26,), 0, 5),
-        Cell(usual, deviation, 10, "nearest", "innovation", (8, 9), 0, 10),
-        Cell(usual, absolute, 10, "nearest", "innovation", (10, 11), 0, 10),
-        Cell(usual, deviation, 2, "nearest", "hung", (22, 23, 24, 28, 29, 30)),
-        Cell(usual, absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
     ]
     return tuple(cells)
 
