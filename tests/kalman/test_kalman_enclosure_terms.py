@@ -1,0 +1,321 @@
+"""Every term of the bounds that enclose gains, and of what a guarantee adds up, in exact fractions."""
+
+from __future__ import annotations
+
+from fractions import Fraction as F
+from operator import add, mul, sub, truediv
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from flint import arb, arb_mat
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee import bound, enclosure, gains
+from gpbnb.kalman.guarantee.enclosure import Enclosed
+from gpbnb.kalman.guarantee.envelope import Certificate, Disturbances, Limits
+from gpbnb.kalman.guarantee.linear import state_space
+
+UNIT, UP = F(1, 64), F(33, 32)
+
+
+def same(found: Any, expected: Any, rel: float = 1e-14) -> None:
+    assert float(found) == pytest.approx(float(expected), rel=rel, abs=0)
+
+
+# -- numbers with a bound for their roundings -------------------------------------------------------------------------
+
+
+@pytest.fixture
+def numbers(monkeypatch: pytest.MonkeyPatch) -> tuple[Enclosed, Enclosed]:
+    monkeypatch.setattr(enclosure, "_UP", float(UP))
+    return Enclosed(arb(3), float(UNIT), 1 / 8), Enclosed(arb(-5), float(UNIT), 1 / 16)
+
+
+A, B = F(1, 8), F(1, 16)
+
+
+def rounded(size: F, error: F) -> F:
+    return (error + UNIT * (size * UP + error)) * UP
+
+
+def test_the_errors_of_one_operation(numbers: tuple[Enclosed, Enclosed]) -> None:
+    a, b = numbers
+    product = (3 * UP * B + 5 * UP * A + A * B) * UP
+    quotient = (A + F(3, 5) * B) * UP / (5 / UP - B * UP) * UP**2
+    for found, exactly, error in (
+        (a + b, -2, rounded(F(2), A + B)),
+        (a - b, 8, rounded(F(8), A + B)),
+        (a * b, -15, rounded(F(15), product)),
+        (a / b, F(-3, 5), rounded(F(3, 5), quotient)),
+    ):
+        same(found.exactly.mid(), exactly)
+        same(found.error, error)
+    same(a.size, 3 * UP)
+    assert (-a).error == a.error
+    exact_three = Enclosed(arb(3), float(UNIT))
+    same((exact_three * exact_three).error, rounded(F(9), F(0)))
+
+
+def test_the_errors_cover_the_worst_operands() -> None:
+    """Without the factors for float64, at the ends of both intervals and with the largest rounding."""
+    for x, y in ((3.0, 5.0), (-7.0, 0.5), (0.125, -9.0)):
+        a, b = Enclosed(arb(x), float(UNIT), 1 / 8), Enclosed(arb(y), float(UNIT), 1 / 16)
+        for found, operation in ((a + b, add), (a - b, sub), (a * b, mul), (a / b, truediv)):
+            true = operation(F(x), F(y))
+            worst = max(
+                abs(operation(F(x) + s * A, F(y) + t * B) * (1 + r * UNIT) - true)
+                for s in (-1, 1)
+                for t in (-1, 1)
+                for r in (-1, 1)
+            )
+            assert worst <= F(found.error)
+            assert F(found.error) <= worst * F(3, 2)
+
+
+# -- one step from a set of covariances -------------------------------------------------------------------------------
+
+
+PHI, H, Q, R, P = F(3, 4), F(2), F(1, 2), F(1, 4), F(5, 4)
+
+
+def phase() -> enclosure._Phase:
+    """One state: the step from its center, in fractions."""
+    V = PHI * P * PHI + Q
+    HS = H / (H * V * H + R)
+    C = 1 - V * HS * H
+    one = lambda x: np.array([[float(x)]])  # noqa: E731
+    exact = lambda x: arb_mat([[arb(x.numerator) / arb(x.denominator)]])  # noqa: E731
+    return enclosure._Phase(
+        (), one(P), exact(C * PHI), exact(V * HS), one(HS), one(PHI * HS * H * PHI), exact(C * V)
+    )  # fmt: skip
+
+
+def given(unit: float) -> list[np.ndarray]:
+    return [enclosure._enclosed(np.array([[x]], dtype=object), unit) for x in (PHI, H, Q, R)]
+
+
+def chain(form: Form) -> dict[str, F]:
+    """Errors of each operation of a step of one state, to first order in an error and with its own rounding."""
+    u = UNIT
+
+    def after(size: F, error: F) -> F:
+        return error + u * (abs(size) + error)
+
+    V = PHI * P * PHI + Q
+    x = after(PHI * P, F(0))
+    x = after(PHI * P * PHI, PHI * x)
+    error_V = after(V, x)
+    HV = after(H * V, F(0))  # V is taken as exact from here on
+    S = H * V * H + R
+    s = after(S, after(H * V * H, H * HV))
+    inverse = after(1 / S, (1 / S) * s / (S - s))
+    K = V * H / S
+    error_K = after(K, HV / S + H * V * inverse + HV * inverse)
+    KH = after(K * H, F(0))
+    C = 1 - K * H
+    w = after(C, KH)
+    if form is Form.INNOVATION:
+        return {"V": error_V, "K": error_K, "rounded": after(C * V, w * V)}
+    wv = after(C * V, w * V)
+    joseph = after(C * V * C, wv * C + C * V * w + wv * w)
+    kr = after(K * R, F(0))
+    krk = after(K * R * K, kr * K)
+    return {"V": error_V, "K": error_K, "rounded": after(C * V * C + K * R * K, joseph + krk)}
+
+
+@pytest.mark.parametrize("form", enclosure.FORMS)
+def test_the_roundings_of_a_step(form: Form, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a single covariance: the balls have the radii of the roundings only, which widen them by a few percent."""
+    monkeypatch.setattr(enclosure, "_SUMS", 4.0)
+    small = F(1, 2**30)
+    monkeypatch.setitem(globals(), "UNIT", small)
+    found = enclosure._disturbed(form, phase(), given(float(small)), np.zeros((1, 1)), float(small))
+    errors = chain(form)
+    V = PHI * P * PHI + Q
+    S = H * V * H + R
+    C = 1 - V * H * H / S
+    of_gain = errors["K"] ** 2 * S if form is Form.JOSEPH else errors["K"] * H * V
+    total = errors["rounded"] + of_gain + C * errors["V"] * C
+    assert float(total * 4) <= found.covariance[0, 0] * (1 + 1e-6)
+    assert found.covariance[0, 0] <= float(total * 4) * (1 + 1e-6) + (1e-15 if form is Form.JOSEPH else 0)
+    same(found.gain[0, 0], (C * errors["V"] * H / S + errors["K"]) * 4, 1e-6)
+
+
+def test_what_a_set_of_covariances_adds(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without roundings: the second-order term, and the distance of the gain, for a set so small that balls stay so."""
+    monkeypatch.setattr(enclosure, "_SUMS", 4.0)
+    radius = F(1, 2**20)
+    found = enclosure._disturbed(Form.INNOVATION, phase(), given(0.0), np.array([[float(radius)]]), 0.0)
+    V = PHI * P * PHI + Q
+    S = H * V * H + R
+    C = 1 - V * H * H / S
+    second = C * PHI * radius * (PHI * H / S * H * PHI) * radius * C * PHI
+    same(found.covariance[0, 0], 4 * second, 1e-3)
+    same(found.gain[0, 0], 4 * C * PHI * radius * PHI * H / S, 1e-3)
+
+
+# -- the set that is never left ---------------------------------------------------------------------------------------
+
+
+def test_the_set_that_is_never_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One state: the second trial is the first sum, enlarged by a tenth; each of its terms is seen in it."""
+    sums = F(9, 8)
+    products, residuals = [F(1), F(1, 2), F(3, 16)], [F(1, 32), F(1, 64)]
+    center, after, start, disturbed = F(64), F(65), F(63), F(3)
+    array = lambda x: np.array([[float(x)]])  # noqa: E731
+    ball = lambda x: arb_mat([[arb(float(x))]])  # noqa: E731
+    one = enclosure._Phase((), array(center), ball(F(1, 2)), ball(F(2)), array(1), array(1), ball(after))
+    powers = enclosure._Powers([array(x) for x in products], [array(x) for x in residuals])
+    monkeypatch.setattr(enclosure, "_SUMS", float(sums))
+    monkeypatch.setattr(enclosure, "_phases", lambda *_: [one])
+    monkeypatch.setattr(enclosure, "_powers", lambda _: [powers])
+    known = enclosure._Disturbed(array(disturbed), array(F(5)))
+    monkeypatch.setattr(enclosure, "_disturbed", lambda *_: known)
+    run = SimpleNamespace(C=[None, array(start)], G=[array(0), array(F(7, 4))])
+    run.exactly = lambda x: np.vectorize(F, otypes=[object])(np.asarray(x))
+    stored: Any = SimpleNamespace(cycle=1)
+    found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 2, 60)
+    begun = sums * max(x * abs(start - center) * x for x in products)
+    W = disturbed + abs(after - center)
+
+    def step(B: F) -> F:
+        total = begun + products[-1] * B * products[-1]
+        for M, following, off in zip(products, products[1:], residuals, strict=False):
+            total += M * W * M + 2 * off * B * (following + off)
+        return total * sums
+
+    trial = 2 * begun
+    while step(trial) > trial:
+        trial = F(11, 10) * step(trial)
+    assert trial > 2 * begun
+    assert found is not None
+    same(found.covariance[0, 0, 0], trial)
+    same(found.gain[0, 0, 0], 5 + abs(F(2) - F(7, 4)) * sums)
+    assert found.start == 2
+
+
+# -- a gain that repeats ----------------------------------------------------------------------------------------------
+
+
+def test_distances_are_rounded_upwards() -> None:
+    inverse = arb_mat([[arb(2), arb(0)], [arb(1), arb(3)]])
+    change = np.array([[F(1, 3), F(1, 7)], [F(1, 7), F(2)]], dtype=object)
+    W = np.array([[F(2), F(0)], [F(1), F(3)]], dtype=object)
+    exactly = sum(x * x for x in (W @ change @ W.T).ravel())
+    found = F(gains._distance(inverse, change))
+    assert exactly < found**2 < exactly * (1 + F(1, 2**47))
+    ball = gains._frobenius_to_identity(arb_mat([[arb(2), arb(2)], [arb(-1), arb(5)]]))
+    same(ball.mid(), np.sqrt(1 + 4 + 1 + 16), 1e-15)
+    assert gains._upper(arb(3, 0.5)) >= 3.5
+    assert F(gains._upper(arb(1))) == 1 + F(1, 2**50)
+
+
+@pytest.mark.parametrize(
+    ("end", "weight", "moved", "closes"),
+    [
+        (2.0, 2.0, 0.0, True), (3.9, 2.0, 0.0, True), (4.1, 2.0, 0.0, False),  # the distance at the end
+        (2.0, 2.5, 0.0, True), (2.0, 3.0, 0.0, False),  # in other weights: (1 + 1/2)² of it
+        (2.0, 2.0, 7.9, True), (2.0, 2.0, 8.1, False),  # and what the period moved, in units of 2² = 4
+        (np.inf, 2.0, 0.0, False),
+    ],
+)  # fmt: skip
+def test_a_distance_closes_with_the_period(
+    end: float, weight: float, moved: float, closes: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Weights of 2 and a trial of 4 at the beginning of the period."""
+
+    class Run:
+        steps, C, bounds = 3, np.full((3, 1, 1), 10.0), (None, "dK")
+
+        def __init__(self, *_: Any) -> None:
+            self.P, self.taken = np.array([[10.0]]), 0
+            self.bound = gains_bound(2.0, 1.0)
+
+        def take(self, z: Any) -> None:
+            self.taken += 1
+            if self.taken == 2:
+                assert self.bound.zeta == 4.0
+                self.P, self.bound = np.array([[10.0 + moved]]), gains_bound(weight, end)
+
+        def exactly(self, x: Any) -> Any:
+            return np.vectorize(F, otypes=[object])(x)
+
+    class Bound(SimpleNamespace):
+        def _replace(self, zeta: float) -> Bound:
+            return Bound(L=self.L, zeta=zeta)
+
+    def gains_bound(L: float, zeta: float) -> Bound:
+        return Bound(L=np.array([[L]]), zeta=zeta)
+
+    monkeypatch.setattr(gains, "BoundedRun", Run)
+    stored: Any = SimpleNamespace(m=1)
+    run: Any = Run()
+    found = gains._closes(stored, run, 0, 2, 4.0, 100)
+    assert (found is not None) is closes
+    if found is not None:
+        kappa = abs(F(weight) / 2 - 1)
+        shrinks = 1 - (1 + kappa) ** 2 * F(end) / 4
+        same(found.needed, F(11, 10) * max(F(moved) / 4, 0) / shrinks / 1, 1e-12)
+        assert found.dK == "dK"
+
+
+# -- what a guarantee adds up -----------------------------------------------------------------------------------------
+
+
+def test_sums_of_a_period(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One state that repeats every step: the disturbances, and the residuals and the tail times the largest bound."""
+    schedule = state_space([["1/2"]], [["1"]]).schedule(FloatFormat(2, 24))
+    sums, residual, tail = [F(3), F(1, 2), F(1, 4), F(0)], F(1, 8), F(1, 16)
+    one = np.ones((1, 1))
+    found = Disturbances(one[None] / 2, one[None] * 0, np.ones((1, 1, 4)), np.ones((1, 4)), one, one, one, one)
+    certificate = Certificate(
+        np.array([[float(x) for x in sums]]), one * float(residual), one * float(tail), one * 0, 9
+    )
+    monkeypatch.setattr(bound, "certify", lambda *_: certificate)
+    monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(4, dtype=np.int64))
+    history, parts, lags = bound._sums(schedule, found, np.array([8.0]), 50, True, 10, 1e6)
+    carried = (residual + tail) * 8
+    same(parts[0, 0, 3], carried, 1e-16)
+    exactly = (sum(sums) + carried) * (1 + F(1, 2**48))
+    assert abs(F(float(history[0, 0])) / exactly - 1) < F(1, 2**51)
+    assert lags == 9
+    # A bound that does not bound itself is raised until it does.
+    raised, _, _ = bound._sums(schedule, found, np.array([1.0]), 50, True, 10, 1e6)
+    limit = sum(sums) / (1 - residual - tail)
+    assert limit < F(float(raised[0, 0])) < limit * (1 + F(1, 2**30))
+
+
+@pytest.mark.parametrize("which", ["K", "gain", "dK", "loop", "spread", "all"])
+def test_limits_from_measurements_allow_for_each_rounding(which: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    schedule = state_space([["1/2"]], [["1"]]).schedule(FloatFormat(2, 24))
+    value = {
+        name: float(F(n, 8)) if which in (name, "all") else 0.0
+        for n, name in enumerate(("K", "gain", "dK", "loop", "spread"), 3)
+    }
+    one = np.ones((1, 1, 1))
+    empty = np.zeros((1, 1))
+    found = Disturbances(
+        one / 2, one * value["spread"], one, empty, empty, one * value["K"], one * value["loop"], one * value["gain"]
+    )
+    monkeypatch.setattr(bound, "_disturbances", lambda *_: found)
+    schedule.dK[:] = value["dK"]
+    seen = []
+
+    def peaks(*arguments: Any) -> Any:
+        seen.append(arguments[4].copy())
+        return np.array([5.0]), np.array([7.0])
+
+    monkeypatch.setattr(bound, "peaks", peaks)
+    limits = bound._from_measurements(
+        schedule, Limits(np.array([np.inf]), np.array([np.inf]), np.array([2.0])), 9, True, 5
+    )
+    X, V = (F(5) * (1 + F(1, 2**30)), F(7) * (1 + F(1, 2**30)))
+    same(limits.state[0], X)
+    same(limits.innovation[0], V)
+    tiny = F(1, 2**48)
+    exactly = tiny * (F(value["K"]) * 2 + F(value["gain"]) * V) + F(value["dK"]) * V
+    exactly += (tiny * F(value["loop"]) + F(value["spread"])) * X
+    same(seen[-1][0, 0], exactly)
