@@ -8,6 +8,7 @@ at once, so that a campaign that was stopped goes on where it was.
 from __future__ import annotations
 
 import argparse
+import ast
 import csv
 import json
 import math
@@ -19,20 +20,31 @@ import subprocess
 import sys
 import time
 import zlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from tests.mutants.concern import Concern, module_of
 from tests.mutants.operators import Mutant, mutants, mutated
-from tests.mutants.runs import load_libraries, run
+from tests.mutants.runs import Collected, How, Outcome, load_libraries, run, with_collected
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 CACHE = ROOT / ".cache" / "mutants"
+COMPILED = CACHE / "gpbnb" / "compiled"
 RESULTS = HERE / "results.csv"
-FIELDS = ("module", "operator", "occurrence", "line", "before", "after", "outcome", "by", "seconds", "commit", "date")
+FIELDS = (
+    *("module", "operator", "occurrence", "line", "before", "after"),
+    *("outcome", "by", "seconds", "commit", "date", "reason"),
+)
+#: Outcomes in the order of the table. By hand, a survivor becomes equivalent, with the reason; survivors have one, too.
+OUTCOMES = ("caught", "timeout", "caught by a stored picture", "equivalent", "survived", "no test")
+NOT_CAUGHT = OUTCOMES[2:3] + OUTCOMES[4:]
+MOST_FILES = 12
+"""Test files that judge a mutant, the nearest."""
 
 
 def git(*arguments: str) -> str:
@@ -88,52 +100,100 @@ def changed_line(source: str, other: str) -> tuple[str, str]:
     return "", ""
 
 
+_COMPILES = re.compile(r"^@(compiled|inner|njit|overload|intrinsic)", re.MULTILINE)
+#: Their functions work only when compiled.
+_KERNELS = ("gpbnb/arithmetic/kernels/", "gpbnb/kalman/kernels/")
+
+
+def is_compiled(source: str, line: int) -> bool:
+    """Whether a line may be part of compiled code: of a decorated function, or of a constant."""
+    inside = False
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or line):
+            inside = True
+            if any(_COMPILES.match("@" + ast.unparse(each)) for each in node.decorator_list):
+                return True
+    return not inside
+
+
+Codes = Mapping[Any, Any] | None
+"""What a fault changes: functions with their new code, in the tests imported already; None for a file."""
+
+
 class Judges:
     """The tests that judge the mutants of a module."""
 
-    def __init__(self, tree: Path, budget: float) -> None:
-        self.tree, self.budget = tree, budget
+    def __init__(self, tree: Path, budget: float, collected: Collected) -> None:
+        self.tree, self.budget, self.collected = tree, budget, collected
         self.concern = Concern(tree)
-        self.file = CACHE / "unfit.json"
-        #: Tests that judge no mutant: too slow, or, where nothing is compiled, failing without a fault.
-        self.unfit: dict[str, list[str]] = (
-            json.loads(self.file.read_text(encoding="utf-8")) if self.file.is_file() else {"slow": []}
-        )
+        self.file = CACHE / "tests.json"
+        #: What is known of tests: durations, which are too slow or fail without a fault, and which are not.
+        self.known: dict[str, Any] = {"seconds": {}, "unfit": {}, "sound": {}}
+        if self.file.is_file():
+            self.known |= json.loads(self.file.read_text(encoding="utf-8"))
         self._compiled = [
-            name
-            for name, path in self.concern.modules.items()
-            if re.search(r"^@(compiled|njit|inlined|register_jitable)", path.read_text(encoding="utf-8"), re.MULTILINE)
+            name for name, path in self.concern.modules.items() if _COMPILES.search(path.read_text(encoding="utf-8"))
         ]
+        self._stamps = self._find_stamps()
 
-    def compiled(self, module: str) -> bool:
-        """Whether the tests can use compiled functions: a change of the module does not change them."""
-        return not any(self.concern.reaches(name, module) for name in self._compiled)
+    def _find_stamps(self) -> dict[str, str]:
+        """Digests of the sources of compiled functions, without a fault."""
+        files = [str(self.concern.modules[name]) for name in self._compiled]
+        code = (
+            "import json, sys; from pathlib import Path; from gpbnb.caching import digest, imported;"
+            "print(json.dumps({each: digest(imported(Path(each))) for each in sys.argv[1:]}))"
+        )
+        environment = os.environ | {"PYTHONPATH": str(self.tree)}
+        command = [sys.executable, "-B", "-c", code, *files]
+        done = subprocess.run(command, cwd=self.tree, env=environment, check=True, capture_output=True, text=True)
+        return dict(json.loads(done.stdout))
 
-    def of(self, module: str) -> tuple[list[str], frozenset[str], bool]:
-        """Test files, tests of them left out, and whether to compile."""
-        compiled = self.compiled(module)
-        files = [str(test.relative_to(self.tree)) for test in self.concern.judges(module)][:12]
-        left_out = set(self.unfit["slow"])
-        if not compiled:
-            files = files[:6]
-            for name in files:
-                key = f"{name}, not compiled"
-                if key not in self.unfit:
-                    found = run(self.tree, [name], budget=self.budget, compiled=False, stop=False)
-                    self._note(key, [name] if found.stuck else found.failed)
-                left_out |= set(self.unfit[key])
-        return [name for name in files if name not in left_out], frozenset(left_out), compiled
+    def ways(self, name: str, line: int) -> tuple[str, How]:
+        """How to run the tests on a fault in a line of a file, and a name for it.
 
-    def _note(self, key: str, tests: list[str]) -> None:
-        self.unfit[key] = tests
-        self.file.write_text(json.dumps(self.unfit, indent=1), encoding="utf-8")
+        A fault that no compiled function contains leaves all of them valid. Python runs the others, unless they work
+        only when compiled: those are compiled again, for which there is more time.
+        """
+        seconds = self.known["seconds"]
+        module = module_of(self.tree / name, self.tree)
+        if not any(self.concern.reaches(each, module) for each in self._compiled):
+            return "compiled", How(self.budget, seconds=seconds)
+        if not is_compiled((self.tree / name).read_text(encoding="utf-8"), line):
+            return "compiled", How(self.budget, stamps=self._stamps, seconds=seconds)
+        if name.startswith(_KERNELS):
+            return "compiled", How(4 * self.budget, seconds=seconds)
+        return "not compiled", How(self.budget, compiled=False, seconds=seconds)
 
-    def is_slow(self, test: str, compiled: bool) -> bool:
-        """Whether a test takes too long without a fault, too; it judges no more mutants then."""
-        if test == "collection" or not run(self.tree, [test], budget=self.budget, compiled=compiled).stuck:
+    def run(self, files: Sequence[str], way: str, how: How, codes: Codes = None) -> Outcome:
+        """Run test files, without those tests that fail or take too long without a fault."""
+        unfit = frozenset(self.known["unfit"].setdefault(way, []))
+        files = [each for each in files if each not in unfit]
+        if how.pictures:
+            files = [each for each in files if "pictured" in (self.tree / each).read_text(encoding="utf-8")]
+        how = how._replace(left_out=unfit)
+        found = run(self.tree, files, how) if codes is None else self.collected.run(files, codes, how)
+        if not how.pictures:
+            for test, seconds in found.seconds.items():
+                self.known["seconds"].setdefault(test, round(seconds, 2))
+        return found
+
+    def refuse(self, way: str, how: How, tests: Sequence[str], codes: Codes = None) -> bool:
+        """Whether tests fail or take too long without a fault, too; they judge no more mutants then."""
+        sound, unfit = self.known["sound"].setdefault(way, []), self.known["unfit"].setdefault(way, [])
+        names = [each.removesuffix(": the process ended") for each in tests]
+        new = [each for each in names if each not in (*sound, *unfit) and (self.tree / each.split("::")[0]).is_file()]
+        if not new:
             return False
-        self._note("slow", [*self.unfit["slow"], test])
-        return True
+        how = how._replace(stop=False)
+        found = run(self.tree, new, how) if codes is None else self.collected.run(new, {}, how)
+        bad = [each for each in new if found.stuck or found.failed]
+        sound += [each for each in new if each not in bad]
+        unfit += bad
+        self.save()
+        return bool(bad)
+
+    def save(self) -> None:
+        self.file.write_text(json.dumps(self.known, indent=1), encoding="utf-8")
 
 
 def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
@@ -144,22 +204,47 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     if other is None or other == source:
         return {"outcome": "no change"}
     before, after = changed_line(source, other)
-    while True:
-        files, left_out, compiled = judges.of(module_of(path, judges.tree))
-        if not files:
-            return {"before": before, "after": after, "outcome": "no test"}
-        begun = time.monotonic()
-        try:
-            path.write_text(other, encoding="utf-8")
-            found = run(judges.tree, files, budget=judges.budget, compiled=compiled, left_out=left_out)
-        finally:
-            path.write_text(source, encoding="utf-8")
-        if not found.stuck or not judges.is_slow(found.stuck, compiled):
-            break
-    outcome = "timeout" if found.stuck else "caught" if found.failed else "survived"
+    row = {"before": before, "after": after}
+    files = [str(test.relative_to(judges.tree)) for test in judges.concern.judges(module_of(path, judges.tree))]
+    files = files[:MOST_FILES]
+    if not files:
+        return row | {"outcome": "no test"}
+    way, how = judges.ways(name, mutant.line)
+    begun = time.monotonic()
+
+    codes: Codes = None
+    if way == "compiled" and not is_compiled(source, mutant.line):
+        codes = judges.collected.changed(path, source, other)
+
+    def with_the_fault(how: How) -> Outcome:
+        while True:
+            if codes is not None:
+                found = judges.run(files, way, how, codes)
+            else:
+                compiled = set(COMPILED.glob("*"))
+                try:
+                    path.write_text(other, encoding="utf-8")
+                    found = judges.run(files, way, how)
+                finally:
+                    path.write_text(source, encoding="utf-8")
+                if how.stamps is None:  # what was compiled from a fault is of no further use
+                    for file in set(COMPILED.glob("*")) - compiled:
+                        file.unlink()
+            if not judges.refuse(way, how, [found.stuck] if found.stuck else found.failed, codes):
+                return found
+
+    found, outcome = with_the_fault(how), "caught"
+    if not found.stuck and not found.failed and how.compiled:
+        count = len(found.seconds)
+        found, outcome = with_the_fault(how._replace(pictures=True)), "caught by a stored picture"
+        found.seconds.update({str(i): 0.0 for i in range(count)})
+    if found.stuck:
+        outcome = "timeout"
+    elif not found.failed:
+        outcome = "survived"
     by = found.stuck or (found.failed or [f"{len(found.seconds)} tests"])[0]
-    seconds = f"{time.monotonic() - begun:.1f}"
-    return {"before": before, "after": after, "outcome": outcome, "by": by, "seconds": seconds}
+    judges.save()
+    return row | {"outcome": outcome, "by": by, "seconds": f"{time.monotonic() - begun:.1f}"}
 
 
 def read(path: Path) -> list[dict[str, str]]:
@@ -188,13 +273,21 @@ def write(path: Path, rows: Sequence[Mapping[str, str]]) -> None:
 
 
 def summary(rows: Sequence[Mapping[str, str]]) -> None:
-    """Print the counts and the survivors."""
-    survivors = [row for row in rows if row["outcome"] in ("survived", "no test")]
-    for row in survivors:
-        print(f"{row['module']}:{row['line']} {row['operator']}: {row['outcome']}")
-        print(f"  - {row['before']}\n  + {row['after']}")
-    caught = sum(row["outcome"] in ("caught", "timeout") for row in rows)
-    print(f"{len(rows)} mutants in {len({row['module'] for row in rows})} files, {caught} caught, {len(survivors)} not")
+    """Print the counts of each package, and what was not caught."""
+    for row in rows:
+        if row["outcome"] in NOT_CAUGHT:
+            print(f"{row['module']}:{row['line']} {row['operator']}: {row['outcome']}; {row['reason']}")
+            print(f"  - {row['before']}\n  + {row['after']}")
+    print("\nmutants | caught | by a stored picture only | equivalent | survived | package")
+    packages: dict[str, Counter[str]] = {}
+    for row in rows:
+        packages.setdefault(str(Path(row["module"]).parent), Counter())[row["outcome"]] += 1
+    for name, count in [*sorted(packages.items()), ("all", sum(packages.values(), Counter()))]:
+        caught = count["caught"] + count["timeout"]
+        numbers = (caught, count["caught by a stored picture"], count["equivalent"])
+        print(" | ".join(f"{each:4}" for each in (count.total(), *numbers, count.total() - sum(numbers))), "|", name)
+    if judged := count.total() - count["equivalent"]:
+        print(f"{caught / judged:.1%} of those that are not equivalent are caught")
 
 
 def main() -> None:
@@ -220,7 +313,7 @@ def main() -> None:
         plan = [
             (row["module"], Mutant(row["operator"], int(row["occurrence"]), int(row["line"])))
             for row in rows.values()
-            if row["outcome"] in ("survived", "no test") and (not chosen.files or row["module"] in names)
+            if row["outcome"] in NOT_CAUGHT and (not chosen.files or row["module"] in names)
         ]
     else:
         samples = {name: sample(name, chosen.lines, chosen.seed) for name in names}
@@ -231,28 +324,39 @@ def main() -> None:
             for name, mutant in zip(samples, round_, strict=True)
             if mutant is not None
         ]
+    os.environ["GPBNB_CACHE_DIR"] = str(COMPILED.parent)
+    os.environ["GPBNB_QUIET"] = "1"
     tree = CACHE / f"tree-{os.getpid()}"
     copy_tree(tree)
     load_libraries()
-    judges = Judges(tree, chosen.budget)
-    end = time.monotonic() + 60 * chosen.minutes
-    for number, (name, mutant) in enumerate(plan):
-        place = (name, mutant.operator, str(mutant.occurrence), str(mutant.line))
-        row = dict(zip(FIELDS, place, strict=False))
-        if key(row) in rows and not chosen.again:
-            continue
-        if time.monotonic() > end:
-            break
-        row |= {"commit": commit, "date": f"{now:%Y-%m-%d}"} | judge(judges, name, mutant)
-        if row["outcome"] != "no change":
-            rows[key(row)] = row
-            write(
-                chosen.results, sorted(rows.values(), key=lambda each: (each["module"], int(each["line"]), key(each)))
-            )
-        where = f"{name}:{mutant.line} {mutant.operator}"
-        print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
+
+    def campaign(collected: Collected) -> None:
+        judges = Judges(tree, chosen.budget, collected)
+        end = time.monotonic() + 60 * chosen.minutes
+        for number, (name, mutant) in enumerate(plan):
+            place = (name, mutant.operator, str(mutant.occurrence), str(mutant.line))
+            row = dict(zip(FIELDS, place, strict=False))
+            if key(row) in rows and not chosen.again:
+                continue
+            row["reason"] = rows.get(key(row), {}).get("reason", "")
+            if time.monotonic() > end:
+                break
+            row |= {"commit": commit, "date": f"{now:%Y-%m-%d}"} | judge(judges, name, mutant)
+            if row["outcome"] != "no change":
+                rows[key(row)] = row
+                write(
+                    chosen.results,
+                    sorted(rows.values(), key=lambda each: (each["module"], int(each["line"]), key(each))),
+                )
+            where = f"{name}:{mutant.line} {mutant.operator}"
+            print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
+
+    # Those that any of the faults needs; the others need not be imported.
+    concern = Concern(tree)
+    needed = {test for name in names for test in concern.judges(module_of(tree / name, tree))[:MOST_FILES]}
+    with_collected(tree, [str(test.relative_to(tree)) for test in sorted(needed)], campaign)
     shutil.rmtree(tree)
-    summary([row for row in rows.values() if row["module"] in names])
+    summary([row for row in read(chosen.results) if row["module"] in names])
 
 
 if __name__ == "__main__":

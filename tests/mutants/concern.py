@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import deque
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 
 #: Tests of the form of the project, and tests against what notebooks and sweeps stored. They judge no mutant.
@@ -31,7 +32,12 @@ def module_of(path: Path, root: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def _imported(path: Path, package: str) -> Iterator[str]:
+@cache
+def _imported(path: Path, package: str) -> tuple[str, ...]:
+    return tuple(_names(path, package))
+
+
+def _names(path: Path, package: str) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -57,6 +63,7 @@ class Concern:
             for path in sorted((root / "tests").rglob("test_*.py"))
             if not str(path.relative_to(root)).startswith(NOT_JUDGES)
         ]
+        self._needed = {path: self._helpers(path, set()) for path in self.tests}
 
     def _public_names(self) -> dict[str, str]:
         tree = ast.parse((self.root / "gpbnb/__init__.py").read_text(encoding="utf-8"))
@@ -87,14 +94,15 @@ class Concern:
         return found
 
     def judges(self, module: str) -> list[Path]:
-        """List test files that reach a module, nearest first; those of the same topic precede others as near."""
-        topic = module.split(".")[1] if "." in module else ""
+        """List test files that reach a module: those with its name first, then the nearest; its own topic counts."""
+        topic, name = module.split(".")[1] if "." in module else "", module.split(".")[-1]
         ranked = []
         for test in self.tests:
-            steps = self._distance(self._helpers(test, set()), module)
+            steps = self._distance(self._needed[test], module)
             if steps is not None:
                 there = test.relative_to(self.root / "tests").parts[0] == topic
-                ranked.append((steps + (0 if there else 2), str(test), test))
+                named = there and name in test.stem.removeprefix(f"test_{topic}")
+                ranked.append((0 if named else 1 + steps + (0 if there else 2), str(test), test))
         return [test for _, _, test in sorted(ranked)]
 
     def reaches(self, module: str, other: str) -> bool:

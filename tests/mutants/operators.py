@@ -7,6 +7,7 @@ arguments, a norm, or a label. Imports, annotations, decorators, docstrings and 
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -77,8 +78,8 @@ def untouched(node: Node) -> bool:
 class _Each(Operator):
     """An operator whose changes of a node are listed by a function: each is a way to rewrite the node."""
 
-    def changes(self, node: Node) -> list[Callable[[], None]]:
-        raise NotImplementedError
+    @abstractmethod
+    def changes(self, node: Node) -> list[Callable[[], None]]: ...
 
     def mutation_positions(self, node: Node) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
         changes = self.changes(node)
@@ -312,10 +313,10 @@ class Mutant(NamedTuple):
 
 def mutants(source: str) -> list[Mutant]:
     """List all changes of a source."""
-    found = []
+    found, tree = [], get_ast(source)
     for name, operator_class in OPERATORS.items():
         operator, count = operator_class(), 0
-        stack = [get_ast(source)]
+        stack = [tree]
         while stack:
             node = stack.pop()
             for start, _ in operator.mutation_positions(node):
