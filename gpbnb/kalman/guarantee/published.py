@@ -45,12 +45,16 @@ def elaenia_gold() -> LinearModel:
 
 
 def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
-    """Three constants and two nearly parallel measurements: Dyer and McReynolds, in the 'shootout' of Grewal & Andrews.
+    """Three constants seen by two nearly parallel measurements: an example by Dyer and McReynolds.
 
     Parameters
     ----------
-    d : deviation of the measurements from parallel ones. The shootout takes eps^(2/3) 10^(10 - k); the default is near
-        k = 8 of binary32.
+    d : deviation of the two measurements from parallel. Grewal and Andrews compare filters for
+        ``d = eps**(2/3) * 10**(10 - k)``; in binary32, k = 8 gives about the default.
+
+    References
+    ----------
+    dyer1969; the script ``shootout.m`` of grewal2008.
     """
     e = Fraction(d)
     return LinearModel(
