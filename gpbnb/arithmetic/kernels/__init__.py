@@ -1,1 +1,1 @@
-"""Loops behind the arrays, one module a backend."""
+"""Compiled loops behind the arrays: one module per backend."""

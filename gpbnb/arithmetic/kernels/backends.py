@@ -1,8 +1,8 @@
-"""What holds the numbers of an array: float64, pairs of int64, or Python's integers.
+"""Backends that store an array's numbers and compute with them: as float64, pairs of int64, or Python integers.
 
-A backend works on `components`, a tuple of arrays of one shape that NumPy can move, cut and join alike. The first array
-holds the sign. Where a compiled backend cannot hold or compute something, it answers None, and the exact one, which
-can, takes over: the digits are the same. The compiled loops are imported on their first use.
+A backend works on `components`, a tuple of arrays with the same shape, so that NumPy can reshape, slice and join all of
+them in the same way. The first array carries the sign. If a compiled backend cannot hold or compute a result, it
+returns None, and the exact backend computes the same digits instead. The compiled loops are imported on first use.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _POWERS_OF_TEN = np.array([10**k for k in range(23)], np.float64)  # exact
 
 
 class Backend(ABC):
-    """Numbers of one format, in one kind of arrays."""
+    """Store numbers of one format and compute with them."""
 
     dtype: Any
 
@@ -41,39 +41,39 @@ class Backend(ABC):
 
     @abstractmethod
     def from_exact(self, m: Array, e: Array) -> Components | None:
-        """Hold normalized pairs of Python's integers."""
+        """Convert normalized pairs of Python integers to components; None if they do not fit."""
 
     @abstractmethod
     def to_exact(self, components: Components) -> Components:
-        """Significands and exponents as Python's integers."""
+        """Convert components to significands and exponents, as Python integers."""
 
     @abstractmethod
     def from_numbers(self, values: Array, exactly: bool) -> Components | None:
-        """Round an array of a NumPy number type; `exactly`: only where no entry changes."""
+        """Round an array of a NumPy number type; with `exactly`, return None if rounding changes an entry."""
 
     @abstractmethod
     def apply(self, name: str, *operands: Components) -> Components | None:
-        """One operation of :class:`ExactKernel` on each entry; the caller has excluded what it excludes."""
+        """Apply an operation of :class:`ExactKernel` to each entry; callers exclude zero divisors, negative roots."""
 
     @abstractmethod
     def compare(self, a: Components, b: Components) -> Array:
-        """-1, 0 or 1 for each pair of entries, as int8."""
+        """Compare each pair of entries: -1, 0 or 1, as int8."""
 
     @abstractmethod
     def to_float(self, components: Components) -> Array:
-        """The nearest float64 of each entry; OverflowError as :meth:`ExactKernel.to_float`."""
+        """Round each entry to the nearest float64; raises OverflowError like :meth:`ExactKernel.to_float`."""
 
     def fold(self, name: str, components: Components) -> Components | None:
-        """Combine the entries along the first axis, of at least one, from left to right."""
+        """Combine the entries along the first axis from left to right; there must be at least one."""
         return None
 
     def matmul(self, a: Components, b: Components) -> Components | None:
-        """The product of two matrices, at least one column by one row, each entry summed from left to right."""
+        """Multiply two matrices with an inner dimension of at least 1, summing each entry from left to right."""
         return None
 
 
 class Exact(Backend):
-    """Any base and precision, any exponent: significand and exponent as Python's integers."""
+    """Any base, precision and exponent: significands and exponents are Python integers."""
 
     dtype = object
 
@@ -100,14 +100,14 @@ class Exact(Backend):
 
 
 class Compiled(Backend):
-    """What the backends with compiled loops share."""
+    """Common part of the backends with compiled loops."""
 
     tag: Tag
-    count: int  # of components
+    count: int  # number of components
     fuses = False  # whether it has a fused multiply-add
 
     def run_tag(self) -> Tag:
-        """The tag for a run of its own: random roundings begin with the first number of their seed."""
+        """Return the tag for a separate run, whose random roundings start at the first number of their seed."""
         return self.tag
 
     def apply(self, name: str, *operands: Components) -> Components | None:
@@ -143,7 +143,7 @@ class Compiled(Backend):
         return self.unpack(c)
 
     def pack(self, components: Components) -> Array:
-        """A new array, as the compiled loops of the topics take and give them."""
+        """Pack components into a new array, in the layout that the topics' compiled loops take and return."""
         return (
             np.array(components[0], order="C")
             if self.count == 1
@@ -151,7 +151,7 @@ class Compiled(Backend):
         )
 
     def unpack(self, array: Array) -> Components:
-        """The components, new arrays, of what :meth:`pack` made."""
+        """Unpack an array that :meth:`pack` made into components, as new arrays."""
         if self.count == 1:
             return (np.array(array, order="C"),)
         return tuple(np.array(array[..., i], order="C") for i in range(self.count))
@@ -160,16 +160,16 @@ class Compiled(Backend):
         return tuple(np.empty(size, self.dtype) for _ in range(self.count))
 
     def _seen(self, components: Components) -> Any:
-        """Components as a compiled loop takes them."""
+        """Bring components into the form that a compiled loop expects."""
         return components[0] if self.count == 1 else components
 
 
 class Floats(Compiled):
-    """Bases 2 and 16 on float64."""
+    """Bases 2 and 16, stored as float64."""
 
     dtype = np.float64
     count = 1
-    lowest_power, highest_power = -960, 1023  # of two, of numbers that it holds
+    lowest_power, highest_power = -960, 1023  # powers of two between which its numbers lie
 
     def __init__(self, base: int, precision: int, nearest: bool) -> None:
         super().__init__(base, precision, nearest)
@@ -237,7 +237,7 @@ class Pairs(Compiled):
         if values.dtype.kind == "f" and values.dtype.itemsize <= 8:
             x = values.astype(np.float64, copy=False)
             if not ((np.abs(x) < 2.0**53) & (np.rint(x) == x)).all():
-                return None  # digits beyond the point: as many as the exact backend can write
+                return None  # fractions: the exact backend converts every digit
         elif values.dtype.kind not in "iu":
             return None
         largest = 10**self.precision if exactly else 2**63
@@ -261,7 +261,7 @@ class Pairs(Compiled):
 
     def to_float(self, components: Components) -> Array:
         m, e = components
-        # Of two exact float64, one rounding.
+        # Both operands are exact in float64, so the result is rounded only once.
         simple = (np.abs(m) <= 2**53) & (np.abs(e) <= 22)
         power = _POWERS_OF_TEN[np.where(simple, np.abs(e), 0)]
         x = np.asarray(np.where(e < 0, m / power, m * power))
@@ -272,39 +272,39 @@ class Pairs(Compiled):
 
 @lru_cache(maxsize=256)
 def exact(base: int, precision: int, nearest: bool) -> Exact:
-    """The backend that holds every number of a format."""
+    """Return the backend that holds every number of a format."""
     return Exact(base, precision, nearest)
 
 
 @lru_cache(maxsize=256)
 def backend(base: int, precision: int, nearest: bool) -> Backend:
-    """The fastest backend of a format."""
+    """Return the fastest backend for a format."""
     if precision > LARGEST_PRECISION.get(base, 0):
         return exact(base, precision, nearest)
     return (Pairs if base == 10 else Floats)(base, precision, nearest)
 
 
 def double_doubles(values: NDArray[Any]) -> NDArray[np.float64]:
-    """Exact values, an object array of Fractions, as float64 (..., 2) for the tag ``DoubleDouble``: the nearest."""
+    """Round Fractions in an object array to the nearest double-doubles: float64 (..., 2), for ``DoubleDouble``."""
     pairs = []
     for value in values.ravel().tolist():
         n, d = value.numerator, value.denominator
         high = n / d
-        # Most are float64, and the test for it is many times faster than the difference of two Fractions.
+        # Most values are exact in float64, and testing for that is many times faster than subtracting two Fractions.
         exact = n.bit_length() <= 53 and d & (d - 1) == 0 and d.bit_length() <= 960
         pairs.append((high, 0.0 if exact else float(value - Fraction(high))))
     return np.array(pairs, dtype=np.float64).reshape(*values.shape, 2)
 
 
 def _read_only(a: Array) -> Array:
-    """A view that cannot be written to: compiled loops need be made for one kind of input only."""
+    """Return a read-only view, so that loops are compiled for only one kind of input."""
     a = a.view()
     a.flags.writeable = False
     return a
 
 
 def _flat(part: Array, shape: tuple[int, ...]) -> Array:
-    # In one piece, whatever it was: compiled loops need be made for one layout only.
+    # Always contiguous, so that loops are compiled for only one layout.
     flat = np.ascontiguousarray(part if part.shape == shape else np.broadcast_to(part, shape)).reshape(-1)
     flat.flags.writeable = False
     return flat
@@ -319,7 +319,7 @@ def _shape(*operands: Components) -> tuple[int, ...]:
 
 @lru_cache(maxsize=1)
 def _loops() -> Any:
-    # Here, and not above: numba takes a second to import, and exact arithmetic does not need it.
+    # Imported here because numba takes a second to import and exact arithmetic does not need it.
     from gpbnb.arithmetic.kernels import elementwise
 
     return elementwise

@@ -1,14 +1,14 @@
 """Base 2 with 1 to 53 digits, and base 16 with 1 to 13, on float64.
 
-Conditions are joined by & and |, which do not branch: no branch depends on a rounding, which is unpredictable.
+Conditions are joined by & and |, which do not branch, because a processor cannot predict how a rounding goes.
 
-The float64 result p of an operation and the sign of what it lacks of the exact one say where the exact result lies
-between two neighbouring float64. Seen as integers, float64 of one sign are evenly spaced, over powers of two too:
-stepping down from p when the exact magnitude is less than that of p gives the exact result chopped to 53 bits.
-Midpoints between numbers of fewer bits are float64, so adding half a unit and clearing the dropped bits rounds it
-rightly to nearest, half away from zero.
+Let p be the float64 result of an operation and r the exact result minus p. Then p and the sign of r determine between
+which neighbouring float64 values the exact result lies. Read as integers, float64 values of one sign are evenly spaced,
+even across powers of two: a step of one down from p whenever the exact result is smaller in magnitude gives the exact
+result chopped to 53 bits. Midpoints between numbers with fewer bits are float64 values as well. So adding half a unit
+and clearing the dropped bits rounds correctly to nearest, half away from zero.
 
-A result below 2**-960, whose residual might be lost, or from 2**1023 on becomes NaN, and stays so.
+A result below 2**-960, where r might underflow, or of at least 2**1023 becomes NaN, and later results stay NaN.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _LIMIT = np.int64((1023 + 1023) << 52)
 _HALF_ULP = np.int64(53 << 52)
 LEAST, LIMIT = 2.0**-960, 2.0**1023
 
-EXACT_PRODUCT = 26  # digits up to which a product has at most 53
-SAFE_TWICE = 25  # digits up to which rounding a float64 result, itself rounded to nearest, goes right
+EXACT_PRODUCT = 26  # bits; products of numbers this short are exact in float64
+SAFE_TWICE = 25  # bits; rounding to float64 first and then to this precision gives the correct result
 
 
 def _clear_binary(fmt: Any, u: Any) -> Any:
@@ -41,19 +41,20 @@ def _clear_binary(fmt: Any, u: Any) -> Any:
 
 
 def _clear_hexadecimal(fmt: Any, u: Any) -> Any:
-    # The first digit of 2**e * 1.f has 1 + e mod 4 bits.
+    # The first hexadecimal digit of 2**e * 1.f has 1 + e mod 4 bits.
     unit = np.int64(1) << (56 - 4 * fmt.precision - (((u >> 52) + 1) & 3))
     half = unit >> 1 if fmt.nearest else np.int64(0)
     return (u + half) & -unit
 
 
 def operations(clear: Any, ties: bool) -> dict[str, Any]:
-    """The scalar operations on float64 for one way to clear the dropped bits.
+    """Make the scalar operations on float64 for one way of clearing the dropped bits.
 
     Parameters
     ----------
-    clear : rounds the integer view of a magnitude, already chopped to 53 bits, to the digits of a format.
-    ties : whether the format may have 53 bits, where nothing is cleared but float64 rounds ties to even.
+    clear : rounds a magnitude, chopped to 53 bits and read as an integer, to the digits of a format.
+    ties : whether the format may have 53 bits: then no bit is cleared, and the ties that float64 rounds to even are
+        corrected.
     """
     clear = inner(forceinline=True)(clear)
 
@@ -66,7 +67,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
 
     @inner(forceinline=True)
     def direction(fmt: Any, p: Any, r: Any) -> Any:
-        """From p, the nearest float64 to the exact p + r, to that with the further digits dropped (or the tie up)."""
+        """Step from p, the float64 nearest to p + r, to p + r chopped to 53 bits; at 53 bits, to the tie away."""
         if ties and fmt.precision == 53 and fmt.nearest:
             half = from_bits((bits(p) & _EXPONENT) - _HALF_ULP)
             return np.int64(r == (half if p > 0 else -half))
@@ -104,7 +105,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         r = fma(-q, b, a)
         if b < 0.0:
             r = 0.0 - r
-        # A quotient of 53-bit numbers is never halfway between two: no tie to correct.
+        # A quotient of two 53-bit numbers never lies halfway between two others, so there is no tie to correct.
         down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, q, r)
         return fit(fmt, q, down, a == 0.0)
 
@@ -115,7 +116,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         s = math.sqrt(a)
         if ties and fmt.precision <= SAFE_TWICE:
             return fit(fmt, s, np.int64(0), a == 0.0)
-        # Nor is a root.
+        # Neither does a square root.
         down = np.int64(0) if ties and fmt.precision == 53 and fmt.nearest else direction(fmt, s, fma(-s, s, a))
         return fit(fmt, s, down, a == 0.0)
 

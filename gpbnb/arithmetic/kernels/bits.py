@@ -1,4 +1,4 @@
-"""Machine operations that Python has no name for: fused multiply-add, integer views, the high half of a product."""
+"""Machine operations that Python does not offer: fused multiply-add, integer views, the high half of a product."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def bits(typingctx: Any, x: Any) -> Any:
 
 @intrinsic
 def from_bits(typingctx: Any, n: Any) -> Any:
-    """The float64 of these 64 bits."""
+    """The float64 with these 64 bits, given as an int64."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.bitcast(args[0], ir.DoubleType())
@@ -54,7 +54,7 @@ def high_product(typingctx: Any, a: Any, b: Any) -> Any:
 
 @intrinsic
 def leading_zeros(typingctx: Any, n: Any) -> Any:
-    """How many bits before the first that is set, of a uint64; as an int64."""
+    """Number of zero bits above the highest set bit of a uint64, as an int64."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.ctlz(args[0], ir.Constant(ir.IntType(1), 0))
@@ -64,7 +64,7 @@ def leading_zeros(typingctx: Any, n: Any) -> Any:
 
 @intrinsic
 def select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
-    """``a if condition else b``, of two numbers of one type, without a branch."""
+    """``a if condition else b`` without a branch, for two numbers of the same type."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.select(*args)

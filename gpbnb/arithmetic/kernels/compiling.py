@@ -1,10 +1,10 @@
 """The decorators of compiled functions, and the cache that keeps what was compiled.
 
-:func:`compiled` is for those that callers in Python use, :func:`inner` for those that only they call.
+Use :func:`compiled` for functions that Python calls, and :func:`inner` for those that only compiled functions call.
 
-numba's own cache compares the file that defines a function. It does not notice a change in another file whose functions
-are compiled in. The cache here has a key for all files that the defining file imports. Several processes can
-fill it at the same time: they wait for each other and compile nothing twice.
+numba's own cache checks only the file that defines a function, and misses changes in other files whose functions are
+compiled into it. Here the key of the cache covers all files that the defining file imports. Several processes can fill
+the cache at the same time: they wait for each other and compile nothing twice.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from numba.core import caching
 from gpbnb.caching import cache_folder, changed_since_import, digest, imported, lock, remove_unused, unlock, writable
 
 _VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
-_LONGEST_WAIT = 240.0  # seconds, for another process that compiles the same
+_LONGEST_WAIT = 240.0  # seconds, for another process that compiles the same function
 _NOTICE = (
     "gpbnb: compiling for this processor. The first use of a function takes up to a minute; "
     "later runs load the result from {}.\n"
@@ -37,9 +37,9 @@ _NOTICE = (
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a function when it is first called, for the types it is called with, or load it from the cache.
+    """Compile a function on its first call with given types, or load it from the cache.
 
-    It releases the interpreter's lock.
+    The compiled function releases Python's global interpreter lock.
     """
     dispatcher = njit(nogil=True, no_cfunc_wrapper=True)(function)
     sources = imported(Path(function.__code__.co_filename).resolve())
@@ -51,11 +51,11 @@ def compiled(function: Callable[..., Any]) -> Any:
 def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
     """Compile a function into the compiled functions that call it.
 
-    It gets no entries for callers in Python and C, whose compilation takes longer than that of a short function.
+    It gets no entry points for Python and C, which take longer to compile than a short function itself.
 
     Parameters
     ----------
-    options : of numba's ``njit``.
+    options : passed to numba's ``njit``.
     """
     decorate = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
     return decorate if function is None else decorate(function)
@@ -125,7 +125,7 @@ def _stamp_of(cache: _Cache) -> tuple[str, ...]:
 
 
 class _Files:
-    """What numba asks of its files: load, save and flush."""
+    """Cache files with the methods that numba expects: load, save and flush."""
 
     def __init__(self, folder: Path, name: str, stamp: tuple[str, ...]) -> None:
         self._folder, self._name, self._stamp = folder, name, stamp
@@ -135,7 +135,7 @@ class _Files:
         path = self._path(key)
         found = self._read(path, key)
         if found is None:
-            if path not in self._locks:  # held since a compilation that failed
+            if path not in self._locks:  # else it is still locked since a failed compilation
                 self._locks[path] = lock(path, _LONGEST_WAIT)
             found = self._read(path, key)
             if found is None:
@@ -150,7 +150,7 @@ class _Files:
         try:
             draft.write_bytes(caching.dumps((self._stamp, key, data)))
             draft.replace(path)
-        except OSError:  # a full disk costs time only
+        except OSError:  # a full disk only costs time
             draft.unlink(missing_ok=True)
 
     def flush(self) -> None:
@@ -158,12 +158,12 @@ class _Files:
             path.unlink(missing_ok=True)
 
     def release(self) -> None:
-        """Let the others that wait for this function read it."""
+        """Unlock the files, so that waiting processes can read them."""
         while self._locks:
             unlock(*self._locks.popitem())
 
     def _path(self, key: Any) -> Path:
-        # The name need not tell all keys apart: the key stands in the file, too.
+        # Two keys may share a name, because the file also contains the key.
         short = hashlib.sha256(repr((self._stamp, str(key))).encode()).hexdigest()[:24]
         return self._folder / f"{self._name}.{short}.compiled"
 
@@ -172,7 +172,7 @@ class _Files:
             stamp, stored, data = pickle.loads(path.read_bytes())
         except OSError:
             return None
-        except Exception:  # cut off, or of another version: compile it again
+        except Exception:  # truncated, or written by another version: compile again
             return None
         if stamp != self._stamp or stored != key:
             return None

@@ -1,8 +1,8 @@
 """Base 10 with 1 to 18 digits, on pairs of int64.
 
-A number is ``(m, e)`` and means ``m * 10**e``; zero is ``(0, 0)``, any other has ``10**(t-1) <= abs(m) < 10**t``.
-Magnitudes are uint64, in which 10**19 fits; only products, and dividends of 10 to 18 digits, need 128 bits. Up to 8
-digits :mod:`gpbnb.arithmetic.kernels.shortdecimal` does the same faster.
+A pair ``(m, e)`` represents ``m * 10**e``. Zero is ``(0, 0)``; every other number has ``10**(t-1) <= abs(m) < 10**t``.
+Magnitudes are uint64, which holds 10**19; only products, and dividends with 10 to 18 digits, need 128 bits. For up to 8
+digits, :mod:`gpbnb.arithmetic.kernels.shortdecimal` computes the same faster.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import Away, Down, Even, LimitedDecimal, Odd, Up, Zero
 
-NARROW = 9  # digits up to which the dividend fits into 64 bits
+NARROW = 9  # precision up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
 
 _U0, _U1 = np.uint64(0), np.uint64(1)
@@ -28,14 +28,14 @@ _TWO_64 = 2.0**64
 POWER = np.array([10**k for k in range(20)], np.uint64)
 HALF = POWER // np.uint64(2)
 
-# n // d for n < 2**61 and d = 10**k, k > 0, is the high half of n * INVERSE[k], shifted right by LENGTH[k]: with
-# l = floor(log2 d) and c = ceil(2**(63 + l) / d), c * d exceeds 2**(63 + l) by less than d < 2**(l + 1), and that times
-# n is less than 2**(63 + l); INVERSE[k] = 2c is less than 2**64.
+# For n < 2**61 and d = 10**k, k > 0, n // d is the high half of n * INVERSE[k], shifted right by LENGTH[k]. Proof: let
+# l = floor(log2 d) and c = ceil(2**(63 + l) / d). Then c * d exceeds 2**(63 + l) by less than d < 2**(l + 1), and n
+# times this excess is below 2**(63 + l). INVERSE[k] = 2c is below 2**64.
 _LENGTHS = [(10**k).bit_length() - 1 for k in range(19)]
 LENGTH = np.array(_LENGTHS, np.uint64)
 INVERSE = np.array([0] + [-2 * ((-1 << (63 + n)) // 10**k) for k, n in enumerate(_LENGTHS) if k > 0], np.uint64)
 
-# Divisors with their first bit set, and their reciprocals, for quotients of 128 by 64 bits.
+# Divisors shifted until their highest bit is set, and their reciprocals, for dividing 128 by 64 bits.
 _SHIFT = np.array([63 - n for n in _LENGTHS], np.int64)
 _NORMAL = np.array([10**k << (63 - n) for k, n in enumerate(_LENGTHS)], np.uint64)
 _RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in enumerate(_LENGTHS)], np.uint64)
@@ -43,7 +43,7 @@ _RECIPROCAL = np.array([(2**128 - 1) // (10**k << (63 - n)) - 2**64 for k, n in 
 
 @inner(forceinline=True)
 def _power(k: Any) -> Any:
-    """10**k; an unsigned index spares the question whether it counts from the end."""
+    """10**k; with an unsigned index, numba need not test whether it is negative."""
     return POWER[np.uint64(k)]
 
 
@@ -55,7 +55,7 @@ def _quotient(n: Any, k: Any) -> Any:
 
 @inner(forceinline=True)
 def _wide_by_power(high: Any, low: Any, k: Any) -> Any:
-    """Quotient and remainder by 10**k of a 128-bit number, for a quotient that fits into 64 bits.
+    """Divide a 128-bit number by 10**k: quotient, which must fit into 64 bits, and remainder.
 
     Moeller and Granlund, Improved division by invariant integers (2011), algorithm 4.
     """
@@ -80,7 +80,7 @@ def _wide_by_power(high: Any, low: Any, k: Any) -> Any:
 
 @inner
 def _wide_by_any(high: Any, low: Any, d: Any) -> Any:
-    """Quotient and remainder of a 128-bit number by d < 2**63, for a quotient that fits into 64 bits.
+    """Divide a 128-bit number by d < 2**63: quotient, which must fit into 64 bits, and remainder.
 
     Knuth, The art of computer programming 2, 4.3.1, algorithm D, in digits of 32 bits.
     """
@@ -105,14 +105,14 @@ def _wide_by_any(high: Any, low: Any, d: Any) -> Any:
 
 @inner(forceinline=True)
 def _digits(n: Any) -> Any:
-    """Number of decimal digits of n > 0; one for zero."""
-    count = ((64 - leading_zeros(n | _U1)) * 1233) >> 12  # that number or one less
+    """Number of decimal digits of n; 1 for zero."""
+    count = ((64 - leading_zeros(n | _U1)) * 1233) >> 12  # the number of digits or one less
     return count + np.int64(n >= _power(count))
 
 
 @inner(forceinline=True)
 def check(e: Any) -> None:
-    """OverflowError for an exponent that the next operations could not compute with."""
+    """Raise OverflowError for an exponent that is too large for further operations."""
     if e > LARGEST_EXPONENT or e < -LARGEST_EXPONENT:
         raise OverflowError(
             "got a result with an exponent beyond 2**60; needed one that int64 holds; scale the numbers"
@@ -120,7 +120,7 @@ def check(e: Any) -> None:
 
 
 def _increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
-    """1 if a magnitude goes up to m + 1, else 0; `up`: it is halfway or more, `tie`: halfway, `inexact`: above m."""
+    """1 if a magnitude rounds up to m + 1, else 0; `up`: at least halfway, `tie`: halfway, `inexact`: above m."""
     raise TypeError("got a call of _increment from Python; needed one from a function compiled by numba")
 
 
@@ -139,7 +139,7 @@ def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, neg
 
 
 def _within_range(fmt: Any, m: Any, e: Any) -> Any:
-    """The pair, if its exponent is one that the backend and the format hold."""
+    """Return the pair; raises OverflowError if the backend or the format cannot hold its exponent."""
     raise TypeError("got a call of _within_range from Python; needed one from a function compiled by numba")
 
 
@@ -159,7 +159,7 @@ def _overloaded_within_range(fmt: Any, m: Any, e: Any) -> Any:
 
 @inner(forceinline=True)
 def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
-    """The pair of a magnitude of t digits, or one that rounding carried to t + 1."""
+    """Make the pair of a magnitude with t digits, or with t + 1 after a carry."""
     carried = m == _power(fmt.precision)
     m = _power(fmt.precision - 1) if carried else m
     return _within_range(fmt, (-np.int64(m) if negative else np.int64(m)), e + np.int64(carried))
@@ -167,7 +167,7 @@ def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
 
 @inner(forceinline=True)
 def _filled(fmt: Any, n: Any, e: Any, negative: Any) -> Any:
-    """The pair of an exact n of less than t digits."""
+    """Make the pair of an exact n with fewer than t digits."""
     if n == _U0:
         return np.int64(0), np.int64(0)
     k = fmt.precision - _digits(n)
@@ -189,7 +189,7 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     x, y = np.uint64(abs(m1)), np.uint64(abs(m2))
     negative = m1 < 0
     same = negative == (m2 < 0)
-    beyond_half: Any = False  # of what lies below the last digit of n
+    beyond_half: Any = False  # all three describe what lies below the last digit of n
     halfway: Any = False
     more: Any = False
     if d <= 1:
@@ -205,8 +205,8 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
         if n < _power(t - 1):
             return _filled(fmt, n, e, negative)
     else:
-        # One more digit of the larger number, and the smaller one cut off there: its rest only decides the
-        # direction, and the sum has t digits at least.
+        # The larger number gets one more digit, and the smaller one is cut off at that digit. What is cut off only
+        # decides the direction, and the sum has at least t digits.
         k = d - 1
         e = e1 - 1
         if k > t:
@@ -301,12 +301,12 @@ def sqrt(fmt: Any, a: Any) -> Any:
         raise ValueError("got the square root of a negative number; needed x >= 0")
     if m == 0:
         return np.int64(0), np.int64(0)
-    # With 2t - 1 or 2t digits and an even exponent, the root has exactly t digits.
+    # The root of a number with 2t - 1 or 2t digits and an even exponent has exactly t digits.
     k = fmt.precision - ((e - fmt.precision) & 1)
     x = np.uint64(m)
     high, low = high_product(x, _power(k)), x * _power(k)
     s = np.uint64(math.sqrt(np.float64(high) * _TWO_64 + np.float64(low)))
-    # One step of Newton's; the remainder then fits into 63 bits, and the root is one or two off at most.
+    # After one Newton step the remainder fits into 63 bits, and the root is off by at most two.
     square = s * s
     upper = np.int64(high - high_product(s, s) - (_U1 if low < square else _U0))
     remainder = np.float64(upper) * _TWO_64 + np.float64(low - square)
@@ -318,14 +318,14 @@ def sqrt(fmt: Any, a: Any) -> Any:
     while rest > 2 * root:
         rest -= 2 * root + 1
         root += 1
-    # Never a tie, never a carry: as in the exact kernel.
+    # Neither a tie nor a carry can occur, as the exact kernel explains.
     whole = np.uint64(root)
     return _number(fmt, whole + _increment(fmt, whole, rest > root, False, rest > 0, False), (e - k) // 2, False)
 
 
 @inner
 def round_(fmt: Any, x: Any) -> Any:
-    """Round ``m * 10**e``, m any int64 but the least."""
+    """Round ``m * 10**e`` for any int64 m except the smallest."""
     m, e = x
     if m == 0:
         return np.int64(0), np.int64(0)
@@ -346,5 +346,5 @@ def compare(fmt: Any, a: Any, b: Any) -> Any:
     m2, e2 = b
     if e1 == e2 or m1 == 0 or m2 == 0 or (m1 < 0) != (m2 < 0):
         return (m1 > m2) - (m1 < m2)
-    # One sign, and the larger exponent is the larger magnitude.
+    # Both have the same sign, so the larger exponent means the larger magnitude.
     return 1 if (e1 > e2) == (m1 > 0) else -1

@@ -1,10 +1,11 @@
-"""The reference arithmetic: sums of two float64, 106 bits, relative error of one operation below 2**-102.
+"""The reference arithmetic: unevaluated sums of two float64, with a relative error below 2**-102 per operation.
 
-A number is ``(high, low)`` with high = fl(high + low). Algorithms and bounds, u = 2**-53: Joldes, Muller and Popescu,
-Tight and rigorous error bounds for basic building blocks of double-word arithmetic, ACM TOMS 44 (2017): sums 3 u**2,
-products 4 u**2, quotients 15 u**2; roots, Lefevre et al., ACM TOMS 49 (2023): 25/8 u**2.
+A number is ``(high, low)`` with high = fl(high + low). The algorithms and their error bounds, u = 2**-53, are those of
+Joldes, Muller and Popescu, Tight and rigorous error bounds for basic building blocks of double-word arithmetic, ACM
+TOMS 44 (2017): 3 u**2 for sums, 4 u**2 for products and 15 u**2 for quotients; and of Lefevre et al., ACM TOMS 49
+(2023): 25/8 u**2 for square roots.
 
-A result below 2**-850, which may be less accurate, or from 2**1000 on becomes NaN, and stays so.
+A result below 2**-850, which may be less accurate, or of at least 2**1000 becomes NaN, and later results stay NaN.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Compiled loops over whole arrays: entry by entry, folds, products of matrices.
+"""Compiled loops over whole arrays: entry by entry, folds, and matrix products.
 
-Each answers whether a result has left the range of its backend, or raises OverflowError there; its output is then void.
+If a result leaves the range of its backend, a loop returns True or raises OverflowError, and its output is invalid.
 """
 
 from __future__ import annotations
@@ -75,12 +75,12 @@ FOLDS = {name: _fold(getattr(scalar, name)) for name in ("add", "multiply")}
 
 @compiled
 def compared(fmt: Any, n: int, a: Any, b: Any, c: Any) -> None:
-    """c[i] = -1, 0 or 1 as a[i] is less than, equal to or greater than b[i]."""
+    """c[i] = -1, 0 or 1 if a[i] is less than, equal to or greater than b[i]."""
     for i in range(n):
         c[i] = compare(fmt, load(fmt, a, i), load(fmt, b, i))
 
 
 @compiled
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """The matrix product c = a b; OverflowError as :func:`gpbnb.arithmetic.kernels.scalar.matmul`."""
+    """The matrix product c = a b; raises OverflowError like :func:`gpbnb.arithmetic.kernels.scalar.matmul`."""
     scalar.matmul(fmt, a, b, c)

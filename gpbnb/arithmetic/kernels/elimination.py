@@ -1,7 +1,8 @@
 """Compiled Gaussian elimination, in every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar`.
 
-The order of operations, and so each digit, is that of the loops in :mod:`gpbnb.arithmetic.linalg`. Matrices are arrays
-of the tag, worked on in place; OverflowError where a number leaves the range of its backend: the arrays are then void.
+The order of operations, and therefore each digit, is the same as in :mod:`gpbnb.arithmetic.linalg`. Matrices are packed
+arrays, which the functions overwrite. If a number leaves the range of its backend, they raise OverflowError, and the
+arrays are invalid.
 """
 
 from __future__ import annotations
@@ -27,9 +28,9 @@ from gpbnb.arithmetic.kernels.scalar import (
 
 @compiled
 def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
-    """Factor a (n, n): the upper factor on and above the diagonal, below it the multipliers of the lower.
+    """Factor a (n, n): the upper factor on and above the diagonal, the multipliers of the lower factor below it.
 
-    `order` (n,) goes with the rows. Returns the column of the first zero pivot, or -1 where there is none.
+    `order` (n,) is permuted like the rows. Returns the column of the first zero pivot, or -1 if there is none.
     """
     n = a.shape[0]
     for k in range(n):
@@ -58,7 +59,7 @@ def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
 
 @compiled
 def reduce(fmt: Any, factors: Any, b: Any) -> None:
-    """Reduce the right-hand sides b (n, p), rows in the order of the factors that :func:`lu` made."""
+    """Forward substitution in the right-hand sides b (n, p), whose rows have the order that :func:`lu` made."""
     n = factors.shape[0]
     for k in range(n):
         for i in range(k + 1, n):
@@ -69,7 +70,7 @@ def reduce(fmt: Any, factors: Any, b: Any) -> None:
 
 @compiled
 def substitute(fmt: Any, factors: Any, b: Any) -> None:
-    """Back substitution: from the reduced right-hand sides b (n, p) to the solutions."""
+    """Back substitution: overwrite the reduced right-hand sides b (n, p) with the solutions."""
     n = factors.shape[0]
     for k in range(n - 1, -1, -1):
         for i in range(k + 1, n):

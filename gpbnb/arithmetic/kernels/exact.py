@@ -1,8 +1,8 @@
 """Correctly rounded arithmetic on Python integers: any base, any precision, unbounded exponent.
 
-A number is a pair ``(m, e)`` and means ``m * base**e``. Zero is ``(0, 0)``; any other number is
-normalized, ``base**(t-1) <= abs(m) < base**t``, so that equal numbers are equal pairs.
-Every function rounds once, from the exact result.
+A pair ``(m, e)`` represents ``m * base**e``. Zero is ``(0, 0)``; every other number is normalized,
+``base**(t-1) <= abs(m) < base**t``, so that equal numbers are equal pairs. Every function computes the exact result and
+rounds it once.
 """
 
 from __future__ import annotations
@@ -15,17 +15,17 @@ from math import isqrt, log2
 Pair = tuple[int, int]
 
 ZERO: Pair = (0, 0)
-LARGEST_BITS = 10_000_000  # integers beyond this would take minutes or all memory
+LARGEST_BITS = 10_000_000  # longer integers would take minutes or exhaust the memory
 _LARGEST_POWER_OF_TEN = int(LARGEST_BITS / log2(10))
 
 
 def integer_text(n: int) -> str:
-    """The decimal digits of an integer of any length; ``str`` refuses more than 4300."""
+    """Decimal digits of an integer of any length; ``str`` refuses more than 4300 digits."""
     return str(Decimal(n))
 
 
 class ExactKernel:
-    """Scalar operations of one format.
+    """Scalar operations in one format.
 
     Parameters
     ----------
@@ -42,13 +42,13 @@ class ExactKernel:
         self._smallest = base ** (precision - 1)
         self.limit = base**precision
         self._largest_exponent = int(LARGEST_BITS / self._bits)
-        # What the operations need; of very long significands the powers are made when needed.
+        # Powers that the operations need; for very long significands they are computed on demand.
         self._powers = [base**k for k in range(min(2 * precision + 8, 512))]
 
     # -- from exact values ---------------------------------------------------------------------
 
     def from_ratio(self, p: int, q: int, e: int = 0) -> Pair:
-        """Round ``p / q * base**e``; ``q`` is positive."""
+        """Round ``p / q * base**e``; ``q`` must be positive."""
         if p == 0:
             return ZERO
         if q == 1:
@@ -56,7 +56,7 @@ class ExactKernel:
         return self._round_quotient(p, q, e)
 
     def from_decimal(self, p: int, q: int, k: int) -> Pair:
-        """Round ``p / q * 10**k``; ``q`` is positive.
+        """Round ``p / q * 10**k``; ``q`` must be positive.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class ExactKernel:
         return self.from_ratio(p * 10**k, q) if k > 0 else self.from_ratio(p, q * 10**-k)
 
     def is_exactly(self, pair: Pair, p: int, q: int, k: int) -> bool:
-        """Whether ``pair``, just rounded from ``p / q * 10**k``, equals it."""
+        """Whether ``pair``, the rounded ``p / q * 10**k``, equals this number exactly."""
         m, e = pair
         if m == 0:
             return True  # no other number rounds to zero
@@ -93,8 +93,9 @@ class ExactKernel:
         if e1 < e2:
             m1, e1, m2, e2 = m2, e2, m1, e1
         if e1 - e2 > self.precision + 1:
-            # The smaller operand is below base**-2 units of the last digit, the next number or midpoint at least
-            # 1 / (2 * base) units away, also just below a power of the base: only its sign matters.
+            # Only the sign of the smaller operand matters. It is below base**-2 units in the last digit of the larger
+            # one, and the nearest number or midpoint is at least 1 / (2 * base) units away, even just below a power of
+            # the base.
             m2, e2 = (1 if m2 > 0 else -1), e1 - 3
         n = m1 * self.power(e1 - e2) + m2
         return self._round_integer(n, e2) if n else ZERO
@@ -107,7 +108,7 @@ class ExactKernel:
         return self._round_integer(n, e1 + e2) if n else ZERO
 
     def divide(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
-        """The caller has excluded ``m2 == 0``."""
+        """Round the quotient; callers exclude ``m2 == 0``."""
         if m1 == 0:
             return ZERO
         return self._round_quotient(m1 if m2 > 0 else -m1, abs(m2), e1 - e2)
@@ -126,15 +127,15 @@ class ExactKernel:
         return self._round_integer(n, f) if n else ZERO
 
     def sqrt(self, m: int, e: int) -> Pair:
-        """The caller has excluded ``m < 0``."""
+        """Round the square root; callers exclude ``m < 0``."""
         if m == 0:
             return ZERO
-        # With 2t - 1 or 2t digits and an even exponent, the root has exactly t digits.
+        # The root of a number with 2t - 1 or 2t digits and an even exponent has exactly t digits.
         shift = self.precision if (e - self.precision) % 2 == 0 else self.precision - 1
         n = m * self.power(shift)
         root = isqrt(n)
-        # n >= (root + 1/2)**2 in integers: n - root**2 > root. An exact tie cannot occur, nor a carry:
-        # n <= (b**t - 1) * b**t, whose root is below b**t - 1/2.
+        # In integers, n >= (root + 1/2)**2 means n - root**2 > root. Neither a tie nor a carry can occur, because n is
+        # at most (b**t - 1) * b**t, whose root is below b**t - 1/2.
         if self.nearest and n - root * root > root:
             root += 1
         return root, (e - shift) // 2
@@ -146,7 +147,7 @@ class ExactKernel:
         return abs(m), e
 
     def compare(self, m1: int, e1: int, m2: int, e2: int) -> int:
-        """-1, 0 or 1 as the first number is less than, equal to or greater than the second."""
+        """-1, 0 or 1 if the first number is less than, equal to or greater than the second."""
         if m1 == 0 or m2 == 0 or (m1 < 0) != (m2 < 0):
             return (m1 > m2) - (m1 < m2)
         larger = (e1, abs(m1)) > (e2, abs(m2))
@@ -170,11 +171,11 @@ class ExactKernel:
         return Fraction(m * self.base**e) if e >= 0 else Fraction(m, self.base**-e)
 
     def to_float(self, m: int, e: int) -> float:
-        """The nearest float64; halfway between two, the one with even significand.
+        """Round to the nearest float64, ties to the even significand.
 
         Raises
         ------
-        OverflowError : the result would be infinite, or zero for a number that is not.
+        OverflowError : the result would be infinite, or a nonzero number would become zero.
         """
         if m == 0:
             return 0.0
@@ -192,7 +193,7 @@ class ExactKernel:
         )
 
     def about(self, e: int) -> str:
-        """The size of a number with the exponent e, for messages."""
+        """Approximate size of a number with exponent e, for messages."""
         return f"{integer_text(self.base)}**{integer_text(e + self.precision - 1)}"
 
     # -- rounding ------------------------------------------------------------------------------
@@ -205,7 +206,7 @@ class ExactKernel:
         """Number of base-b digits of ``n > 0``."""
         if self.base == 2:
             return n.bit_length()
-        count = int((n.bit_length() - 1) / self._bits) + 1  # within one or two; then exactly:
+        count = int((n.bit_length() - 1) / self._bits) + 1  # off by one or two, corrected below
         while self.power(count) <= n:
             count += 1
         while self.power(count - 1) > n:
@@ -246,5 +247,5 @@ class ExactKernel:
 
 @lru_cache(maxsize=256)
 def kernel(base: int, precision: int, nearest: bool) -> ExactKernel:
-    """The kernel of a format, made once."""
+    """Return the kernel of a format; each is made only once."""
     return ExactKernel(base, precision, nearest)

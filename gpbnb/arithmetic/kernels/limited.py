@@ -1,6 +1,6 @@
 """Correctly rounded arithmetic on Python integers with every rounding mode and a limited range.
 
-Numbers are the pairs of :mod:`gpbnb.arithmetic.kernels.exact`. A subnormal number is normalized as well: its last
+Numbers are pairs as in :mod:`gpbnb.arithmetic.kernels.exact`. Subnormal numbers are normalized as well; their last
 digits are zeros.
 """
 
@@ -18,7 +18,7 @@ _MASK = 2**64 - 1
 
 
 def draw(seed: int, count: int) -> int:
-    """Random bits for the rounding number `count`: SplitMix64, of which the upper bits are taken."""
+    """Random bits for rounding number `count`: the upper bits of SplitMix64."""
     z = (seed + count * 0x9E3779B97F4A7C15) & _MASK
     z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
     z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
@@ -26,11 +26,10 @@ def draw(seed: int, count: int) -> int:
 
 
 class LimitedKernel(ExactKernel):
-    """Scalar operations of one format with any rounding mode, and with limits if it has any.
+    """Scalar operations in one format with any rounding mode, with or without limits.
 
-    Results are rounded as if the exponent had no upper limit; a result that is then beyond the largest number
-    overflows. Where a format has no subnormal numbers, results that are below the least normal number after rounding
-    become zero.
+    Results are first rounded as if the exponent had no upper limit; a rounded result beyond the largest number
+    overflows. In a format without subnormal numbers, rounded results below the smallest normal number become zero.
 
     Raises
     ------
@@ -41,16 +40,16 @@ class LimitedKernel(ExactKernel):
         super().__init__(rules.base, rules.precision, rules.rounding in (Rounding.NEAREST, Rounding.EVEN))
         self.rules = rules
         self.rounding, self.limits = rules.rounding, rules.limits
-        self.count = 0  # of roundings, for the random ones
+        self.count = 0  # roundings so far, which select the random bits
         if self.limits is not None:
-            #: Exponent of the last digit of the least normal number.
+            #: Exponent of the last digit of the smallest normal number.
             self.quantum = self.limits.emin - rules.precision + 1
             largest = self.limits.largest / Fraction(rules.base) ** self.quantum
             m, e = self._normalized(int(largest), self.quantum)
-            self.top = e, m  # in the order of size
+            self.top = e, m  # exponent first, so that tuples compare by size
 
     def restart(self) -> None:
-        """Begin the random numbers of stochastic rounding again."""
+        """Restart the random numbers of stochastic rounding."""
         self.count = 0
 
     # -- operations ----------------------------------------------------------------------------
@@ -80,15 +79,15 @@ class LimitedKernel(ExactKernel):
         return self._sum(m1 * m2, e1 + e2, m3, e3)
 
     def sqrt(self, m: int, e: int) -> Pair:
-        """The caller has excluded ``m < 0``."""
+        """Round the square root; callers exclude ``m < 0``."""
         self.count += 1
         if m == 0:
             return ZERO
-        # So many digits that the root has more than t, and more than a random rounding looks at.
+        # Enough digits that the root has more than t, and more than a random rounding compares.
         shift = 2 * (self.precision + DRAW_BITS) + (e & 1)
         n = m * self.base**shift
         root = isqrt(n)
-        # An inexact root lies strictly between two integers: one more digit says so.
+        # One more digit marks an inexact root, which lies strictly between two integers.
         sticky = int(root * root != n)
         return self._round_integer(root * self.base + sticky, (e - shift) // 2 - 1)
 
@@ -106,7 +105,7 @@ class LimitedKernel(ExactKernel):
             m1, e1, m2, e2 = m2, e2, m1, e1
         gap = 3 * self.precision + DRAW_BITS + 2
         if e1 - e2 > gap and self.limits is None:
-            # Only the sign of the smaller number matters: it is far below what any mode looks at.
+            # Only the sign of the smaller number matters: it is far below the digits that decide a rounding.
             m2, e2 = (1 if m2 > 0 else -1), e1 - 2 * DRAW_BITS - 3
         n = m1 * self.power(e1 - e2) + m2
         return self._round_integer(n, e2) if n else ZERO
@@ -118,7 +117,7 @@ class LimitedKernel(ExactKernel):
         drop = self._dropped(self.digits(a) - self.precision, e)
         if drop <= 0:
             return self._within(n, a, e)
-        if drop > self.digits(a) + DRAW_BITS + 2:  # far below half of the last digit
+        if drop > self.digits(a) + DRAW_BITS + 2:  # far below half a unit of the last digit
             a, e, drop = 1, e + drop - DRAW_BITS - 2, DRAW_BITS + 2
         unit = self.power(drop)
         m, rest = divmod(a, unit)
@@ -127,7 +126,7 @@ class LimitedKernel(ExactKernel):
     def _round_quotient(self, p: int, q: int, e: int) -> Pair:
         a = abs(p)
         shift = self.precision - self.digits(a) + self.digits(q)
-        # The quotient has t digits or one more at this shift; then it is rounded at the right one.
+        # With this shift the quotient has t or t + 1 digits, which decides how many are dropped.
         numerator, denominator = (a * self.power(shift), q) if shift >= 0 else (a, q * self.power(-shift))
         drop = self._dropped(int(numerator >= denominator * self.limit), e - shift)
         if drop < 0:
@@ -138,7 +137,7 @@ class LimitedKernel(ExactKernel):
         return self._within(p, m + self._up(m, rest, denominator, p < 0), e - shift + drop)
 
     def _dropped(self, excess: int, e: int) -> int:
-        """How many digits of an integer times ``base**e`` are dropped, of which `excess` are too many for t."""
+        """Number of digits to drop from an integer times ``base**e`` that has `excess` digits more than t."""
         if self.limits is None:
             return excess
         if self.limits.fixed:
@@ -146,7 +145,7 @@ class LimitedKernel(ExactKernel):
         return max(excess, self.quantum - e) if self.limits.subnormal else excess
 
     def _up(self, m: int, rest: int, unit: int, negative: bool) -> bool:
-        """Whether the magnitude ``m + rest / unit`` is rounded to m + 1."""
+        """Whether the magnitude ``m + rest / unit`` rounds up to m + 1."""
         match self.rounding:
             case Rounding.NEAREST:
                 return 2 * rest >= unit
@@ -164,7 +163,7 @@ class LimitedKernel(ExactKernel):
                 return draw(self.rules.seed, self.count) * unit < rest << DRAW_BITS
 
     def _within(self, sign: int, m: int, e: int) -> Pair:
-        """The pair of a rounded magnitude, if it is within the limits."""
+        """Make the pair of a rounded magnitude and apply the limits."""
         if m == 0:
             return ZERO
         if self.limits is not None and self.limits.fixed:
@@ -182,7 +181,7 @@ class LimitedKernel(ExactKernel):
         return (m if sign > 0 else -m), e
 
     def _wrapped(self, m: int, e: int) -> int:
-        """A fixed-point number as a count of its last digit."""
+        """Apply the limits to a fixed-point number; returns it in units of its last digit."""
         limits = cast(Limits, self.limits)
         count = m * self.power(e - self.quantum)
         unit = Fraction(self.base) ** self.quantum
@@ -199,12 +198,12 @@ class LimitedKernel(ExactKernel):
         )
 
     def _normalized(self, m: int, e: int) -> Pair:
-        """Add zeros up to t digits, or take them away where rounding has carried to more."""
+        """Append zeros up to t digits, or remove them if rounding has carried to more."""
         shift = self.precision - self.digits(abs(m))
         return (m * self.power(shift) if shift >= 0 else m // self.power(-shift)), e - shift
 
 
 @lru_cache(maxsize=256)
 def limited_kernel(rules: Rules) -> LimitedKernel:
-    """The kernel of a format, made once."""
+    """Return the kernel of a format; each is made only once."""
     return LimitedKernel(rules)

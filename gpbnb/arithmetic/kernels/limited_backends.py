@@ -21,20 +21,20 @@ _MODES: dict[Rounding, Any] = {
     Rounding.DOWN: tags.Down,
     Rounding.ODD: tags.Odd,
 }
-_REACH = 320  # bits of exponent up to which products, quotients and their rests are normal float64
+_REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
 _HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
-_UNLIMITED = 2**60  # exponent of base 10
+_UNLIMITED = 2**60  # stands for an unlimited exponent in base 10
 
 
 class Accumulator(Protocol):
-    """A format that can keep sums of products."""
+    """A format that can accumulate sums of products."""
 
     def run_tag(self, fused: bool = False, *, order: Order = "left", block: int = 32) -> tags.Tag:
-        """The arithmetic for a compiled loop."""
+        """Return the tag of its arithmetic for a compiled loop."""
 
 
 class LimitedExact(Exact):
-    """Any format, on Python's integers."""
+    """Any format, stored as Python integers."""
 
     def __init__(self, rules: Rules) -> None:
         self.base, self.precision, self.rules = rules.base, rules.precision, rules
@@ -51,7 +51,7 @@ class LimitedExact(Exact):
             raise OverflowError(f"{_NAMES[name]}{self._place(name, operands)}: {error}") from None
 
     def _place(self, name: str, operands: tuple[Components, ...]) -> str:
-        """Where the first entry overflows."""
+        """Index of the first entry that overflows, for the message."""
         parts = np.broadcast_arrays(*(part for components in operands for part in components))
         operation = getattr(self.kernel, name)
         for index in np.ndindex(parts[0].shape):
@@ -75,7 +75,7 @@ _NAMES = {
 
 
 class LimitedFloats(Floats):
-    """Bases 2 and 16 on float64."""
+    """Bases 2 and 16, stored as float64."""
 
     fuses = True
 
@@ -103,13 +103,13 @@ class LimitedFloats(Floats):
         return self.tag
 
     def restart(self) -> None:
-        """Begin the random numbers of stochastic rounding again."""
+        """Restart the random numbers of stochastic rounding."""
         if isinstance(self.tag, tags.Limited) and isinstance(self.tag.mode, tags.Random):
             self.tag.mode.state[1] = 0
 
 
 class LimitedPairs(Pairs):
-    """Base 10 on pairs of int64."""
+    """Base 10, stored as pairs of int64."""
 
     def __init__(self, rules: Rules) -> None:
         self.base, self.precision, self.rules = rules.base, rules.precision, rules
@@ -139,11 +139,11 @@ def _emax(rules: Rules) -> int:
 
 
 def check_order(order: Order, fused: bool, block: int) -> None:
-    """Check how sums of products are to be computed.
+    """Check the options for computing sums of products.
 
     Raises
     ------
-    ValueError : an unknown order, pairwise sums with fused multiply-add, or blocks without a product.
+    ValueError : an unknown order, pairwise sums with fused multiply-add, or blocks of less than one product.
     """
     if order not in get_args(Order):
         raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
@@ -154,7 +154,7 @@ def check_order(order: Order, fused: bool, block: int) -> None:
 
 
 def run_tag(backend: Backend, rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
-    """The tag for a compiled loop of its own; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
+    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
     check_order(order, fused, block)
     if not isinstance(backend, Compiled):
         raise ValueError(f"got {rules}; needed a format with compiled loops")
@@ -170,11 +170,11 @@ def run_tag(backend: Backend, rules: Rules, fused: bool, order: Order = "left", 
 
 
 def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
-    """The tag for sums of products that are kept in another arithmetic until they are stored.
+    """Return the tag for numbers in one arithmetic whose sums of products are accumulated in another.
 
     Raises
     ------
-    ValueError : one of the two is not on float64, or sums have fewer digits than what is stored.
+    ValueError : one of the two does not use float64, or the sums have fewer digits than the numbers.
     """
     for tag in (stored, sums):
         if not isinstance(tag, tags.FLOATS) or isinstance(tag, tags.Mixed):
@@ -195,13 +195,13 @@ def _digits(tag: tags.Tag) -> int:
 
 @lru_cache(maxsize=256)
 def limited_exact(rules: Rules) -> LimitedExact:
-    """The backend that holds every number of a format."""
+    """Return the backend that holds every number of a format."""
     return LimitedExact(rules)
 
 
 @lru_cache(maxsize=256)
 def limited_backend(rules: Rules) -> Backend:
-    """The fastest backend of a format."""
+    """Return the fastest backend for a format."""
     if rules.base == 10 and rules.precision <= LARGEST_PRECISION[10] and rules.rounding in _MODES:
         if rules.limits is None or (not rules.limits.fixed and rules.limits.largest == _all_nines(rules, _emax(rules))):
             return LimitedPairs(rules)
@@ -216,11 +216,11 @@ def _all_nines(rules: Rules, emax: int) -> Any:
 
 
 def _float_tag(rules: Rules, hardware: bool = True) -> Any:
-    """The tag for numbers on float64; None where float64 cannot hold what decides a rounding."""
+    """Return the tag for float64 storage, or None if float64 cannot hold the digits that decide a rounding."""
     base, precision, rounding, limits, seed = rules
     random = rounding is Rounding.STOCHASTIC
     longest = 53 - DRAW_BITS if random else 52 if base == 2 else 13
-    # The one digit has no bit in float64 that would be even or odd.
+    # A single binary digit is implicit in float64: no stored bit is even or odd.
     hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
     digits = tags.Two() if base == 2 else tags.Sixteen()
     mode = _random(seed) if random else _MODES[rounding]()
@@ -232,7 +232,7 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
             else None
         )
     emin, emax = limits.emin, _emax(rules)
-    if limits.fixed:  # numbers up to twice the largest have its spacing as well, so that none is rounded into the range
+    if limits.fixed:  # numbers up to twice the largest keep its spacing, so that none is rounded back into the range
         emin, precision = emin + 1, precision + 1
     plain = not limits.fixed and limits.subnormal and limits.largest == _all_nines(rules, emax)
     if hardware and base == 2 and rounding is Rounding.EVEN and plain and (precision, limits.emin, emax) in _HARDWARE:

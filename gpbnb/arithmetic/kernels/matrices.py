@@ -1,7 +1,7 @@
 """Compiled loops over matrices for the topics' recursions, written once for every tag.
 
-They are compiled into the loops that call them. What a step multiplies by zero it leaves out: a product with zero and a
-sum with zero are exact, so no digit changes.
+They are compiled into the loops that call them. Multiplications by zero are skipped: products with zero and sums with
+zero are exact, so no digit changes.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def copy(fmt: Any, a: Any, c: Any) -> None:
 
 @inner
 def transpose(fmt: Any, a: Any, c: Any) -> None:
-    """c = a'; c is not a."""
+    """c = a'; c must not be a."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             put(fmt, c, (j, i), load(fmt, a, (i, j)))
@@ -69,13 +69,13 @@ def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 
 def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """c = a b if the tag wants its sums pairwise or in blocks; returns whether it does."""
+    """c = a b if the tag asks for pairwise or blocked sums; returns whether it does."""
     raise TypeError("got a call of product_in_order from Python; needed one from a function compiled by numba")
 
 
 @inner
 def _pairwise(fmt: Any, a: Any, b: Any, i: int, j: int, sums: Any) -> Any:
-    # Without recursion, which numba's cache does not survive: product k completes every part that it is the last of.
+    # Not recursive, because numba cannot cache recursive functions: product k completes every part that it ends.
     count = 0
     for k in range(a.shape[1]):
         sums[count] = multiply(fmt, load(fmt, a, (i, k)), load(fmt, b, (k, j)))
@@ -123,7 +123,7 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 @inner
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a b, each entry summed from left to right, over the entries of a that are not zero; c is neither a nor b."""
+    """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
     if product_in_order(fmt, a, b, c):
         return
     for i in range(a.shape[0]):
@@ -147,7 +147,7 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @inner
 def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """As :func:`product`, with the same digits, over the entries of b that are not zero."""
+    """Like :func:`product`, with the same digits, but summed over the nonzero entries of b."""
     if product_in_order(fmt, a, b, c):
         return
     for j in range(b.shape[1]):
@@ -171,9 +171,9 @@ def product_by_sparse(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @inner
 def inverse(fmt: Any, a: Any, c: Any) -> Any:
-    """c = the inverse of a, by elimination without exchange of rows, which a covariance does not need; a is used up.
+    """c = the inverse of a, by elimination without row exchanges, which a covariance does not need; overwrites a.
 
-    Returns 1 if all pivots are positive, -1 if one is negative, 0 if one is zero: then c is void.
+    Returns 1 if all pivots are positive, -1 if one is negative, and 0 if one is zero; c is then invalid.
     """
     m = a.shape[0]
     answer = 1
@@ -204,9 +204,10 @@ def inverse(fmt: Any, a: Any, c: Any) -> Any:
 
 @inner
 def factor_ud(fmt: Any, a: Any, u: Any) -> Any:
-    """u = the factors of a covariance a = U D U', D on the diagonal of u and U, with ones there, above; a is used up.
+    """u = the factors of a covariance a = U D U', with D on the diagonal of u; overwrites a.
 
-    Returns whether no entry of D came out negative, nor one zero below a column that is not.
+    The unit diagonal of U is not stored. Returns False if an entry of D is negative, or if it is zero and an entry
+    above it is not.
     """
     n = a.shape[0]
     definite = True

@@ -1,10 +1,10 @@
-"""Bases 2 and 16 as processors compute: every rounding mode, a limited range, fused multiply-add; on float64.
+"""Bases 2 and 16 as processors compute, on float64: every rounding mode, a limited range, fused multiply-add.
 
-As in :mod:`gpbnb.arithmetic.kernels.binary`, an operation gives the nearest float64 p and the sign of what p lacks of
-the exact result. Below the least normal number B of a format all numbers have the spacing of those from B to 2B. So B
-is added to the magnitude, the sum is rounded as any other number, and B is taken away again, without an error.
+As in :mod:`gpbnb.arithmetic.kernels.binary`, an operation yields the nearest float64 p and the sign of the exact
+result minus p. Below the smallest normal number B of a format, all numbers have the same spacing as those from B to 2B.
+So B is added to the magnitude, the sum is rounded like any other number, and B is subtracted again without error.
 
-Results beyond the range become NaN, and stay so.
+Results beyond the range become NaN, and later results stay NaN.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.rules import DRAW_BITS
 from gpbnb.arithmetic.kernels.tags import Away, Down, Even, Odd, Random, Sixteen, Two, Up, Zero
 
-EXACT_PRODUCT = 26  # digits up to which a product has at most 53
+EXACT_PRODUCT = 26  # bits; products of numbers this short are exact in float64
 _ONE = np.int64(1)
 _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
 _EXPONENT, _ONE_BITS = np.int64(0x7FF << 52), np.int64(1023 << 52)
@@ -30,7 +30,7 @@ _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1C
 _DRAWN = np.uint64(64 - DRAW_BITS)
 
 
-# -- rounding the integer view of a magnitude, already chopped to 53 bits -----------------------------
+# -- rounding a magnitude that is chopped to 53 bits and read as an integer ---------------------------
 
 
 def _dropped_binary(fmt: Any, u: Any) -> Any:
@@ -38,7 +38,7 @@ def _dropped_binary(fmt: Any, u: Any) -> Any:
 
 
 def _dropped_hexadecimal(fmt: Any, u: Any) -> Any:
-    # The first digit of 2**e * 1.f has 1 + e mod 4 bits.
+    # The first hexadecimal digit of 2**e * 1.f has 1 + e mod 4 bits.
     return np.int64(56) - np.int64(4) * fmt.precision - (((u >> 52) + 1) & 3)
 
 
@@ -49,7 +49,7 @@ def _away(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
 
 def _even(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
     unit = _ONE << k
-    # The last digit by a mask: there are no vector instructions that shift signed numbers.
+    # A mask finds the last digit, because no vector instruction shifts signed numbers.
     return (u + ((unit >> 1) - 1) + np.int64(((u & unit) != 0) | sticky)) & -unit
 
 
@@ -74,7 +74,7 @@ def _odd(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
 
 
 def _random(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    # The same numbers as those of gpbnb.arithmetic.kernels.limited.draw.
+    # The same random numbers as gpbnb.arithmetic.kernels.limited.draw.
     state = fmt.mode.state
     state[1] += np.uint64(1)
     z = state[0] + state[1] * _GOLDEN
@@ -83,7 +83,7 @@ def _random(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
     drawn = np.int64((z ^ (z >> np.uint64(31))) >> _DRAWN)
     unit = _ONE << k
     rest = u & (unit - 1)
-    # k >= DRAW_BITS: the draw times the unit, over 2**DRAW_BITS, against the rest and what it lacks
+    # k >= DRAW_BITS, so the scaled draw is an integer; sticky tells whether digits follow the rest
     scaled = drawn << (k - DRAW_BITS)
     up = (scaled < rest) | ((scaled == rest) & sticky)
     return (u & -unit) + (np.int64(up) << k)
@@ -95,13 +95,13 @@ _DROPPED = {Two: _dropped_binary, Sixteen: _dropped_hexadecimal}
 
 @cache
 def operations(digits: Any, mode: Any) -> dict[str, Any]:
-    """The scalar operations for the classes of the digits and of the rounding mode."""
+    """Make the scalar operations for a class of digits and a class of rounding mode."""
     dropped = inner(forceinline=True)(_DROPPED[digits])
     round_magnitude = inner(forceinline=True)(_MODES[mode])
 
     @inner(forceinline=True)
     def fit(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
-        """Round the exact p + r, of whose r only the sign counts; p is its nearest float64."""
+        """Round the exact p + r, where p is its nearest float64; only the sign of r is used."""
         negative = p < 0.0
         a = abs(p)
         base = fmt.gradual if a < fmt.gradual else 0.0
@@ -171,14 +171,14 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
 
 @inner(forceinline=True)
 def _round_even(fmt: Any, x: Any) -> Any:
-    """Round a float64 in as few vector instructions as there can be; the result is that of the general way.
+    """Round a float64 with as few vector instructions as possible; the general method gives the same result.
 
-    The float64 between C and 2C, with C = 2**(e + 53 - t), have the spacing of the t-digit numbers from 2**e to
-    2**(e + 1), and the machine's ties go to even. So C with the sign of x is added and taken away.
+    The float64 values between C and 2C, with C = 2**(e + 53 - t), have the spacing of the t-digit numbers from 2**e to
+    2**(e + 1), and the machine rounds ties to even. So adding C, with the sign of x, and subtracting it again rounds x.
     """
     u = bits(x)
     shift = (np.int64(53) - fmt.precision) << 52
-    # Below the least normal number the spacing does not get smaller. If x is beyond every range, C may be anything.
+    # Below the smallest normal number the spacing stays the same. If x is beyond every range, C does not matter.
     large, least = from_bits((u & _EXPONENT) + shift), fmt.gradual * from_bits(_ONE_BITS + shift)
     large = from_bits(bits(large if large > least else least) | (u & _SIGN))
     y = (x + large) - large
@@ -198,11 +198,11 @@ def _two_sum(a: Any, b: Any) -> Any:
 
 @inner(forceinline=True)
 def _fused_sum(a: Any, b: Any, c: Any) -> Any:
-    """a * b + c as the nearest float64 w and a rest of the right sign, and whether it is exactly zero.
+    """a * b + c as its nearest float64 w and a residual with the correct sign, and whether the sum is exactly zero.
 
-    With p + e the exact product and s + r = p + c, the rests e and r add up to v + lowest, and s + v to w + low. If low
-    is not zero, it is a multiple of the last bit of v, and larger than lowest. A product whose rest is too small for
-    float64 gives NaN.
+    The exact product is p + e, and p + c = s + r. The residuals e and r add up to v + lowest, and s and v to w + low.
+    If low is not zero, it is a multiple of the last bit of v and thus larger than lowest. If the residual of the
+    product is too small for float64, w is NaN.
     """
     p = a * b
     e = fma(a, b, -p)
@@ -263,7 +263,7 @@ def _machine(rounded: Any) -> dict[str, Any]:
 
 @inner(forceinline=True)
 def _fused_single(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    # The product is exact. The sum is rounded to odd, and so its second rounding comes out right.
+    # The product is exact, and the sum is rounded to odd, so that the second rounding is correct.
     s, r = _two_sum(a * b, c)
     u = bits(abs(s)) - np.int64(((r < 0.0) & (s > 0.0)) | ((r > 0.0) & (s < 0.0)))
     odd = from_bits(u | np.int64(r != 0.0))
@@ -275,6 +275,6 @@ def _fused_double(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return _double(fma(a, b, c))
 
 
-# Sums, products, quotients and roots of 24-bit numbers may be rounded to 53 bits first: it never makes a tie.
+# Sums, products, quotients and roots of 24-bit numbers may be rounded to 53 bits first, which never creates a tie.
 SINGLE = {**_machine(_single), "fused": _fused_single}
 DOUBLE = {**_machine(_double), "fused": _fused_double}

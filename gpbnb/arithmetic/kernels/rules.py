@@ -1,4 +1,4 @@
-"""The rules of a number format: how it rounds, and how far its numbers reach."""
+"""Rules of a number format: how it rounds, and its range."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Literal, NamedTuple
 
 
 class Rounding(Enum):
-    """How a number with more digits than the format holds is fitted into it."""
+    """How a number with too many digits is rounded to a format."""
 
-    #: To nearest, half away from zero; hung1984, ch. II, (3).
+    #: To nearest, ties away from zero; hung1984, ch. II, (3).
     NEAREST = "nearest"
-    #: Toward zero, the further digits dropped; hung1984, ch. II, (9). IEEE 754 calls it roundTowardZero.
+    #: Toward zero: further digits are dropped; hung1984, ch. II, (9). IEEE 754 calls it roundTowardZero.
     CHOP = "chop"
-    #: To nearest, half to the neighbour with an even last digit, the default of IEEE 754.
+    #: To nearest, ties to the neighbour with an even last digit: the default of IEEE 754.
     EVEN = "even"
     #: Toward plus infinity.
     UP = "up"
     #: Toward minus infinity.
     DOWN = "down"
-    #: Inexact results to the neighbour with an odd last digit, so that a second rounding comes out right.
+    #: Inexact results go to the neighbour with an odd last digit, so that a second rounding is correct.
     ODD = "odd"
-    #: Up or down at random, with the probability that makes the mean exact.
+    #: Up or down at random, with probabilities that make the expected value exact.
     STOCHASTIC = "stochastic"
 
     @staticmethod
@@ -31,31 +31,31 @@ class Rounding(Enum):
         return Rounding.NEAREST, Rounding.CHOP
 
 
-#: How a sum of products is added up: from left to right, halves of halves, or in blocks.
+#: Order in which a sum of products is added: from left to right, pairwise, or in blocks.
 Order = Literal["left", "pairwise", "blocked"]
 
-#: Stochastic rounding compares so many random bits with the digits that are dropped.
+#: Number of random bits that stochastic rounding compares with the dropped digits.
 DRAW_BITS = 24
 
 
 class Limits(NamedTuple):
-    """How far the numbers of a format reach."""
+    """Range of a format."""
 
-    #: Exponent of the least normal number ``base**emin``, written d.dd... * base**e.
+    #: Exponent of the smallest normal number, ``base**emin``.
     emin: int
-    #: Whether numbers below it keep its spacing; else they become zero.
+    #: Whether numbers below it keep its spacing (subnormal numbers) or become zero.
     subnormal: bool
-    #: The largest and the lowest number.
+    #: The largest number and the most negative one.
     largest: Fraction
     lowest: Fraction
-    #: What happens beyond them: "raise", "saturate" or "wrap".
+    #: What happens to results beyond these: "raise", "saturate" or "wrap".
     overflow: str = "raise"
-    #: Whether larger numbers have the same spacing too: fixed point.
+    #: Whether all numbers have the same spacing: fixed point.
     fixed: bool = False
 
 
 class Rules(NamedTuple):
-    """Everything that decides the digits of a result."""
+    """All settings that determine the digits of a result."""
 
     base: int
     precision: int

@@ -9,12 +9,11 @@ for the type of the tag::
         for k in range(1, len(x)):
             store(fmt, x, k, multiply(fmt, f, load(fmt, x, k - 1)))
 
-Each operation rounds the exact result once, like :class:`gpbnb.arithmetic.kernels.exact.ExactKernel`, digit for digit;
-``DoubleDouble`` has relative errors below 2**-102. What a backend cannot hold never goes on unseen: in base 10 the
-operation raises OverflowError; a float64 that leaves 2**-960 ... 2**1023 becomes NaN, further operations keep it, and
-``store``, ``compare`` and :func:`matmul` raise OverflowError on it.
-
-Callers hand in numbers of the format only; :mod:`gpbnb.arithmetic.kernels.backends` makes the arrays.
+Each operation rounds the exact result once and agrees digit for digit with
+:class:`gpbnb.arithmetic.kernels.exact.ExactKernel`; ``DoubleDouble`` has relative errors below 2**-102. A number that
+leaves the range of its backend never passes unnoticed: in base 10 the operation raises OverflowError; a float64 outside
+2**-960 ... 2**1023 becomes NaN, later operations keep it, and ``store``, ``compare`` and :func:`matmul` raise
+OverflowError. Callers must pass numbers of the format; :mod:`gpbnb.arithmetic.kernels.backends` makes the arrays.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ def _only_compiled(name: str) -> TypeError:
     return TypeError(f"got a call of {name} from Python; needed one from a function compiled by numba")
 
 
-# -- operations of two numbers and one -------------------------------------------------------------
+# -- operations on two numbers and on one -------------------------------------------------------------
 
 
 def add(fmt: Any, a: Any, b: Any) -> Any:
@@ -85,12 +84,12 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
 
 
 def divide(fmt: Any, a: Any, b: Any) -> Any:
-    """fl(a / b); ZeroDivisionError for b = 0, but in ``Double``."""
+    """fl(a / b); raises ZeroDivisionError for b = 0, except in ``Double``."""
     raise _only_compiled("divide")
 
 
 def sqrt(fmt: Any, a: Any) -> Any:
-    """The square root, rounded; ValueError for a < 0, but in ``Double``."""
+    """fl(sqrt(a)); raises ValueError for a < 0, except in ``Double``."""
     raise _only_compiled("sqrt")
 
 
@@ -110,7 +109,7 @@ def absolute(fmt: Any, a: Any) -> Any:
 
 
 def compare(fmt: Any, a: Any, b: Any) -> Any:
-    """-1, 0 or 1 as a is less than, equal to or greater than b; OverflowError if one is beyond the backend."""
+    """-1, 0 or 1 if a is less than, equal to or greater than b; raises OverflowError if one is out of range."""
     raise _only_compiled("compare")
 
 
@@ -140,12 +139,12 @@ def load(fmt: Any, array: Any, index: Any) -> Any:
 
 
 def store(fmt: Any, array: Any, index: Any, x: Any) -> None:
-    """Put a number at an index; OverflowError if it is beyond the backend."""
+    """Store a number at an index; raises OverflowError if it is out of range."""
     raise _only_compiled("store")
 
 
 def put(fmt: Any, array: Any, index: Any, x: Any) -> None:
-    """As :func:`store`, unchecked."""
+    """Like :func:`store`, but unchecked."""
     raise _only_compiled("put")
 
 
@@ -155,30 +154,30 @@ def lost(fmt: Any, x: Any) -> Any:
 
 
 def _beyond_largest(fmt: Any, a: Any) -> Any:
-    """A number, or what becomes of it beyond the largest."""
+    """Return a number, or what the format replaces it with if it is beyond the largest."""
     raise _only_compiled("_beyond_largest")
 
 
 def multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     """fl(c + fl(a * b)), or fl(c + a * b) where the tag fuses.
 
-    Where the backend cannot hold the product, the sum says so if it matters there.
+    A product out of range is reported only if it affects the sum.
     """
     raise _only_compiled("multiply_add")
 
 
 def first_product(fmt: Any, a: Any, b: Any) -> Any:
-    """fl(a * b), the first term of a sum of products; exact where the tag keeps such sums longer."""
+    """The first product of a sum, rounded in the arithmetic in which the tag accumulates sums."""
     raise _only_compiled("first_product")
 
 
 def stored_sum(fmt: Any, x: Any) -> Any:
-    """A sum of products as it is stored: rounded, where the tag keeps such sums longer."""
+    """A sum of products as it is stored: rounded, if the tag accumulates sums in another arithmetic."""
     raise _only_compiled("stored_sum")
 
 
 def settle(fmt: Any, c: Any) -> None:
-    """Round a matrix of sums of products to what is stored; only ``Mixed`` has any to round."""
+    """Round a matrix of accumulated sums for storage; only ``Mixed`` needs this."""
     raise _only_compiled("settle")
 
 
@@ -296,7 +295,7 @@ def _negative(fmt: Any, a: Any) -> Any:
 
 @overload(_beyond_largest, strict=False, jit_options=_INLINE)
 def _overloaded_beyond_largest(fmt: Any, a: Any) -> Any:
-    # A fixed-point format has one negative number more.
+    # A fixed-point format has one more negative number than positive ones.
     if _tag(fmt) is Limited:
         return lambda fmt, a: fmt.over if a > fmt.largest else a
     if _tag(fmt) is Mixed:
@@ -391,7 +390,7 @@ def _overloaded_settle(fmt: Any, c: Any) -> Any:
 
 
 # -- arrays ------------------------------------------------------------------------------------------
-# A pair of arrays, (significands, exponents) or (high, low), serves as well as one with a last axis of two.
+# A pair of arrays, (significands, exponents) or (high, low), works as well as one array with a last axis of two.
 
 
 @overload(load, strict=False, jit_options=_INLINE)
@@ -467,10 +466,10 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
 
 @inner
 def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a b, each entry the :func:`dot` of a row and a column; c is neither a nor b.
+    """c = a b, each entry the :func:`dot` of a row and a column; c must be neither a nor b.
 
-    Row by row, and in a row one product after the other for all its entries at once: the order within each entry is
-    that of :func:`dot`.
+    The loops take one row of c at a time and add one product to each of its entries; within an entry, the order is that
+    of :func:`dot`.
     """
     for i in range(a.shape[0]):
         if a.shape[1] == 0:
@@ -489,7 +488,7 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @inner
 def check(fmt: Any, c: Any) -> None:
-    """Settle the matrix c; OverflowError if a number in it has left the range of its backend."""
+    """Settle the matrix c; raises OverflowError if an entry has left the range of its backend."""
     settle(fmt, c)
     gone = False
     for i in range(c.shape[0]):

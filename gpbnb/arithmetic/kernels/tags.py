@@ -1,6 +1,6 @@
-"""What tells a compiled kernel in which arithmetic to work: a tag, on whose type numba specialises.
+"""Tags that tell a compiled loop which arithmetic to use; numba compiles the loop for the type of its tag.
 
-No kernel is needed to make one, and importing this is light.
+Importing this module is fast, because it needs no compiled code.
 """
 
 from __future__ import annotations
@@ -11,28 +11,28 @@ LARGEST_SHORT = 8  # precision of ShortDecimal
 
 
 class Binary(NamedTuple):
-    """Base 2, precision 1 to 53; a number is a float64, an array float64 (...)."""
+    """Base 2, precision 1 to 53; a number is a float64, an array is float64 (...)."""
 
     precision: int
     nearest: bool
 
 
 class Hexadecimal(NamedTuple):
-    """Base 16, precision 1 to 13; a number is a float64, an array float64 (...)."""
+    """Base 16, precision 1 to 13; a number is a float64, an array is float64 (...)."""
 
     precision: int
     nearest: bool
 
 
 class Decimal(NamedTuple):
-    """Base 10, precision 1 to 18; a number is ``(significand, exponent)``, an array int64 (..., 2)."""
+    """Base 10, precision 1 to 18; a number is ``(significand, exponent)``, an array is int64 (..., 2)."""
 
     precision: int
     nearest: bool
 
 
 class ShortDecimal(NamedTuple):
-    """Base 10, precision 1 to 8; the same numbers as those of ``Decimal``, computed faster."""
+    """Base 10, precision 1 to 8: the same numbers as ``Decimal``, computed faster."""
 
     precision: int
     nearest: bool
@@ -43,7 +43,7 @@ class Double(NamedTuple):
 
 
 class DoubleDouble(NamedTuple):
-    """The reference: ``(high, low)`` of float64, relative error of one operation below 2**-102; float64 (..., 2)."""
+    """The reference: pairs ``(high, low)`` of float64, relative errors below 2**-102; an array is float64 (..., 2)."""
 
 
 class Two(NamedTuple):
@@ -55,11 +55,11 @@ class Sixteen(NamedTuple):
 
 
 class Away(NamedTuple):
-    """To nearest, half away from zero."""
+    """To nearest, ties away from zero."""
 
 
 class Even(NamedTuple):
-    """To nearest, half to the even last digit."""
+    """To nearest, ties to the even last digit."""
 
 
 class Zero(NamedTuple):
@@ -75,11 +75,11 @@ class Down(NamedTuple):
 
 
 class Odd(NamedTuple):
-    """Inexact results to the odd last digit."""
+    """Inexact results go to the neighbour with an odd last digit."""
 
 
 class Random(NamedTuple):
-    """Stochastic rounding; the array holds the seed and how many numbers have been drawn."""
+    """Stochastic rounding; the array holds the seed and the count of random numbers drawn."""
 
     state: Any  # (2,) uint64
 
@@ -93,58 +93,58 @@ class Fused(NamedTuple):
 
 
 class Pairwise(NamedTuple):
-    """The sum of the first half of the products, rounded down, is added to that of the second, and so on in each."""
+    """Products are summed in two halves, and each half likewise; the first half has floor(n / 2) products."""
 
 
 class Blocked(NamedTuple):
-    """Products are summed from left to right in blocks, and so are the sums of the blocks."""
+    """Products are summed from left to right within blocks, then the sums of the blocks from left to right."""
 
     block: int
     products: Any  # Separate or Fused
 
 
 class Limited(NamedTuple):
-    """Bases 2 and 16 with any rounding mode, and with a range; a number is a float64, an array float64 (...)."""
+    """Bases 2 and 16 with any rounding mode and a limited range; a number is a float64, an array is float64 (...)."""
 
     digits: Any  # Two or Sixteen
     mode: Any
     sums: Any  # Separate, Fused, Pairwise or Blocked
     precision: int
-    gradual: float  # numbers below it have the spacing of those just above; 0 without subnormal numbers
-    least: float  # results below it, but an exact zero, become `below`
+    gradual: float  # smaller numbers keep the spacing just above it; 0 without subnormal numbers
+    least: float  # smaller magnitudes, except an exact zero, become `below`
     below: float
-    lowest: float  # results below it become `under`, those above the largest `over`; NaN is overflow
+    lowest: float  # results below it become `under`, results above `largest` become `over`; NaN marks overflow
     largest: float
     under: float
     over: float
 
 
 class Hardware32(NamedTuple):
-    """IEEE binary32, ties to even, with its range, computed by the machine; numbers as float64."""
+    """IEEE binary32 with its range and ties to even, computed by the machine; numbers are stored as float64."""
 
 
 class Hardware64(NamedTuple):
-    """IEEE binary64, ties to even, with its range, computed by the machine."""
+    """IEEE binary64 with its range and ties to even, computed by the machine."""
 
 
 class Mixed(NamedTuple):
-    """Numbers of one arithmetic, whose sums of products are kept in another until they are stored; single float64."""
+    """Numbers in one arithmetic whose sums of products are accumulated in another; both are single float64."""
 
     stored: Any
     sums: Any
 
 
 class LimitedDecimal(NamedTuple):
-    """Base 10, precision 1 to 18, with any rounding mode but the random one, and a range; numbers as of ``Decimal``."""
+    """Base 10, precision 1 to 18, any rounding mode except random, and a limited range; numbers as in ``Decimal``."""
 
     mode: Any
     precision: int
-    least: int  # exponent of the last digit of the least normal number
-    largest: int  # and of the largest
-    flush: bool  # whether numbers below become zero; else they are beyond the backend
+    least: int  # exponent of the last digit of the smallest normal number
+    largest: int  # exponent of the last digit of the largest number
+    flush: bool  # whether smaller numbers become zero; otherwise they are out of range
 
 
-FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Mixed)  # whose numbers are single float64
+FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Mixed)  # numbers are single float64
 PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
 
 Tag = (

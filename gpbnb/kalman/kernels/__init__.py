@@ -1,1 +1,1 @@
-"""Compiled loops of the filter, its simulation and its contraction bound, written once for every arithmetic."""
+"""Compiled loops for the filter, its simulation and its contraction bound, written once for every arithmetic."""

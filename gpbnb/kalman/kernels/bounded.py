@@ -1,7 +1,7 @@
-"""Compiled: the contraction bound of steps that a run has taken, each repeated in double-double.
+"""Compiled comparison of a run with its steps repeated in double-double, for the contraction bound.
 
-The long functions do not depend on the format of the run: what it computed comes as double-double numbers. So they
-are compiled once, not once for each arithmetic.
+The long functions do not depend on the format of the run, because its results are converted to double-double first. So
+they are compiled once, not once for each arithmetic.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 
 def widened(fmt: Any, a: Any) -> Any:
-    """A number of a format as a double-double: exact in base 2 and 16; within four roundings in base 10."""
+    """Convert a number to double-double: exactly in bases 2 and 16, within four roundings in base 10."""
     raise TypeError("got a call of widened from Python; needed one from a function compiled by numba")
 
 
@@ -64,7 +64,7 @@ def _overloaded_widened(fmt: Any, a: Any) -> Any:
 
 @compiled
 def widen(fmt: Any, packed: Any, wide: Any) -> None:
-    """Convert numbers of a format, (k, n, m) as it packs them, to double-double, (k, n, m, 2)."""
+    """Convert the packed numbers of a format, (k, n, m), to double-double, (k, n, m, 2)."""
     for k in range(wide.shape[0]):
         for i in range(wide.shape[1]):
             for j in range(wide.shape[2]):
@@ -73,7 +73,7 @@ def widen(fmt: Any, packed: Any, wide: Any) -> None:
 
 @compiled
 def symmetric_parts(form: int, given: Any, covariances: Any) -> None:
-    """The symmetric parts of covariances, (k, n, n, 2), or what their factors stand for."""
+    """Symmetric parts of covariances, (k, n, n, 2); in the UD form, the covariances that the factors represent."""
     exactly, n = DoubleDouble(), given.shape[1]
     U, UD = np.empty((n, n, 2)), np.empty((n, n, 2))
     half = (0.5, 0.0)
@@ -97,7 +97,7 @@ def symmetric_parts(form: int, given: Any, covariances: Any) -> None:
 
 @compiled
 def whole_gain(form: int, K: Any, H: Any, UR: Any, c: Any) -> None:
-    """c = the gain of a step; of UD, from those of one measurement after the other."""
+    """c = the gain of a step; in the UD form, combined from the gains of its single measurements."""
     n, m = K.shape[0], K.shape[1]
     exactly = DoubleDouble()
     copy(exactly, K, c)
@@ -123,17 +123,17 @@ def whole_gain(form: int, K: Any, H: Any, UR: Any, c: Any) -> None:
 
 @compiled
 def residuals(exact_model: Any, exact_z: Any, first: int, x: Any, P: Any, repeated: Any, out: Any) -> None:
-    """What enters the contraction bound of steps that were repeated in double-double from where a run stood.
+    """Residuals for the contraction bound: compare each step of a run with its repetition in double-double.
 
     Parameters
     ----------
     exact_model : the stored model in double-double, as ``Run.matrices``.
     exact_z : (steps, m, 1, 2), the measurements.
-    first : how many steps were taken before these.
+    first : number of steps taken before these.
     x, P : (steps + 1, n, 1, 2) and (steps + 1, n, n, 2), states and symmetric covariances of the run.
-    repeated : states and covariances of each step, repeated; the covariances are made symmetric.
-    out : of each step, in float64: the innovation (m,), and what the run's state and covariance have too much, (n,)
-        and (n, n).
+    repeated : states and covariances after each repeated step; the covariances are symmetrized in place.
+    out : for each step, in float64: the innovation (m,), and the run's state and covariance minus the repeated ones,
+        (n,) and (n, n).
     """
     exactly, half = DoubleDouble(), (0.5, 0.0)
     xe, Pe = repeated

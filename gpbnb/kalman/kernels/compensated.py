@@ -1,4 +1,4 @@
-"""Compiled: the update of the state by compensated (Kahan) summation."""
+"""Compiled update of the state by compensated (Kahan) summation."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from gpbnb.arithmetic.kernels.matrices import copy, difference, matrix_sum, prod
 def compensated_update(
     fmt: Any, increment: Any, h: Any, K: Any, z: Any, x: Any, carried: Any, d: Any, u: Any, y: Any, g: Any
 ) -> None:
-    """Add (Phi - I) x + K (z - H Phi x) to x, and keep what the addition rounded away for the next step.
+    """Add (Phi - I) x + K (z - H Phi x) to x, and carry the rounding error of the addition to the next step.
 
     Parameters
     ----------
     increment : Phi - I, rounded.
-    carried : what the estimate has too much, from the step before and for the next.
-    d, u, y, g : workspaces of the sizes of x, x, z and z.
+    carried : rounding error of the estimate, from the previous step and for the next.
+    d, u, y, g : workspaces with the shapes of x, x, z and z.
     """
     product(fmt, increment, x, d)
     matrix_sum(fmt, x, d, u)

@@ -1,4 +1,4 @@
-r"""Compiled: the contraction bound over one step; :mod:`gpbnb.kalman.contraction` states and explains it.
+r"""Compiled contraction bound over one step; :mod:`gpbnb.kalman.contraction` states and explains it.
 
 The functions take and return float64 and include their own roundings in the bound.
 """
@@ -19,29 +19,29 @@ _U = 2.0**-53
 class Contraction(NamedTuple):
     r"""The bound after a step: :math:`\|e_k\|_k \le \eta`, :math:`\|L_k^{-1}E_kL_k^{-T}\|_F \le \zeta`.
 
-    Infinite where nothing can be said: the error of the covariance is too large for the gain to be known.
+    It is infinite if the error of the covariance is too large to bound the error of the gain.
     """
 
-    #: (n, n), the weights, a lower triangle.
+    #: (n, n), the weights, lower triangular.
     L: NDArray[np.float64]
     #: bounds the error of the state, in standard deviations.
     eta: float
-    #: bounds the error of the covariance, relative to it.
+    #: bounds the relative error of the covariance.
     zeta: float
     #: bounds the norm of :math:`A_k`, at most about 1.
     alpha: float
-    #: (m,), bounds what the error of the covariance does to each column of the gain.
+    #: (m,), bounds the effect of the covariance error on each column of the gain.
     gain: NDArray[np.float64]
 
 
 @compiled
 def contraction_start(P: Any, de: Any, dE: Any) -> Any:
-    """Begin the bound.
+    """Start the bound at the initial state and covariance.
 
     Parameters
     ----------
-    P : (n, n), first covariance, for the weights.
-    de, dE : (n,) and (n, n), componentwise bounds of the errors of the first state and covariance; zero if exact.
+    P : (n, n), initial covariance, which defines the weights.
+    de, dE : (n,) and (n, n), componentwise bounds on the errors of the initial state and covariance; zero if exact.
 
     Returns
     -------
@@ -74,22 +74,22 @@ def contraction_step(
     dK: Any,
     dinnovation: Any,
 ) -> Any:
-    r"""Take the bound over one step.
+    r"""Propagate the bound through one step.
 
     .. math:: \zeta_k = \|T_k\|_k + \frac{\alpha^2\zeta}{1-g\zeta}, \qquad
         \eta_k = \|q_k\|_k + \frac{\alpha\,(\eta + \|y_k\|\zeta)}{1-g\zeta}, \qquad g\zeta < 1,
 
     with :math:`\alpha = \|L_k^{-1}A_kL_{k-1}\|_2`, :math:`g = \|L_{k-1}^TG_kL_{k-1}\|`,
-    :math:`\|y_k\| = \|L_{k-1}^Ty_k\|`. The weights :math:`L_kL_k^T` go on by Joseph's form with the gain K.
+    :math:`\|y_k\| = \|L_{k-1}^Ty_k\|`. The weights :math:`L_kL_k^T` follow Joseph's form with the gain K.
 
     Parameters
     ----------
-    before : the bound after the step before, Contraction.
+    before : Contraction, the bound after the previous step.
     Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model, nearest float64.
-    K (n, m), S (m, m), innovation (m,) : gain K°, innovation covariance S° and ν̂ of the exact step from what the
-        program had, nearest float64 of a double-double evaluation.
-    q (n,), T (n, n) : residuals of the step, program minus exact step, subtracted before they become float64.
-    dq, dT, dK, dinnovation : componentwise bounds of the errors of that evaluation, of :func:`evaluation_errors`.
+    K (n, m), S (m, m), innovation (m,) : gain K°, innovation covariance S° and innovation ν̂ of the exact step from
+        the program's values, evaluated in double-double and rounded to float64.
+    q (n,), T (n, n) : residuals of the step, program minus exact step, subtracted in double-double.
+    dq, dT, dK, dinnovation : componentwise bounds on the errors of that evaluation, from :func:`evaluation_errors`.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def contraction_step(
     new = _weights((W + W.T) / 2)
     Y, delta = _inverse(new)
     aY = np.abs(Y)
-    # What A, AL and YAL may be off: their roundings, and the error of K.
+    # Bounds the errors of A, AL and YAL: their roundings, and the error of K.
     spread = _times(aPhi + _times(aK, _times(aH, aPhi)), aL) * many + _times(dK, _times(aH, _times(aPhi, aL)))
     alpha = (_norm2(_times(Y, AL)) + _norm(_times(aY, spread))) / (1 - delta)
 
@@ -138,13 +138,14 @@ def contraction_step(
 def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
     r"""Bound the errors of the evaluation of one step, componentwise.
 
-    It is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`,
-    :math:`K = P_pH^TS^{-1}` by Cholesky or by elimination without exchange of rows, the inverse formed or not, P by
-    :math:`(I-KH)P_p` or Joseph's form, its two halves averaged; sums in any order.
+    The step is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`,
+    :math:`K = P_pH^TS^{-1}`, and P by :math:`(I-KH)P_p` or Joseph's form, made symmetric by averaging its two halves.
+    The bound holds for Cholesky and for elimination without row exchanges, whether or not the inverse of S is formed,
+    and for sums in any order.
 
     Parameters
     ----------
-    Phi, H, Q, R : the model. x (n,), P (n, n) : where the step starts. z (m,) : measurement.
+    Phi, H, Q, R : the model. x (n,), P (n, n) : state and covariance before the step. z (m,) : measurement.
     K (n, m), S (m, m) : gain and innovation covariance of this step.
     unit : unit roundoff of one operation of the evaluation, 2**-102 for :mod:`gpbnb.arithmetic.kernels.doubledouble`.
 
@@ -176,7 +177,7 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
 
 @compiled
 def state_error_bound(bound: Any) -> Any:
-    r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,), in its units."""
+    r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,)."""
     rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
     return rows * bound.eta
 
@@ -205,7 +206,7 @@ def gain_error_bound(bound: Any, K: Any, used: Any, dK: Any) -> Any:
 
 @compiled
 def _many(n: int, m: int) -> float:
-    """Bounds the relative error, by magnitudes, of what a step computes in float64."""
+    """Bound on the error of one step's float64 computations, relative to the sums of magnitudes."""
     return (16 * (n + m) + 64) * _U
 
 
@@ -233,9 +234,9 @@ def _norm(A: Any) -> float:
 
 @compiled
 def _norm2(X: Any) -> float:
-    """Upper bound of the largest singular value: mu - X'X proved positive by elimination, mu found by bisection.
+    """Upper bound on the largest singular value: bisection finds a mu for which elimination shows mu - X'X positive.
 
-    Elimination that runs through proves a matrix of trace t to be above -2 (n + 2) u t (Rump 2006).
+    If elimination succeeds, all eigenvalues of a matrix with trace t are above -2 (n + 2) u t (Rump 2006).
     """
     n = X.shape[1]
     B = _times(X.T, X)
@@ -245,7 +246,7 @@ def _norm2(X: Any) -> float:
     if not trace < np.inf:
         return np.inf
     low, high = trace / n * 0.999, trace
-    while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # what matters is how far it is from 1
+    while high - low > max(1e-3 * abs(1 - high), 1e-11) * low + 1e-300:  # only its distance from 1 matters
         middle = low + (high - low) / 2
         if not low < middle < high:
             break
@@ -274,7 +275,7 @@ def _is_positive(mu: float, B: Any) -> bool:
 
 @compiled
 def _weights(W: Any) -> Any:
-    """A nonsingular lower factor of about W: any will do, so a pivot that is lost is replaced by a small one."""
+    """A nonsingular lower factor of about W; any such factor is valid, so lost pivots are replaced by small ones."""
     n = len(W)
     L = np.zeros((n, n))
     for j in range(n):
@@ -295,7 +296,7 @@ def _weights(W: Any) -> Any:
 
 @compiled
 def _inverse(L: Any) -> Any:
-    """Y near the inverse of a lower matrix, and a bound of the Frobenius norm of YL - I."""
+    """Approximate inverse Y of a lower triangular L, and a bound on the Frobenius norm of YL - I."""
     n = len(L)
     Y = np.zeros((n, n))
     for j in range(n):
@@ -310,7 +311,7 @@ def _inverse(L: Any) -> Any:
 
 @compiled
 def _inverse_general(S: Any) -> Any:
-    """Inverse of S by elimination with pivoting, and a componentwise bound of its error; infinite if singular."""
+    """Inverse of S by elimination with pivoting, and a componentwise bound on its error, infinite if S is singular."""
     m = len(S)
     M, Y = S.copy(), np.eye(m)
     for k in range(m):
@@ -333,7 +334,8 @@ def _inverse_general(S: Any) -> Any:
                 for j in range(m):
                     M[i, j] -= factor * M[k, j]
                     Y[i, j] -= factor * Y[k, j]
-    # (I + E) S^-1 = Y with E = YS - I, so |S^-1 - Y| <= |E| |Y| / (1 - |E|), norms of rows and all.
+    # S^-1 - Y = -E (I + E)^-1 Y with E = YS - I. With e the largest row sum of |E|, each entry is at most e / (1 - e)
+    # times the sum of its column of |Y|.
     aY = np.abs(Y)
     E = np.abs(_times(Y, S) - np.eye(m)) + _many(m, m) * _times(aY, np.abs(S))
     largest = 0.0

@@ -1,7 +1,7 @@
-"""Compiled: products for the filter's step, which leave out factors of zero and leading factors of one.
+"""Compiled products for the filter's step, which skip factors of zero and leading factors of one.
 
-Products with zero or one and sums with zero are exact, so no digit changes. The inner loops run along rows, where
-numbers lie side by side in memory and the processor takes several at once.
+Products with zero or one and sums with zero are exact, so no digit changes. The inner loops run along rows, whose
+numbers are adjacent in memory, so that the processor handles several at once.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
 
 @inner
 def _is_moderate(a: Any) -> Any:
-    """Whether all numbers are zero or from 2**-400 to 2**400 in magnitude."""
+    """Whether all numbers are zero or between 2**-400 and 2**400 in magnitude."""
     least, largest = _LARGEST, np.int64(0)
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
@@ -46,14 +46,14 @@ def _is_moderate(a: Any) -> Any:
 
 
 def _short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-    """c = a b if the format is short and the numbers are moderate; returns whether it was."""
+    """c = a b if the format is short and the numbers are moderate; returns whether they are."""
     raise TypeError("got a call of _short_product from Python; needed one from a function compiled by numba")
 
 
 @overload(_short_product, strict=False)
 def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     def of_binary(fmt: Any, a: Any, b: Any, c: Any) -> Any:
-        # Up to 25 bits, a float64 result rounded again is right, and nothing leaves the range of float64: products are
+        # Up to 25 bits, rounding a float64 result again is correct. Nothing leaves the range of float64: products are
         # at least 2**-800, and sums are multiples of 2**-850. So no operation needs a check.
         if not fmt.nearest or fmt.precision > SAFE_TWICE or not _is_moderate(a) or not _is_moderate(b):
             return False
@@ -76,7 +76,7 @@ def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 @inner
 def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a b, each entry summed from left to right over the entries of a that are not zero; c is neither a nor b."""
+    """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
     if product_in_order(fmt, a, b, c):
         return
     for i in range(a.shape[0]):
@@ -103,9 +103,10 @@ def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @inner
 def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """As :func:`product_with_units`, with the same digits, column after column of a.
+    """Like :func:`product_with_units`, with the same digits, but one column of a at a time.
 
-    One row of c after another grows by a product; a processor computes them at once, as none waits for the last.
+    A column adds one product to each row of c; the processor computes several rows at once, because none waits for
+    another.
     """
     if _short_product(fmt, a, b, c) or product_in_order(fmt, a, b, c):
         return
@@ -123,7 +124,7 @@ def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
 
 @inner
 def add_transposed(fmt: Any, a: Any, c: Any) -> None:
-    """c = c + a', over the entries of a that are not zero."""
+    """c = c + a', skipping the zero entries of a."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
             x = load(fmt, a, (i, j))

@@ -1,4 +1,4 @@
-"""Compiled: estimates of many records as float64, and the largest of their errors."""
+"""Compiled conversion of many records' estimates to float64, and their largest errors."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _POWERS = np.array([10.0**k for k in range(23)])  # exact
 
 @compiled
 def pairs_as_floats(pairs: Any, out: Any) -> None:
-    """Decimal numbers, (steps, n, records, 2), as float64, with an error of two roundings at most."""
+    """Convert decimal numbers, (steps, n, records, 2), to float64 with at most two roundings."""
     for k in range(out.shape[0]):
         for i in range(out.shape[1]):
             for j in range(out.shape[2]):
@@ -26,7 +26,7 @@ def pairs_as_floats(pairs: Any, out: Any) -> None:
 
 @compiled
 def update_largest(computed: Any, true: Any, largest: Any) -> None:
-    """Raise `largest` (states, records) to the largest difference of any step; NaN counts as infinite."""
+    """Raise `largest` (states, records) to the largest difference in any step; NaN counts as infinite."""
     for step in range(computed.shape[0]):
         for i in range(largest.shape[0]):
             for j in range(largest.shape[1]):

@@ -1,4 +1,4 @@
-"""Compiled: the true state moves and is measured."""
+"""Compiled simulation of the true state and its measurements."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpbnb.arithmetic.kernels.compiling import compiled
 
 @compiled
 def measured(Phi: Any, H: Any, process: Any, noise: Any, first: int, w: Any, v: Any, x: Any, z: Any) -> None:
-    """Move the truth x by Phi and roots of Q times w, and measure it by H and roots of R times v."""
+    """Propagate the true state x by Phi plus a root of Q times w, and measure it by H plus a root of R times v."""
     n, m = x.shape[0], z.shape[1]
     u = np.empty(n)
     for step in range(z.shape[0]):

@@ -1,6 +1,6 @@
-"""Compiled: one step of the filter in each form, and a run of many steps.
+"""Compiled filter steps in each form, and runs of many steps.
 
-Each function serves every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar` and releases the interpreter's lock.
+Each function works in every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar` and releases the interpreter's lock.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from gpbnb.kalman.kernels.products import add_transposed, product_by_columns, pr
 
 _HUNG, _HUNG_SECOND_GAIN, _JOSEPH = (int(each) for each in (Form.HUNG, Form.HUNG_SECOND_GAIN, Form.JOSEPH))
 
-#: Entries of the status of a run: steps done, the next checkpoint, the first step with a variance or pivot that is
-#: not positive, and the step that a division by zero ended.
+#: Entries of a run's status: number of steps done, index of the next checkpoint, first step with a variance or pivot
+#: that is not positive, and step at which a division by zero ended the run.
 DONE, NEXT_CHECKPOINT, INDEFINITE, STOPPED = range(4)
 
-#: What a step computes, in this order; a run that overflows says where.
+#: Quantities that a step computes, in this order; an overflow error names one of them.
 QUANTITIES = (
     "the predicted covariance",
     "the innovation covariance",
@@ -59,7 +59,7 @@ _PREDICTED, _OF_INNOVATION, _INVERSE, _GAIN, _COVARIANCE, _ESTIMATE, _FACTORS = 
 
 @inner
 def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: Any) -> Any:
-    """Thornton's modified weighted Gram-Schmidt: the factors of Phi U D U' Phi' + UQ DQ UQ', in place of U."""
+    """Thornton's modified weighted Gram-Schmidt: overwrite U with the factors of Phi U D U' Phi' + UQ DQ UQ'."""
     n = U.shape[0]
     definite = True
     for i in range(n):
@@ -105,7 +105,7 @@ def _predict_ud(fmt: Any, Phi: Any, UQ: Any, U: Any, W: Any, D: Any, C: Any, T: 
 def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any, F: Any, G: Any) -> Any:
     """Bierman's update by one measurement z of h' x with variance r; its gain becomes column i of K.
 
-    Returns 1 if all variances are positive, -1 if one is not, 0 if a division by zero ended it.
+    Returns 1 if all variances are positive, -1 if one is not, and 0 if a division by zero ended the update.
     """
     n = x.shape[0]
     answer = 1
@@ -153,7 +153,7 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
 
 @inner
 def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
-    """c = the inverse of U times a, by back substitution, U being that of R = U D U'."""
+    """c = the inverse of U times a, by back substitution, where R = U D U'."""
     for j in range(a.shape[1]):
         for i in range(a.shape[0] - 1, -1, -1):
             s = load(fmt, a, (i, j))
@@ -166,7 +166,7 @@ def decorrelate(fmt: Any, UR: Any, a: Any, c: Any) -> None:
 
 @compiled
 def invert_each(fmt: Any, R: Any, RI: Any) -> Any:
-    """RI = the inverse of each R; whether all pivots are positive."""
+    """RI = the inverse of each R; returns whether all pivots are positive."""
     S = np.empty_like(R[0])
     definite = True
     for k in range(R.shape[0]):
@@ -177,7 +177,7 @@ def invert_each(fmt: Any, R: Any, RI: Any) -> Any:
 
 @compiled
 def factor_each(fmt: Any, a: Any, U: Any) -> Any:
-    """U = the factors of each a; whether all come out definite."""
+    """U = the factors of each a; returns whether all are definite."""
     T = np.empty_like(a[0])
     definite = True
     for k in range(a.shape[0]):
@@ -188,7 +188,7 @@ def factor_each(fmt: Any, a: Any, U: Any) -> Any:
 
 @inner
 def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F: Any, W: Any) -> None:
-    """W = I - K H; KT becomes K', and T and F are used up."""
+    """W = I - K H; KT becomes K', and T and F are overwritten."""
     transpose(fmt, K, KT)
     product_with_units(fmt, hT, KT, T)
     transpose(fmt, T, F)
@@ -197,9 +197,9 @@ def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F:
 
 @inner(inline="always")
 def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
-    """Take step k + 1, from x and P to x and P, with the measurement z; the gain is left in the workspace.
+    """Take step k + 1 with the measurement z, and overwrite x and P; the gain stays in the workspace.
 
-    Returns 1 if all variances and pivots are positive, -1 if one is not, 0 if one is zero: x is then void.
+    Returns 1 if all variances and pivots are positive, -1 if one is not, and 0 if a pivot is zero; x is then invalid.
     """
     Phi, PhiT, H, HT, Q, R, RI, identity, increment, carried, place = model
     V, T, W, F, WT, K, PHt, B, KT, HD, S, SI, pivots, y, g, u, v = work
@@ -286,16 +286,16 @@ def _record_step(fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, kept: An
 def advance(
     fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, repeated: Any, kept: Any, notes: Any
 ) -> None:
-    """Take one step per row of z, in any form but UD.
+    """Take one step per row of z, in any form except UD.
 
     Parameters
     ----------
-    first : how many steps were taken before.
+    first : number of steps taken before.
     x, P : state and covariance, before the first step and after the last.
-    repeated : None of each, or where each step is to begin, and then the innovation covariance of each: (steps, n, 1),
-        (steps, n, n) and (steps, m, m).
-    kept : the checkpoint steps; where to save state, gain and covariance at them.
-    notes : the status of the run.
+    repeated : to start every step from a given state (steps, n, 1) and covariance (steps, n, n), both of them, and an
+        array (steps, m, m) for the innovation covariances; otherwise empty arrays.
+    kept : checkpoint steps, and arrays for the state, gain and covariance at each of them.
+    notes : status of the run.
     """
     if z.shape[0] == 0:
         return
@@ -318,7 +318,7 @@ def advance(
 
 @compiled
 def advance_ud(fmt: Any, model: Any, z: Any, first: int, x: Any, U: Any, kept: Any, notes: Any) -> None:
-    """Take one step per row of z in the UD form, as :func:`advance`; U holds the factors of the covariance."""
+    """Take one step per row of z in the UD form, like :func:`advance`; U holds the factors of the covariance."""
     if z.shape[0] == 0:
         return
     Phi, H, HT, UQ, UR, place = model
