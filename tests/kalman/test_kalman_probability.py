@@ -9,8 +9,8 @@ import pytest
 from scipy import stats
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import probability, threshold
-from gpbnb.kalman.probability import Needed, interval, needed, quantile_limit, records_needed, shares
+from gpbnb.kalman import mission_runs, probability, threshold
+from gpbnb.kalman.probability import Needed, Share, interval, needed, quantile_limit, records_needed, shares
 from gpbnb.sweeps import Table
 
 
@@ -82,6 +82,21 @@ def test_a_precision_qualifies_only_if_all_larger_ones_do():
     assert needed(shares(Table(threshold.COLUMNS, tuple(more), {}))) == Needed(33, 33, 33)
     with pytest.raises(ValueError, match="got formats of 2 kinds"):
         needed([few[0], few[0]._replace(form="innovation")])
+
+
+@pytest.mark.parametrize("sweep", [threshold.SWEEP, mission_runs.SWEEP], ids=lambda each: each.name)
+def test_every_answer_is_shown_from_both_sides(sweep):
+    groups: dict[tuple[object, ...], list[Share]] = {}
+    for share in shares(sweep.load()):
+        if share.records >= 30:  # settings with fewer records only show how the precision changes
+            fmt = share.fmt
+            groups.setdefault((share.setting, share.states, share.form, fmt.base, fmt.rounding), []).append(share)
+    assert len(groups) >= 2
+    for group in groups.values():
+        by_precision = {share.fmt.precision: share for share in group}
+        answer = needed(group).observed
+        assert answer is not None
+        assert by_precision[answer - 1].high < 0.99
 
 
 def test_what_is_stored_answers():
