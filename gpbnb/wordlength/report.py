@@ -191,7 +191,7 @@ body { font: 16px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 2rem auto
 h1 { font-size: 1.6rem; line-height: 1.25 } h2 { font-size: 1.2rem; margin-top: 2rem }
 table { border-collapse: collapse; width: 100% } th, td { text-align: left; padding: .25rem .8rem .25rem 0;
   vertical-align: top; border-bottom: 1px solid var(--line); overflow-wrap: break-word }
-td:first-child { min-width: 6rem }
+td:first-child { min-width: 6rem } td:last-child { overflow-wrap: anywhere }
 pre { background: var(--soft); padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere; font-size: .85rem }
 svg { display: block; width: 100%; height: auto; fill: var(--text) }
 .legend { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; list-style: none; font-size: .9rem }
@@ -240,7 +240,7 @@ def page(report: Report) -> str:
         body = [(str(i + 1), "not limited" if e is None else f"{e:.3g}") for i, e in enumerate(report.errors)]
         parts += ["<h2>Error of each state at the answer</h2>", _table(("state", "error / tolerance"), body)]
     if report.ranges:
-        ranges = [(name, f"2^{low}", f"2^{high}") for name, low, high in report.ranges]
+        ranges = [(name, _power(2, low), _power(2, high)) for name, low, high in report.ranges]
         parts += ["<h2>Range of the numbers</h2>", _table(("numbers", "smallest", "largest"), ranges)]
     about = "\n".join(f"{key}: {value}" for key, value in report.versions.items())
     parts += [
@@ -265,6 +265,13 @@ def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
     )
 
 
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def _power(base: int, exponent: int) -> str:
+    return f"{base}{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
 _COLOURS = 6  # of _STYLE, one a form
 _DASHES = (("", "solid"), ("7 3", "dashed"), ("2 3", "dotted"))  # one a basis
 
@@ -279,16 +286,16 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
     low, high = math.floor(min(0.0, *logs)), math.ceil(max(0.0, *logs))
 
     def place(t: float, log: float) -> tuple[float, float]:
-        return 60 + 560 * (t - left) / max(right - left, 1), 20 + 260 * (high - log) / max(high - low, 1)
+        return 60 + 560 * (t - left) / max(right - left, 1), 30 + 250 * (high - log) / max(high - low, 1)
 
     drawn = []
     for log in range(low, high + 1, max(1, (high - low) // 6)):
         _, y = place(left, log)
-        drawn.append(f'<text x="52" y="{y + 4:.1f}" text-anchor="end">1e{log}</text>')
+        drawn.append(f'<text x="52" y="{y + 4:.1f}" text-anchor="end">{_power(10, log)}</text>')
         drawn.append(f'<line x1="60" x2="620" y1="{y:.1f}" y2="{y:.1f}" stroke="var(--grid)"/>')
     for t in range(left, right + 1, max(1, (right - left) // 8)):
         x, _ = place(t, low)
-        drawn.append(f'<text x="{x:.1f}" y="298" text-anchor="middle">{t}</text>')
+        drawn.append(f'<text x="{x:.1f}" y="302" text-anchor="middle">{t}</text>')
     _, one = place(left, 0)
     drawn.append(f'<line x1="60" x2="620" y1="{one:.1f}" y2="{one:.1f}" stroke="var(--text)" stroke-dasharray="6 4"/>')
     legend = []
@@ -305,9 +312,10 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
         drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
         legend.append(f'<li><i style="border-top: .2rem {border} {colour}"></i>{html.escape(each.label)}</li>')
     return (
-        '<svg viewBox="0 0 640 330" role="img" aria-label="Error divided by tolerance, against precision; one line '
+        '<svg viewBox="0 0 640 336" role="img" aria-label="Error divided by tolerance, against precision; one line '
         f'for each form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
-        f'<text x="340" y="322" text-anchor="middle">{html.escape(unit)}</text></svg>'
+        '<text x="4" y="17">error / tolerance</text>'
+        f'<text x="340" y="329" text-anchor="middle">{html.escape(unit)}</text></svg>'
         f'<ul class="legend">{"".join(legend)}</ul>'
         "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance.</p>"
     )

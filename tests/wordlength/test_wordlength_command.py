@@ -68,6 +68,9 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
     for outside in ("http://", "https://", "<script", "<link", "src="):
         assert outside not in text
     assert "--tolerance 0.01,inf" in text
+    name, low, high = found["ranges"][0]
+    written = [f"2{''.join('⁻⁰¹²³⁴⁵⁶⁷⁸⁹'['-0123456789'.index(sign)] for sign in str(k))}" for k in (low, high)]
+    assert f"<td>{name}</td><td>{written[0]}</td><td>{written[1]}</td>" in text
     Elements(text)
 
 
