@@ -169,6 +169,15 @@ def test_without_a_cycle_the_error_is_that_of_the_step_times_their_number():
     assert found.size[1:] / found.step[1:] == pytest.approx([found.size[0]] * 2, rel=0.1)
 
 
+def test_every_term_of_the_bounds_with_three_bits():
+    """γ₂ is 1/3 and γ₃ 3/5: no term is small beside another."""
+    beta = Fraction(1, 8)
+    angle, product = 1 + beta, 1 + math.sqrt(2) * Fraction(1, 3)
+    assert theory.recursion_bound(3, beta) == pytest.approx(float((angle * product) ** 3 - 1), rel=1e-14)
+    assert theory.recursion_bound(5000, beta) == math.inf
+    assert theory.direct_bound(-0.75, beta) == float(Fraction(3, 4) * Fraction(3, 5) + beta)
+
+
 def test_the_bound_of_a_method():
     beta = Fraction(1, 10**12)
     assert theory.rotation_bound("recursion", 600.0, 1000)(beta) == theory.recursion_bound(1000, beta)
