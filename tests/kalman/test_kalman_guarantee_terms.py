@@ -204,38 +204,36 @@ def expected(program, fmt, C, offsets, Phi, HPhi, K, dK, limits, b, caps, unit, 
 
 
 def small_program() -> Program:
-    """Two states of which one result is used again; a value without a rounding, and a sum with zero."""
-    build = Builder(2, 1)
+    """Two states and two measurements; one result is used again, and one sum is with zero."""
+    build = Builder(2, 2)
     x, y = build.states
-    (z,) = build.inputs
+    z, other = build.inputs
     u = build.subtract(build.multiply(0, x), build.multiply(1, y))
-    v = build.add(build.multiply(2, u), build.multiply(3, z))
+    v = build.subtract(build.add(build.multiply(2, u), build.multiply(3, z)), build.multiply(7, other))
     w = build.add(build.multiply(4, y), build.multiply(5, x))  # the coefficient 5 is zero
-    return build.finish([build.add(u, v), build.subtract(v, build.multiply(6, w))], 7)
+    return build.finish([build.add(u, v), build.subtract(v, build.multiply(6, w))], 8)
 
 
-GENERIC = (
+GENERIC = (  # the first measurement has a limit of its own, the second that of the state and the innovation
     small_program(),
-    [F(3, 4), F(-5, 8), F(7, 16), F(3, 8), F(5, 4), F(0), F(2)],
-    [F(0), F(1, 64), F(0), F(1, 32), F(0), F(0), F(0)],
+    [F(3, 4), F(-5, 8), F(7, 16), F(3, 8), F(5, 4), F(0), F(2), F(-9, 8)],
+    [F(0), F(1, 64), F(0), F(1, 32), F(0), F(0), F(0), F(1, 16)],
     [[F(1, 2), F(-1, 4)], [F(1, 8), F(3, 4)]],
-    [[F(5, 8), F(-3, 8)]],
-    [[F(1, 4)], [F(5, 16)]],
-    [[F(1, 128)], [F(3, 256)]],
-    ([3.0, 5.0], [0.75], [2.5]),
+    [[F(5, 8), F(-3, 8)], [F(1, 4), F(1, 2)]],
+    [[F(1, 4), F(-7, 8)], [F(5, 16), F(3, 4)]],
+    [[F(1, 128), F(1, 64)], [F(3, 256), F(5, 512)]],
+    ([3.0, 5.0], [0.75, 0.5], [2.5, 9.0]),
     [F(1, 16), F(3, 32)],
 )
-TINY, HALF = F(1, 2**70), F(1, 2)
+TINY = F(1, 2**70)
 CANCELLING = (  # 1 - KH of the program is 2**-70, and K and Φ are those of the exact filter to the last digit
     innovation_program(1, 1),
-    [F(1), F(1), 1 - TINY],
+    [F(3), F(1, 2), 2 - 2 * TINY],
     [F(0)] * 3,
-    [[F(1)]],
-    [[F(1)]],
-    [[1 - TINY]],
+    [[F(3)]],
+    [[F(3, 2)]],
+    [[2 - 2 * TINY]],
     [[F(0)]],
-    ([1.0], [2.0**-60], [2.0**-75]),
-    [F(0)],
 )
 
 
@@ -266,8 +264,7 @@ def found_disturbances(monkeypatch, fmt, case, caps, unit, up):
 @pytest.mark.parametrize("cap", [np.inf, 0.5])
 @pytest.mark.parametrize("fmt", [FloatFormat(2, 7), FloatFormat(2, 5, Rounding.CHOP), FloatFormat(10, 3)], ids=str)
 def test_disturbances(monkeypatch, fmt: FloatFormat, cap: float) -> None:
-    caps = [cap] * len(GENERIC[0].operations)
-    found, exactly = found_disturbances(monkeypatch, fmt, GENERIC, caps, UNIT, UP)
+    found, exactly = found_disturbances(monkeypatch, fmt, GENERIC, [cap] * len(GENERIC[0].operations), UNIT, UP)
     for name, value in exactly.items():
         same(getattr(found, name)[0], value)
 
@@ -275,7 +272,7 @@ def test_disturbances(monkeypatch, fmt: FloatFormat, cap: float) -> None:
 @pytest.mark.parametrize("innovation", [2.0**-60, 4.0])
 def test_disturbances_where_everything_cancels(monkeypatch, innovation: float) -> None:
     """Of the state's part of the result 2**-70 is left, and nothing of what separates the program from the filter."""
-    case = (*CANCELLING[:7], ([1.0], [innovation], [2.0**-75]), [F(0)])
+    case = (*CANCELLING, ([1.0], [innovation], [2.0**-75]), [F(0)])
     caps, fmt = [np.inf] * len(case[0].operations), FloatFormat(2, 300)
     found, exactly = found_disturbances(monkeypatch, fmt, case, caps, F(1, 2**120), 1 + F(1, 2**30))
     for name in exactly.keys() - {"G"}:  # effects are float64; the slack makes up for their roundings
