@@ -225,14 +225,34 @@ GENERIC = (  # the first measurement has a limit of its own, the second that of 
     ([3.0, 5.0], [0.75, 0.5], [2.5, 9.0]),
     [F(1, 16), F(3, 32)],
 )
-TINY = F(1, 2**70)
-CANCELLING = (  # 1 - KH of the program is 2**-70, and K and Φ are those of the exact filter to the last digit
+TINY, LITTLE = F(1, 2**70), F(1, 2**30)
+
+
+def difference_program() -> Program:
+    """A state of which two multiples nearly cancel, times a coefficient."""
+    build = Builder(1, 1)
+    (x,), (z,) = build.states, build.inputs
+    d = build.subtract(build.multiply(0, x), build.multiply(1, x))
+    return build.finish([build.add(build.multiply(2, d), build.multiply(3, z))], 4)
+
+
+# Coefficients known within LITTLE show the size of what they multiply to the last digit, not only to the next power.
+INNOVATION = (  # 1 - KH of the program is 2**-70, and K and Φ are those of the exact filter to the last digit
     innovation_program(1, 1),
     [F(3), F(1, 2), 2 - 2 * TINY],
-    [F(0)] * 3,
+    [F(0), F(0), LITTLE],
     [[F(3)]],
     [[F(3, 2)]],
     [[2 - 2 * TINY]],
+    [[F(0)]],
+)
+DIFFERENCE = (
+    difference_program(),
+    [F(3), 3 - 3 * TINY, F(5, 4), F(1, 2)],
+    [F(0), F(0), LITTLE, LITTLE],
+    [[F(15, 4) * TINY]],
+    [[F(0)]],
+    [[F(1, 2)]],
     [[F(0)]],
 )
 
@@ -269,17 +289,24 @@ def test_disturbances(monkeypatch, fmt: FloatFormat, cap: float) -> None:
         same(getattr(found, name)[0], value)
 
 
-@pytest.mark.parametrize("innovation", [2.0**-60, 4.0])
-def test_disturbances_where_everything_cancels(monkeypatch, innovation: float) -> None:
-    """Of the state's part of the result 2**-70 is left, and nothing of what separates the program from the filter."""
-    case = (*CANCELLING, ([1.0], [innovation], [2.0**-75]), [F(0)])
+@pytest.mark.parametrize(
+    ("case", "within", "b"),
+    [
+        (INNOVATION, ([1.0], [2.0**-60], [2.0**-75]), 0.0),
+        (INNOVATION, ([1.0], [4.0], [2.0**-75]), 0.0),
+        (INNOVATION, ([1.0], [2.0**-60], [8.0]), 0.0),
+        (DIFFERENCE, ([1.0], [2.0**-75], [2.0**-75]), 0.0),
+        (DIFFERENCE, ([2.0**-30], [2.0**-75], [2.0**-75]), 1.0),
+    ],
+)
+def test_disturbances_where_everything_cancels(monkeypatch, case: Any, within: Any, b: float) -> None:
+    """Nothing is left of what separates the program from the filter, and 2**-70 of a result or of an operand."""
     caps, fmt = [np.inf] * len(case[0].operations), FloatFormat(2, 300)
-    found, exactly = found_disturbances(monkeypatch, fmt, case, caps, F(1, 2**120), 1 + F(1, 2**30))
+    found, exactly = found_disturbances(monkeypatch, fmt, (*case, within, [F(b)]), caps, F(1, 2**120), 1 + F(1, 2**30))
     for name in exactly.keys() - {"G"}:  # effects are float64; the slack makes up for their roundings
         same(getattr(found, name)[0], exactly[name])
     assert exactly["loop"] == 0
     assert exactly["gain"] == 0
-    assert F(1, 2**84) < exactly["slack"][0] < F(1, 2**80)
 
 
 # -- sums over all earlier steps --------------------------------------------------------------------------------------
