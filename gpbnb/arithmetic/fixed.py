@@ -134,19 +134,7 @@ class FixedFormat:
     def run_tag(
         self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
     ) -> Tag:
-        """Return the arithmetic for one compiled loop; random roundings start with the first number of the seed.
-
-        Parameters
-        ----------
-        fused : whether sums of products use fused multiply-add.
-        sums : the format that keeps sums of products until they are stored; by default this one.
-        order, block : of the additions in sums of products, as of :func:`gpbnb.arithmetic.linalg.matmul`.
-
-        Raises
-        ------
-        ValueError : the format has no compiled loops, or none with fused multiply-add, with sums in `sums`, or in this
-            order; an unknown order.
-        """
+        """Return the arithmetic for one compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
         if sums is not None:
             return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
         return run_tag(self.backend, self._rules, fused, order, block)
