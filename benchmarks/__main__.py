@@ -27,7 +27,7 @@ def in_units(seconds: float) -> str:
 
 def cells(row: Row) -> tuple[str, ...]:
     """What the tables show of a row."""
-    least = "" if row.least is None else f"≥ {row.least:g}×"
+    least = "" if row.least is None else f"≥ {row.least:.3g}×"
     return row.library, in_units(row.seconds), amount(row.ratio), least, row.reached
 
 

@@ -49,6 +49,7 @@ def in_space(fig: Figure, axes: Sequence[Axes]) -> list[Any]:
         new: Any = fig.add_subplot(1, len(axes), column, projection="3d")
         new.set_box_aspect((1, 1, 1), zoom=1.25)
         new.set_axis_off()
+        new.patch.set_visible(False)  # it would be black in dark mode
         solid.append(new)
     return solid
 

@@ -176,9 +176,11 @@ def headline(found: Answers, ax: Axes) -> list[Artist]:
     artists.append(_beside(ax, "tolerance: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
     size = float(report_bounds.YEAR_SIZE)
     artists.append(ax.axhline(size, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "as large as the drift in a year", (16.9, size), (0, -13), REFERENCE, ha="right"))
+    artists.append(_beside(ax, "the drift in a year", (16.4, size), (0, -13), REFERENCE, ha="right"))
     artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=REFUTED, ms=11, mew=1.5)
-    artists += [_beside(ax, f"{place} printed", (place, size), (9, 3), REFUTED) for place in found.printed]
+    artists += [
+        _beside(ax, f"{place} printed", (place, size), (-6, 9), REFUTED, ha="center") for place in found.printed
+    ]
     ax.set_yscale("log")
     ax.set_ylim(1e-11, 1e23)
     ax.set_yticks(10.0 ** np.arange(-8, 24, 8))
