@@ -196,10 +196,10 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
     n = np.geomspace(1, max(run.n[-1] for run in runs), 200)
     unit = runs[0].process.sigma / runs[0].f_c
     walk = n * float(theory.walk_factor(mu))
-    for run, marker, colour, up in zip(runs, "os", (OBSERVED, OBSERVED_OTHERS[1]), (-1, 1), strict=True):
+    for run, marker, colour, up in zip(runs, "os", (OBSERVED, OBSERVED_OTHERS[1]), (-12, 21), strict=True):
         observed = np.sqrt(run.variance) / unit
         artists += ax.plot(run.n, observed, marker, color=colour, label=run.rule.name)
-        artists.append(write(ax, run.rule.name.split(",")[0], (run.n[0], observed[0]), colour, (8, 21 * up), ha="left"))
+        artists.append(write(ax, run.rule.name.split(",")[0], (run.n[0], observed[0]), colour, (8, up), ha="left"))
     artists += ax.plot(n, np.sqrt(theory.error_variance(n, mu)), color=VALID, label="exact, trapezoidal")
     artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=VALID, ls=":", label="rectangular")
     artists += ax.plot(n, np.sqrt(walk), color=BLACK, ls="--", lw=1, label="random walk (35)")

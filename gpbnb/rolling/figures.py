@@ -129,7 +129,7 @@ def around_roll(result: Spectra, ax: Axes) -> list[Drawn]:
     label(ax, "$f - f_r$ (cycles a year)", DENSITY, "(a) rolled")
     near = float(np.max(result.line_signal))
     name(ax, "drift, rolled", (0, near), SIGNAL, (14, 4))
-    name(ax, "noise", (float(x[-1]), float(np.mean(result.line_noise))), OBSERVED, (-2, 12))
+    name(ax, "noise", (0, float(np.mean(result.line_noise))), OBSERVED, (0, 12))
     return artists
 
 

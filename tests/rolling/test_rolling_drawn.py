@@ -139,7 +139,7 @@ def test_around_roll(ax, found):
     assert drift_line.get_ydata() == pytest.approx(ramp(6600.0, 2.0e7, x / 2.0e7) / 4, rel=1e-6)
     names = named(ax)
     assert near(names.pop("drift, rolled"), PURPLE, (0, float(found.line_signal.max())))
-    assert near(names.pop("noise"), BLUE, (6, float(found.line_noise.mean())))
+    assert near(names.pop("noise"), BLUE, (0, float(found.line_noise.mean())))
     assert not names
     assert ax.get_title(loc="left") == "(a) rolled"
     return ax.figure
