@@ -571,6 +571,15 @@ def test_a_pass_forward(sets) -> None:
         last = F(float(bounds[k, 0]))
 
 
+def test_dropped_components_are_made_up_for() -> None:
+    """A segment that halves falls below what is kept; without the slack of 1e-240, the bound would forget it."""
+    one, tiny = np.ones((2, 1, 1)), 1.5e-250
+    given = one / 2, 0 * one, one, np.full((2, 1), tiny), np.zeros((2, 1))
+    bounds, _ = plain(reach.forward)(*given, reach.nothing(2, np.array([0]), 1), 0, 2, np.zeros(1), np.ones(1))
+    assert bounds[1, 0] >= tiny * 3 / 2
+    assert bounds[1, 0] < 1e-239
+
+
 def test_steps_after_the_gain_has_settled(sets) -> None:
     """One state that halves: sums over the period and over the set before it, asked for anew as long as it matters."""
     loop, spread, slack, b = 0.5, 0.0625, 0.25, 3.0
