@@ -580,9 +580,10 @@ def test_dropped_components_are_made_up_for() -> None:
     assert bounds[1, 0] < 1e-239
 
 
-def test_steps_after_the_gain_has_settled(sets) -> None:
-    """One state that halves: sums over the period and over the set before it, asked for anew as long as it matters."""
-    loop, spread, slack, b = 0.5, 0.0625, 0.25, 3.0
+@pytest.mark.parametrize("loop", [0.5, 1 - 2.0**-12])
+def test_steps_after_the_gain_has_settled(sets, loop: float) -> None:
+    """One state: sums over the period and over the set before it, asked for anew as long as the row changes."""
+    spread, slack, b = 0.0625, 0.25, 3.0
     given = (np.full((1, 1, 1), loop), np.full((1, 1, 1), spread), np.array([[[2.0, -1.0]]]), np.array([[0.5, 0.25]]))
     before = Reach(np.array([[[4.0]]]), np.array([envelope.LOOP]), np.array([[[9.0]], [[1.0]], [[0.0]]]))
     part = np.array([envelope.GAIN, envelope.LOOP])
@@ -592,14 +593,19 @@ def test_steps_after_the_gain_has_settled(sets) -> None:
     for M in before.ellipsoids:
         sets._join(whole[0], M, np.ones(1))
     assert math.sqrt(whole[0, 0, 0]) > 4 + 3 + 1
-    c, sums, residual = 1.0, np.zeros(4), 0.0
+    c, sums, residual, anchor, largest, carried = 1.0, np.zeros(4), 0.0, 0.0, 0.0, 0
     for lag in range(6):
         sums += c * np.array([slack, 0.25, 1.0, 0.0])[[0, 1, 2, 3]]
         residual += c * spread * b
         c *= loop
-        value = np.zeros(4)
-        sets.support(before, np.array([c]), value)
+        between = sets.width(whole[0], np.array([c - anchor])) if lag else math.inf
+        if not between <= 1e-3 * largest:
+            anchor, value, between = c, np.zeros(4), 0.0
+            sets.support(before, np.array([c]), value)
+        carried += between > 0
         expected_parts = sums + value
-        expected_parts[3] = residual
+        expected_parts[3] = residual + between
+        largest = max(largest, expected_parts.sum())
         same(parts[lag, 0], expected_parts, 1e-14)
         same(bounds[lag, 0], expected_parts.sum() * (1 + (6 + 1 + 64) * 4 * float(UNIT)), 1e-14)
+    assert bool(carried) is (loop > 0.5)
