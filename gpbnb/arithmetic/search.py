@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
 
 CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
 """Precisions like those of binary32 and binary64, which are always tried if they are above the answer."""
@@ -96,6 +96,8 @@ class Search:
         #: Precisions that met the tolerance although a higher one missed it; usually empty.
         self.irregular: tuple[int, ...] = ()
         largest = LARGEST_PRECISION[base]
+        while largest > 2 and not isinstance(FloatFormat(base, largest, rounding).backend, Compiled):
+            largest -= 1  # stochastic rounding has fewer digits
 
         def meets(fmt: FloatFormat) -> bool:
             if fmt.precision not in self._ratios:

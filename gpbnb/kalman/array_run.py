@@ -7,7 +7,7 @@ gives the same digits.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -84,6 +84,16 @@ class ArrayRun:
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
+        for _ in self._steps_taken(z):
+            pass
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
+        found = [_double_doubles(x) for x in self._steps_taken(z)]
+        return np.array(found, dtype=np.float64).reshape(-1, self.model.n, 2)
+
+    def _steps_taken(self, z: Any) -> Iterator[FloatArray]:
+        """Take one step after the other, and give the estimate after each."""
         self.model.check_measurements(z, self.steps)
         for measured in self.fmt.array(z):
             if self.stopped is not None:
@@ -104,6 +114,7 @@ class ArrayRun:
                 self._saved.append((self.steps, self.x, K, self.P))
             if self._bound is not None:
                 self._bound.take(measured)
+            yield self.x
 
     def checkpoints(self) -> Checkpoints:
         """Return estimate, gain and covariance at the checkpoint steps that were reached."""

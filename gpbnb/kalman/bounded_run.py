@@ -11,18 +11,14 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.arithmetic.kernels.tags import Decimal
 from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import contraction_start
 from gpbnb.kalman.emulation import History, compare_runs
 from gpbnb.kalman.factors import covariance_of_factors
-from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.filter_run import BLOCK, Run, log_spaced, reference, widened
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.bounded import widen
-from gpbnb.kalman.kernels.step import DONE, NEXT_CHECKPOINT, STOPPED
+from gpbnb.kalman.kernels.step import NEXT_CHECKPOINT
 from gpbnb.kalman.model import LinearModel
-
-_BLOCK = 256  # steps whose results are kept for the bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,51 +80,25 @@ class BoundedRun(Run):
             values = np.stack([packed, np.zeros_like(packed)], axis=-1)[:, :, np.newaxis]
         else:
             values = double_doubles(self.exactly(packed))[:, :, np.newaxis]
-        packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
-        for begin in range(0, len(packed), _BLOCK):
-            self._take_block(packed[begin : begin + _BLOCK], values[begin : begin + _BLOCK])
+        packed = self.pack_measurements(z)
+        for begin in range(0, len(packed), BLOCK):
+            self._take_block(packed[begin : begin + BLOCK], values[begin : begin + BLOCK])
             if self.stopped:
                 return
 
     def _take_block(self, z: NDArray[Any], exact_z: NDArray[Any]) -> None:
         """Take some steps, keep all their results, and extend the bound over them."""
         first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
-        x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
-        x[0], P[0] = self.x, self.P
-        every, notes = np.arange(first + 1, first + len(z) + 1), self.notes.copy()
-        notes[NEXT_CHECKPOINT] = 0
-        failure: ArithmeticError | None = None
-        try:
-            self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
-        except (OverflowError, ZeroDivisionError) as error:
-            notes[STOPPED], failure = notes[DONE] + 1, error
-        done = int(notes[DONE]) - first
-        notes[NEXT_CHECKPOINT] = np.searchsorted(self.checkpoint_steps, notes[DONE], side="right")
-        saved = slice(at, notes[NEXT_CHECKPOINT])
-        rows = self.checkpoint_steps[saved] - first
-        self.X[saved], self.G[saved], self.C[saved], self.notes[:] = x[rows], K[rows], P[rows], notes
-        if self.stopped:
-            pivot = f"a zero pivot in the innovation covariance at step {self.stopped}"
-            self.reason = self.stopped_by(failure) if failure else pivot
+        x, K, P = self.take_block(z)
+        done = len(x) - 1
         if not done:
             return
-        x, P, K, UR = (_widened(each) for each in (x[: done + 1], P[: done + 1], K[1 : done + 1], self.UR))
+        x, P, K, UR = (widened(each) for each in (x, P, K[1:], self.UR))
         steps = self.bound, self.checkpoint_steps, at, self.bounds
         try:
             self.bound = advance_bound(self.form, self._exact, self._plain, exact_z[:done], first, x, P, K, UR, *steps)
         except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
             self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
-
-
-def _widened(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double."""
-    if packed.ndim == 3:
-        return np.stack([packed, np.zeros_like(packed)], axis=-1)
-    if packed.dtype == np.float64:
-        return np.ascontiguousarray(packed)
-    wide = np.empty(packed.shape)
-    widen(Decimal(1, True), packed, wide)  # of any precision
-    return wide
 
 
 def emulate_with_bound(

@@ -16,10 +16,11 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.rules import Order
-from gpbnb.arithmetic.kernels.tags import DoubleDouble, Tag
+from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.factors import combined_gain, covariance_of_factors
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.kernels.bounded import widen
 from gpbnb.kalman.kernels.step import (
     DONE,
     INDEFINITE,
@@ -33,6 +34,9 @@ from gpbnb.kalman.kernels.step import (
 )
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import compiled_form
+
+BLOCK = 256
+"""Number of steps whose results are kept at a time."""
 
 
 class Run:
@@ -143,16 +147,59 @@ class Run:
         self.model.check_measurements(z, 0 if self.stopped else self.steps)
         if self.stopped:
             return
-        packed = self.as_packed(z)
-        packed = packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
         try:
-            self.advance(packed, (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
+            self.advance(self.pack_measurements(z), (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
         except (OverflowError, ZeroDivisionError) as error:
             self.notes[STOPPED] = self.steps + 1
             self.reason = self.stopped_by(error)
         else:
             if self.stopped:
                 self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue by as many steps as there are measurements, (steps, m), and return all estimates.
+
+        Returns
+        -------
+        x : (steps done, n, 2), as double-double.
+        """
+        self.model.check_measurements(z, self.steps)
+        packed, found = self.pack_measurements(z), [np.zeros((0, self.model.n, 2))]
+        for begin in range(0, len(packed), BLOCK):
+            if not self.stopped:
+                x, _, _ = self.take_block(packed[begin : begin + BLOCK])
+                found.append(widened(x[1:])[:, :, 0])
+        return np.concatenate(found)
+
+    def pack_measurements(self, z: Any) -> NDArray[Any]:
+        """Round measurements (steps, m) into the format, as :meth:`advance` expects them."""
+        packed = self.as_packed(z)
+        return packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
+
+    def take_block(self, z: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+        """Take some steps with packed measurements; return estimates, gains and covariances, or factors.
+
+        The first of each is that before these steps, for the gain zeros; one follows for each step done.
+        """
+        first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
+        x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
+        x[0], P[0] = self.x, self.P
+        every, notes = np.arange(first + 1, first + len(z) + 1), self.notes.copy()
+        notes[NEXT_CHECKPOINT] = 0
+        failure: ArithmeticError | None = None
+        try:
+            self.advance(z, (every, x[1:], K[1:], P[1:]), notes)
+        except (OverflowError, ZeroDivisionError) as error:
+            notes[STOPPED], failure = notes[DONE] + 1, error
+        done = int(notes[DONE]) - first
+        notes[NEXT_CHECKPOINT] = np.searchsorted(self.checkpoint_steps, notes[DONE], side="right")
+        saved = slice(at, notes[NEXT_CHECKPOINT])
+        rows = self.checkpoint_steps[saved] - first
+        self.X[saved], self.G[saved], self.C[saved], self.notes[:] = x[rows], K[rows], P[rows], notes
+        if self.stopped:
+            pivot = f"a zero pivot in the innovation covariance at step {self.stopped}"
+            self.reason = self.stopped_by(failure) if failure else pivot
+        return x[: done + 1], K[: done + 1], P[: done + 1]
 
     def advance(self, z: NDArray[Any], kept: tuple[NDArray[Any], ...], notes: NDArray[np.int64]) -> None:
         """Take one step per packed measurement, (steps, m, columns of x).
@@ -236,6 +283,17 @@ def check_compiled(fmt: FloatFormat) -> None:
         )
 
 
+def widened(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert results of compiled loops in any format, (k, n, m) or (k, n, m, 2), to double-double."""
+    if packed.ndim == 3:
+        return np.stack([packed, np.zeros_like(packed)], axis=-1)
+    if packed.dtype == np.float64:
+        return np.ascontiguousarray(packed)
+    wide = np.empty(packed.shape)
+    widen(Decimal(1, True), packed, wide)  # of any precision
+    return wide
+
+
 @dataclass(frozen=True, eq=False)
 class Checkpoints:
     """Exact values after some steps, object arrays of Fractions: x (c, n), K (c, n, m), P (c, n, n)."""
@@ -279,9 +337,31 @@ def reference(
         _take_with_inputs(run, model, z)
     else:
         run.take(z)
+    _check_reference(run, model)
+    return run.checkpoints()
+
+
+def _check_reference(run: Run, model: LinearModel) -> None:
     if run.stopped:
         raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
-    return run.checkpoints()
+
+
+def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
+    """Run the filter as :func:`reference` does, and return the estimates after every step, (steps, n, 2).
+
+    Raises
+    ------
+    ArithmeticError : as for :func:`reference`.
+    """
+    every = range(1, len(z) + 1) if model.has_inputs else ()
+    run = Run(model.without_inputs(), None, Form.INNOVATION, every)
+    if model.has_inputs:
+        _take_with_inputs(run, model, z)
+        found = run.X[:, :, 0]
+    else:
+        found = run.states(z)
+    _check_reference(run, model)
+    return found
 
 
 def _take_with_inputs(run: Run, model: LinearModel, z: Any) -> None:

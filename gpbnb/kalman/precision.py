@@ -16,8 +16,7 @@ from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.bounded_run import BoundedRun
-from gpbnb.kalman.emulation import compare_runs
-from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
+from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
@@ -59,8 +58,8 @@ def required_precision(
     model : a Kalman filter; with repaired covariances, the answer lists the repairs. Or a linear system, whose inputs
         are `z`; see :func:`gpbnb.kalman.system.required_system_precision`. Or a function of a format and `z`, written
         with arrays of the format; see :func:`gpbnb.kalman.recursion.required_recursion_precision`.
-    tolerance : largest error of each state due to rounding, in its unit; one number, or (n,). Give states whose
-        accuracy does not matter an infinite tolerance. For a linear system, of each output.
+    tolerance : largest error of each state due to rounding in any step, in its unit; one number, or (n,). Give states
+        whose accuracy does not matter an infinite tolerance. For a linear system, of each output.
     base : 2, 10 or 16.
     rounding, form : values or their names, such as "nearest" and "UD"; see :class:`gpbnb.kalman.forms.Form` and
         :class:`gpbnb.kalman.array_forms.ArrayForm`.
@@ -116,15 +115,15 @@ def required_precision(
         z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
     repairs = tuple(str(each) for each in model.repairs)
     model, z = without_missing(model, z)
-    measured, checkpoint_steps = _measured(model, z, steps), log_spaced(steps, 16)
+    measured = _measured(model, z, steps)
     model.check_steps(steps)
-    true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
+    true = reference_states(model, measured) if basis == "emulation" else None
 
     def errors_of(chosen: AnyForm) -> Callable[[FloatFormat], tuple[float, str]]:
         if within is not None and for_ever and isinstance(chosen, Form):
             compiled = chosen
             return lambda fmt: _guaranteed(model, fmt, compiled, within, tolerances, basis)
-        return lambda fmt: _error_over_tolerance(model, measured, fmt, chosen, checkpoint_steps, true, tolerances)
+        return lambda fmt: _error_over_tolerance(model, measured, fmt, chosen, true, tolerances)
 
     checks = () if for_ever else CHECKED[base]
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
@@ -182,11 +181,9 @@ def survey(
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
     formats = _formats(base, precisions, rounding)
-    checkpoint_steps = log_spaced(len(measured), 16)
-    true = reference(model, measured, checkpoint_steps) if basis == "emulation" else None
+    true = reference_states(model, measured) if basis == "emulation" else None
     return tuple(
-        (fmt.precision, _error_over_tolerance(model, measured, fmt, form, checkpoint_steps, true, tolerances)[0])
-        for fmt in formats
+        (fmt.precision, _error_over_tolerance(model, measured, fmt, form, true, tolerances)[0]) for fmt in formats
     )
 
 
@@ -228,23 +225,25 @@ def _error_over_tolerance(
     z: NDArray[Any],
     fmt: FloatFormat,
     form: AnyForm,
-    checkpoint_steps: Sequence[int],
-    true: Checkpoints | None,
+    true: NDArray[np.float64] | None,
     tolerances: NDArray[np.float64],
 ) -> tuple[float, str]:
     """Return the largest error, or without `true` the largest bound, over tolerance; or infinity and the reason."""
     asked, measured = np.isfinite(tolerances), fmt.array(z)
     try:
-        run = _opened(model, fmt, form, checkpoint_steps, true is None)
+        run = _opened(model, fmt, form, range(1, len(z) + 1) if true is None else (), true is None)
     except ValueError as error:  # with so few digits, a covariance is not definite
         return math.inf, str(error)
-    run.take(measured)
+    if true is None:
+        run.take(measured)
+    else:
+        states = run.states(measured)
     if run.stopped is not None:
         return math.inf, f"the run is refused: {run.reason}"
     if true is None and isinstance(run, (BoundedRun, ArrayRun)):
         errors = run.bounds[0]
     elif true is not None:
-        errors = compare_runs(run, true).state
+        errors = (states - true).sum(axis=2)
         if run.indefinite is not None:
             lost = f"a computed variance was not positive at step {run.indefinite}"
             return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"

@@ -26,7 +26,7 @@ class Requirement:
     fmt : None if no format with compiled loops meets the tolerance, or if the largest precision tried misses it.
     basis : "emulation", for the observed errors with these measurements; or "bound", for the largest possible errors.
     steps : steps of the filter.
-    tried : precision, and largest error / tolerance over states and checkpoints; infinite if the run stopped, a
+    tried : precision, and largest error / tolerance over states and steps; infinite if the run stopped, a
         variance was no longer positive, or no bound exists.
     why : why, below the answer, the largest precision without a finite error has none; empty if all have one. It is
         shown if it prevented a smaller answer.

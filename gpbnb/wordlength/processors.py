@@ -15,8 +15,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32
-from gpbnb.kalman.emulation import compare_runs
-from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
+from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
@@ -90,7 +89,7 @@ def outcome(
     z: Any,
     processor: Processor,
     form: Form | str = Form.INNOVATION,
-    true: Checkpoints | None = None,
+    true: NDArray[np.float64] | None = None,
 ) -> Outcome:
     """Run a filter on a processor and compare it with the given filter in double-double.
 
@@ -99,24 +98,23 @@ def outcome(
     Parameters
     ----------
     z : (steps, m).
-    true : the reference at :func:`~gpbnb.kalman.filter_run.log_spaced` steps, 16 per decade, if known.
+    true : the result of :func:`~gpbnb.kalman.filter_run.reference_states`, if known.
     """
-    steps = log_spaced(len(z), 16)
     nothing = np.full(model.n, math.inf)
     fused, sums, compensated, order = processor.fused, processor.sums, processor.compensated, processor.order
     try:
-        run = Run(model, processor.fmt, form, steps, fused, sums, compensated, order)  # type: ignore[arg-type]
-        run.take(processor.fmt.array(z))
+        run = Run(model, processor.fmt, form, (), fused, sums, compensated, order)  # type: ignore[arg-type]
+        states = run.states(processor.fmt.array(z))
     except OverflowError as error:
         return Outcome(processor, nothing, f"overflow in the model or the measurements: {error}")
     except ValueError as error:
         return Outcome(processor, nothing, str(error))
     if run.stopped is not None:
         return Outcome(processor, nothing, run.reason)
-    history = compare_runs(run, reference(model, z, steps) if true is None else true)
     if run.indefinite is not None:
         return Outcome(processor, nothing, f"a computed variance was not positive at step {run.indefinite}")
-    return Outcome(processor, np.abs(history.state).max(axis=0), "")
+    errors = (states - (reference_states(model, z) if true is None else true)).sum(axis=2)
+    return Outcome(processor, np.abs(errors).max(axis=0), "")
 
 
 def typical_errors(
@@ -128,7 +126,7 @@ def typical_errors(
     """Return the rms over records of each state's largest error, (processors, n), infinite if a filter fails."""
     squares = np.zeros((len(processors), model.n))
     for z in records:
-        true = reference(model, z, log_spaced(len(z), 16))
+        true = reference_states(model, z)
         squares += np.array([outcome(model, z, each, form, true).error for each in processors]) ** 2
     return np.asarray(np.sqrt(squares / len(records)))
 

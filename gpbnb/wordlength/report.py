@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 from gpbnb.kalman.array_forms import AnyForm
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import log_spaced, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named
-from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.precision import required_precision, survey
 from gpbnb.kalman.requirement import Basis, Requirement
 from gpbnb.kalman.system import LinearSystem
 from gpbnb.sweeps import machine
@@ -162,10 +160,12 @@ def _errors(
     if answer.fmt is None:
         return ()
     sound, filled = without_missing(model, z)
-    checkpoint_steps = log_spaced(len(filled), 16)
-    true = reference(sound, filled, checkpoint_steps)
-    largest = np.abs(emulate(sound, filled, answer.fmt, form, checkpoint_steps, true).state).max(axis=0)
-    return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
+    found: list[float | None] = []
+    for i, tolerance in enumerate(tolerances):
+        alone = np.where(np.arange(len(tolerances)) == i, tolerance, math.inf).tolist()
+        asked = [answer.fmt.precision], answer.fmt.base, answer.fmt.rounding, form
+        found.append(_finite(survey(sound, filled, alone, *asked)[0][1]) if math.isfinite(tolerance) else None)
+    return tuple(found)
 
 
 def _finite(number: float) -> float | None:

@@ -21,7 +21,7 @@ from gpbnb.kalman import report_bounds
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.contraction import companion_bound
 from gpbnb.kalman.emulation import compare_runs
-from gpbnb.kalman.filter_run import Run, log_spaced, reference
+from gpbnb.kalman.filter_run import Run, log_spaced, reference, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
@@ -246,9 +246,7 @@ def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[An
 
     It includes the errors of storing model and measurements, and is infinite or NaN if the range is too small.
     """
-    checkpoint_steps = log_spaced(len(z), 16)
-    true = reference(model, z, checkpoint_steps).x.astype(np.float64)
-    return np.asarray(np.abs(native(model, z, dtype)[np.array(checkpoint_steps) - 1] - true).max(axis=0))
+    return np.asarray(np.abs(native(model, z, dtype) - reference_states(model, z)[:, :, 0]).max(axis=0))
 
 
 def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
