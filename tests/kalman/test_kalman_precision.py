@@ -13,13 +13,15 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import precision
 from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import log_spaced, reference
+from gpbnb.kalman.filter_run import reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import limits
+from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.simulation import Simulation, fine_resolution
+from gpbnb.kalman.system import LinearSystem
 
 STEPS = 60
 MODEL = LinearModel(
@@ -69,7 +71,7 @@ def test_errors_of_storing_the_model_count():
 def errors_in(model, z, base, options):
     """Largest error of each state in so many digits; None where the run is lost."""
     form, rounding = options.get("form", Form.INNOVATION), options.get("rounding", Rounding.NEAREST)
-    checkpoint_steps = log_spaced(len(z), 16)
+    checkpoint_steps = range(1, len(z) + 1)
     true = reference(model, z, checkpoint_steps)
 
     @cache  # for all tolerances
@@ -211,6 +213,36 @@ def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
     t = found.fmt.precision
     assert t > 5
     assert all(math.isinf(ratio) for digits, ratio in found.tried if digits < t)
+
+
+@pytest.mark.parametrize("form", ["innovation", "UD", "symmetrized"])
+def test_an_answer_holds_in_every_step(form):
+    """A constant-velocity tracker whose largest error in 15 bits falls between the steps of a logarithmic scale."""
+    Q = [["1/10000", "3/2000"], ["3/2000", "3/100"]]
+    given = LinearModel([[1, "0.1"], [0, 1]], [[1, 0]], Q, [["0.5"]], [0, 0], [[100, 0], [0, 10]])
+    z = simulated_measurements(given, 300, 0)
+    tolerance = np.array([0.01, 0.1])
+    found = required_precision(given, 300, tolerance, z=z, form=form)
+    every = range(1, 301)
+    true = reference(given, z, every)
+    for digits, ratio in found.tried:
+        history = emulate(given, z, FloatFormat(2, digits), form, every, true)
+        if not history.indefinite and not history.stopped:
+            assert (np.abs(history.state) / tolerance).max() == pytest.approx(ratio, rel=1e-12)
+
+
+def test_masked_inputs_are_refused():
+    system = LinearSystem([["0.9"]], [["0.1"]])
+    masked = np.ma.masked_array(np.ones((5, 1)), mask=np.eye(5, 1))
+    with pytest.raises(ValueError, match="some are masked; needed a number for each"):
+        required_precision(system, 5, 1e-3, z=masked)
+
+
+def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
+    found = required_precision(MODEL, STEPS, 1e-30, z=Z, rounding="stochastic")
+    assert found.fmt is None
+    assert found.tried[-1][0] == 29
+    assert "no precision up to 29 digits" in str(found)
 
 
 def test_its_own_measurements_are_seeded():
