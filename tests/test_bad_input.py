@@ -12,8 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, required_precision
+from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, linalg, required_precision
 from gpbnb.budget import theory as budget
+from gpbnb.kalman.emulation import emulate
+from gpbnb.kalman.guarantee.bound import guarantee
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.requirement import Requirement
 from gpbnb.kalman.simulation import Simulation
@@ -51,6 +53,7 @@ TRIED = {"accepted": 0, "refused": 0}
 GOOD = {"Phi": [["0.5"]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]}
 MODEL = LinearModel(**GOOD)
 Z = np.ones((3, 1))
+FMT = FloatFormat(2, 24)
 
 functions = st.sampled_from([lambda k: [[1]], lambda k: k, lambda k: None, lambda k: np.eye(k), lambda: 1, int, len])
 
@@ -210,3 +213,28 @@ def test_a_tolerance_that_no_precision_meets_gives_no_warning(model):
 def test_too_many_steps_are_refused_before_they_are_simulated():
     with pytest.raises(ValueError, match="got 1,000,000,000,000 steps to simulate; needed at most"):
         required_precision(MODEL, 10**12, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: emulate(MODEL, Z, 24), "got the format 24; needed a FloatFormat or a FixedFormat"),
+        (lambda: emulate(None, Z, FMT), "got a model NoneType; needed a LinearModel"),
+        (lambda: emulate(MODEL, Z[:0], FMT), "got no measurements; needed at least one step"),
+        (lambda: emulate(MODEL, Z, FMT, checkpoint_steps=[2.5]), "needed whole numbers"),
+        (lambda: emulate(MODEL, Z, FMT, checkpoint_steps=[True]), "needed whole numbers"),
+        (lambda: emulate(MODEL, Z, FMT, sums=24), "sums: got 24; needed a FloatFormat or a FixedFormat"),
+        (lambda: emulate(MODEL, Z, FMT, fused="no"), "fused: got 'no'; needed True or False"),
+        (lambda: linalg.dot(FMT.array([1]), FMT.array([1]), sums=24), "sums: got 24; needed a FloatFormat"),
+        (lambda: linalg.dot(FMT.array([1]), FMT.array([1]), fused="yes"), "fused: got 'yes'; needed True or False"),
+        (lambda: required_precision(MODEL, 3, 0.1, within=3), "got within=3; needed the result of limits"),
+        (lambda: guarantee(MODEL, FMT, 3), "got within=3; needed the result of limits"),
+        (lambda: required_precision(MODEL, 3, 0.1, base="2"), "got base '2'; needed"),
+        (lambda: LinearModel(**GOOD, repair="no"), "got repair 'no'; needed True, False or None"),
+        (lambda: LinearModel(**GOOD | {"Phi": lambda k: None}, steps=2), "^Phi: "),
+        (lambda: FixedFormat(10**9, 10**9), "bits; needed 1 to "),
+    ],
+)
+def test_a_wrong_argument_is_named(call, message):
+    with pytest.raises((TypeError, ValueError), match=message):
+        call()

@@ -81,7 +81,8 @@ class FixedFormat:
             raise TypeError(f"rounding: got {self.rounding!r}; needed one of {', '.join(map(str, Rounding))}")
         if not 1 <= self.precision <= LARGEST_BITS:
             raise ValueError(
-                f"got {self.integer_bits} integer bits and {self.fraction_bits} fraction bits; needed at least one"
+                f"got {self.integer_bits} integer bits and {self.fraction_bits} fraction bits; needed 1 to "
+                f"{LARGEST_BITS} together"
             )
         if self.overflow not in _POLICIES:
             raise ValueError(f"overflow: got {self.overflow!r}; needed one of {', '.join(map(repr, _POLICIES))}")

@@ -91,7 +91,7 @@ def matmul(
 
     Raises
     ------
-    TypeError : not FloatArrays.
+    TypeError : not FloatArrays, or sums that are no format.
     ValueError : interface dimensions or formats differ; an unknown order, a block below 1, or pairwise and fused; sums
         of another base or with fewer digits than the operands.
 
@@ -104,6 +104,8 @@ def matmul(
     check_order(order, fused, block)
     if sums is not None:
         a.operand(b)
+        if not hasattr(sums, "run_tag"):
+            raise TypeError(f"sums: got {sums!r}; needed a FloatFormat or a FixedFormat")
         if sums.base != a.format.base or sums.precision < a.format.precision:
             raise ValueError(
                 f"sums: got {sums} with operands in {a.format}; needed the same base and at least as many digits"

@@ -122,10 +122,18 @@ def emulate(
 
     Raises
     ------
-    ValueError : one of these options with known inputs, or with a form without compiled loops.
+    TypeError : no model, or no format.
+    ValueError : one of these options with known inputs, or with a form without compiled loops; no measurements.
     """
     form = form_named(form)
+    if not isinstance(model, LinearModel):
+        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
+    if not isinstance(fmt, (FloatFormat, FixedFormat)):
+        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
+    model.check_measurements(measured, 0)
+    if not len(measured):
+        raise ValueError("got no measurements; needed at least one step")
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")

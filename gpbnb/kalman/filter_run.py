@@ -59,6 +59,7 @@ class Run:
     ------
     ValueError : a format or form without compiled loops; checkpoint steps that do not ascend; compensation or another
         order of additions in a form that does not have it.
+    TypeError : sums that are no format.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -76,13 +77,18 @@ class Run:
     ) -> None:
         model.refuse_inputs("a run in compiled loops")
         self.model, self.fmt, self.form = model, fmt, compiled_form(form)
-        self.checkpoint_steps = np.array(checkpoint_steps, dtype=np.int64).reshape(-1)
+        steps = np.array(checkpoint_steps).reshape(-1)
+        if steps.size and steps.dtype.kind not in "iu":
+            raise ValueError(f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed whole numbers")
+        self.checkpoint_steps = steps.astype(np.int64)
         if np.any(np.diff(self.checkpoint_steps, prepend=0) <= 0):
             raise ValueError(
                 f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
             )
         if fmt is not None:
             check_compiled(fmt)
+        if sums is not None and not isinstance(sums, (FloatFormat, FixedFormat)):
+            raise TypeError(f"sums: got {sums!r}; needed a FloatFormat or a FixedFormat")
         if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(
                 f"got compensated summation in the {self.form} form; needed the innovation form or Joseph's"

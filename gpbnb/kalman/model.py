@@ -84,6 +84,8 @@ class LinearModel:
     repairs: tuple[Repair, ...] = field(default=(), init=False)
 
     def __post_init__(self) -> None:
+        if self.repair is not None and not isinstance(self.repair, bool):
+            raise ValueError(f"got repair {self.repair!r}; needed True, False or None")
         self._evaluate_functions()
         repairable = {
             letter: in_floats(getattr(self, letter)) if self.repair is None else self.repair
@@ -143,7 +145,11 @@ class LinearModel:
                 shapes = {np.shape(each) for each in members}
                 if len(shapes) != 1:
                     raise ValueError(f"{letter}: the function gave shapes {sorted(shapes)}; needed one shape")
-                object.__setattr__(self, letter, np.array(members) if in_floats(members) else exact(members))
+                try:
+                    values = np.array(members) if in_floats(members) else exact(members)
+                except (TypeError, ValueError) as error:
+                    raise type(error)(f"{letter}: {error}") from None
+                object.__setattr__(self, letter, values)
 
     def _read_inputs(self) -> None:
         """Read known inputs and offsets as exact cycles."""

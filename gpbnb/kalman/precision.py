@@ -81,8 +81,12 @@ def required_precision(
     ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops; more
         or fewer measurements than steps; a model with known inputs, or an ``ArrayForm``, where a basis does not cover
         them.
+    TypeError : another kind of model, or of limits.
+    OverflowError : an output of a linear system, or its reference, leaves the range of float64.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    if within is not None and not isinstance(within, Limits):
+        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     if not isinstance(model, LinearModel) and form is not Form.INNOVATION:
         raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
     if callable(model):

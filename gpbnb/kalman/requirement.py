@@ -109,7 +109,7 @@ def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: s
     if not isinstance(basis, str) or basis not in get_args(Basis):
         raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
     if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
-        raise ValueError(f"got base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
+        raise ValueError(f"got base {base!r}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
     return np.broadcast_to(tolerances, (count,))
 
 

@@ -53,7 +53,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     command = shlex.join(["python", "-m", "gpbnb.wordlength", *map(str, arguments or sys.argv[1:])])
     try:
-        tolerance = [float(each) for each in given.tolerance.split(",")]
+        try:
+            tolerance = [float(each) for each in given.tolerance.split(",")]
+        except ValueError:
+            raise ValueError(
+                f"got --tolerance {given.tolerance}; needed numbers with commas between: 0.01,inf"
+            ) from None
         form_named(given.form), rounding_named(given.rounding)
         model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
         z = read_measurements(given.measurements) if given.measurements else None

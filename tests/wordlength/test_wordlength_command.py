@@ -83,7 +83,7 @@ def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tolerance": "small"}, "could not convert"),
+        ({"tolerance": "small"}, "got --tolerance small; needed numbers"),
         ({"tolerance": "-1"}, "needed an error above 0"),
         ({"model": "absent.toml"}, "absent.toml"),
         ({"form": "square"}, "got form 'square'"),

@@ -143,10 +143,13 @@ def check_order(order: Order, fused: bool, block: int) -> None:
 
     Raises
     ------
-    ValueError : an unknown order, pairwise sums with fused multiply-add, or blocks of less than one product.
+    ValueError : an unknown order, pairwise sums with fused multiply-add, blocks of less than one product, or `fused`
+        that is neither true nor false.
     """
     if order not in get_args(Order):
         raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
+    if fused not in (True, False):
+        raise ValueError(f"fused: got {fused!r}; needed True or False")
     if block < 1:
         raise ValueError(f"block: got {block}; needed at least 1")
     if fused and order == "pairwise":

@@ -12,9 +12,9 @@ class Rounding(Enum):
 
     #: To nearest, ties away from zero; hung1984, ch. II, (3).
     NEAREST = "nearest"
-    #: Toward zero: further digits are dropped; hung1984, ch. II, (9). IEEE 754 calls it roundTowardZero.
+    #: Toward zero, by dropping further digits; hung1984, ch. II, (9). IEEE 754 calls it roundTowardZero.
     CHOP = "chop"
-    #: To nearest, ties to the neighbour with an even last digit: the default of IEEE 754.
+    #: To nearest, ties to the neighbour with an even last digit, the default of IEEE 754.
     EVEN = "even"
     #: Toward plus infinity.
     UP = "up"

@@ -134,8 +134,11 @@ def guarantee(
 
     Raises
     ------
+    TypeError : limits that are not from :func:`limits`.
     ValueError : the format has no compiled loops, or a covariance is not definite in it.
     """
+    if not isinstance(within, Limits):
+        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     model.refuse_inputs("a guarantee")
     return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
 
