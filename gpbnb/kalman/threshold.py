@@ -82,11 +82,15 @@ def _cells() -> tuple[Cell, ...]:
         Cell(deviation, 10, "nearest", "innovation", (7, 9), 0, 30),
         Cell(absolute, 2, "chop", "hung", (34, 35), 0, 30),
         Cell(deviation, 2, "chop", "hung", (29,), 0, 30),
+        Cell(absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
+        Cell(deviation, 2, "nearest", "hung", (22, 23, 28, 29, 30)),
+        Cell(absolute, 10, "nearest", "innovation", (8,), 0, 30),
+        Cell(deviation, 10, "nearest", "innovation", (10, 11), 0, 30),
     ]
     return tuple(cells)
 
 
-#: All cells, the most valuable first.
+#: All cells, the most valuable first; those far from the threshold stand last and have not been computed.
 CELLS = _cells()
 
 

@@ -163,7 +163,7 @@ def test_the_cells_are_distinct_and_cover_the_threshold():
     }
     assert nearest["absolute", 2] >= set(range(28, 37))
     assert nearest["deviation", 2] >= set(range(22, 31))
-    assert nearest["absolute", 10] == nearest["deviation", 10] == {8, 9, 10, 11}
+    assert nearest["absolute", 10] & nearest["deviation", 10] >= {8, 9, 10, 11}
     assert {cell.rounding for cell in CELLS} == {"nearest", "chop"}
     near = [cell for cell in CELLS if cell.base == 2 and cell.rounding == "nearest"]
     assert all(cell.count >= 100 for cell in near)
