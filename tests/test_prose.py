@@ -169,7 +169,7 @@ def median_ratios() -> list[float]:
 def false_drift(resets: bool) -> sp.Expr:
     """Variance of a fitted slope of the ramp times the phase, whose rate is a random walk, for k = q = T = 1.
 
-    A step of the rate at u adds t - u to the phase, or, with a reset every P, half of P from then on.
+    If the rate changes by one at time u, the phase has changed by t - u at time t; if it is reset every P, by P / 2.
     """
     t, u = sp.symbols("t u")
     slope = sp.integrate(12 * (t - sp.Rational(1, 2)) * t * (1 if resets else t - u), (t, u, 1))
@@ -285,13 +285,18 @@ def test_a_typed_numeral_is_found_and_what_is_no_prose_is_passed_over():
     assert numerals("It is 3.5 times") == ["It is 3.5 times"]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_no_result_is_typed(page):
-    text = prose(page)
-    for row in TYPED:
+def unlisted(text, rows, page):
+    """The text without the phrases that a list has for the page; each of them must be there."""
+    for row in rows:
         if row["page"] == page.stem:
             assert row["phrase"] in text, (row, "is no longer there: drop it from the list")
             text = text.replace(row["phrase"], " ")
+    return text
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_no_result_is_typed(page):
+    text = unlisted(prose(page), TYPED, page)
     assert numerals(text) == [], "put a computed number in by glue; list one that was not computed, with the reason"
 
 
@@ -303,22 +308,14 @@ def test_each_line_of_the_list_has_a_page_a_reason_and_a_numeral():
 
 @pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
 def test_no_result_is_written_in_words(page):
-    text = prose(page)
-    for row in WORDED:
-        if row["page"] == page.stem:
-            assert row["phrase"] in text, (row, "is no longer there: drop it from the list")
-            text = text.replace(row["phrase"], " ")
+    text = unlisted(prose(page), WORDED, page)
     assert WORDS.findall(text) == [], "list each quantity in tests/number_words.csv, with the reason"
 
 
 @pytest.mark.parametrize("page", WRITTEN, ids=lambda page: page.name)
 def test_no_result_is_typed_in_a_formula(page):
     """Numbers of two digits or more; the coefficients of one digit belong to the algebra, which other tests derive."""
-    text = formulas(page)
-    for row in FORMULAS:
-        if row["page"] == page.stem:
-            assert row["phrase"] in text, (row, "is no longer there: drop it from the list")
-            text = text.replace(row["phrase"], " ")
+    text = unlisted(formulas(page), FORMULAS, page)
     numbers = re.findall(r"(?<![\w.])\d(?:[\d.]|\{,\})*\d", text)
     assert numbers == [], "list each number in tests/formula_numerals.csv, with the reason"
 

@@ -73,14 +73,9 @@ class BoundedRun(Run):
         self.model.check_measurements(z, self.steps)
         if self.stopped or not len(z):
             return
-        packed = self.as_packed(z)
-        if self.fmt is None:
-            values = packed[:, :, np.newaxis]
-        elif packed.ndim == 2:
-            values = np.stack([packed, np.zeros_like(packed)], axis=-1)[:, :, np.newaxis]
-        else:
-            values = double_doubles(self.exactly(packed))[:, :, np.newaxis]
         packed = self.pack_measurements(z)
+        in_floats = packed.dtype == np.float64
+        values = widened(packed) if in_floats else double_doubles(self.exactly(packed))
         for begin in range(0, len(packed), BLOCK):
             self._take_block(packed[begin : begin + BLOCK], values[begin : begin + BLOCK])
             if self.stopped:

@@ -123,7 +123,7 @@ def emulate(
     Raises
     ------
     TypeError : no model, or no format.
-    ValueError : one of these options with known inputs, or with a form without compiled loops; no measurements.
+    ValueError : no measurements; one of these options together with known inputs or a form without compiled loops.
     """
     form = form_named(form)
     if not isinstance(model, LinearModel):

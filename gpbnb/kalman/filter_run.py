@@ -150,7 +150,7 @@ class Run:
 
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        self.model.check_measurements(z, 0 if self.stopped else self.steps)
+        self.model.check_measurements(z, self.steps)
         if self.stopped:
             return
         try:

@@ -18,7 +18,7 @@ def real_numbers(values: Any) -> NDArray[Any]:
 
     Raises
     ------
-    ValueError, TypeError : an entry is masked or not a real number, or rows have different lengths.
+    ValueError, TypeError : an entry is masked, or is not a real number; rows have different lengths.
     """
     if np.ma.is_masked(values):
         raise ValueError("got measurements of which some are masked; needed a number for each")

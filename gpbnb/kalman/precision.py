@@ -191,6 +191,14 @@ def survey(
     )
 
 
+def largest_errors(
+    model: LinearModel, z: Any, fmt: FloatFormat, form: AnyForm | str = Form.INNOVATION
+) -> NDArray[np.float64]:
+    """Return the largest error of each state in any step, (n,), of a run that :func:`survey` found finite."""
+    run = _opened(model, fmt, form_named(form), (), False)
+    return np.abs((run.states(fmt.array(z)) - reference_states(model, z)).sum(axis=2)).max(axis=0)
+
+
 def _formats(base: int, precisions: Sequence[int], rounding: Rounding) -> list[FloatFormat]:
     formats = [FloatFormat(base, precision, rounding) for precision in precisions]
     if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION.get(base, 0)]:

@@ -17,7 +17,7 @@ from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named
-from gpbnb.kalman.precision import required_precision, survey
+from gpbnb.kalman.precision import largest_errors, required_precision
 from gpbnb.kalman.requirement import Basis, Requirement
 from gpbnb.kalman.system import LinearSystem
 from gpbnb.sweeps import machine
@@ -160,12 +160,8 @@ def _errors(
     if answer.fmt is None:
         return ()
     sound, filled = without_missing(model, z)
-    found: list[float | None] = []
-    for i, tolerance in enumerate(tolerances):
-        alone = np.where(np.arange(len(tolerances)) == i, tolerance, math.inf).tolist()
-        asked = [answer.fmt.precision], answer.fmt.base, answer.fmt.rounding, form
-        found.append(_finite(survey(sound, filled, alone, *asked)[0][1]) if math.isfinite(tolerance) else None)
-    return tuple(found)
+    largest = largest_errors(sound, filled, answer.fmt, form)
+    return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
 
 
 def _finite(number: float) -> float | None:

@@ -1,7 +1,7 @@
 """Every term of the guarantee, in exact fractions: none can be dropped unseen.
 
-The allowances for roundings of float64 are powers of two between 1e-27 and 1e-12. Where they are constants of the
-module, larger ones stand in their place here; where they are not, the numbers cancel until what is left is as small.
+The allowances for roundings of float64 lie between 1e-27 and 1e-12, too small to show beside other terms. Where they
+are constants of the module, the tests use larger ones. Elsewhere the numbers are chosen so that the other terms cancel.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ class Limits(NamedTuple):
     lowest: Fraction
     #: What happens to results beyond these: "raise", "saturate" or "wrap".
     overflow: str = "raise"
-    #: Whether all numbers have the same spacing: fixed point.
+    #: Whether all numbers have the same spacing, as in fixed point.
     fixed: bool = False
 
 

@@ -134,7 +134,7 @@ def guarantee(
 
     Raises
     ------
-    TypeError : limits that are not from :func:`limits`.
+    TypeError : `within` is not a result of :func:`limits`.
     ValueError : the format has no compiled loops, or a covariance is not definite in it.
     """
     if not isinstance(within, Limits):
