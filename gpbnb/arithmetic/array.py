@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import entries, exact_ratio
-from gpbnb.arithmetic.functions import power
+from gpbnb.arithmetic.functions import kept, lines, power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.text import decimal_text, in_columns
@@ -303,45 +302,42 @@ class FloatArray(NumPyProtocols):
         """Return the correctly rounded square root of each entry; also ``np.sqrt(x)``."""
         return self._unary("sqrt")
 
-    def sum(self, axis: int | None = None) -> FloatArray:
+    def sum(self, axis: int | None = None, keepdims: bool = False) -> FloatArray:
         """Add up from left to right, ``((x1 + x2) + x3) + ...``; the sum of no entries is zero.
 
         Parameters
         ----------
         axis : along which to add; all entries, row after row, if None.
+        keepdims : whether the result keeps each axis that is added up, with length 1.
 
         References
         ----------
         hung1984, ch. II, (17).
         """
-        return self._reduce("add", axis, 0)
+        return kept(self, self._reduce("add", axis, 0), axis, keepdims)
 
-    def prod(self, axis: int | None = None) -> FloatArray:
+    def prod(self, axis: int | None = None, keepdims: bool = False) -> FloatArray:
         """Multiply from left to right; the product of no entries is one.
 
         Parameters
         ----------
-        axis : along which to multiply; all entries, row after row, if None.
+        axis, keepdims : as in :meth:`sum`.
 
         References
         ----------
         hung1984, ch. II, (19).
         """
-        return self._reduce("multiply", axis, 1)
+        return kept(self, self._reduce("multiply", axis, 1), axis, keepdims)
 
     def _reduce(self, name: str, axis: Any, of_none: int) -> FloatArray:
-        try:
-            axis = None if axis is None else operator.index(axis)
-        except TypeError:
-            raise TypeError(f"axis: got {axis!r}; needed an int or None; reduce one axis at a time") from None
-        lines = self.reshape(-1) if axis is None else self.moved(lambda a: np.moveaxis(a, axis, 0))
-        if not len(lines):
-            return self._zeros(lines.shape[1:]) + of_none
-        if (components := self.backend.fold(name, lines.components)) is not None:
+        given: FloatArray = lines(self, axis)
+        if not len(given):
+            return self._zeros(given.shape[1:]) + of_none
+        if (components := self.backend.fold(name, given.components)) is not None:
             return self.from_components(self.backend, components, self.format)
-        total = lines[0]
-        for i in range(1, len(lines)):
-            total = self._binary(name, total, lines[i])
+        total = given[0]
+        for line in given[1:]:
+            total = self._binary(name, total, line)
         return total
 
     def _zeros(self, shape: tuple[int, ...]) -> FloatArray:

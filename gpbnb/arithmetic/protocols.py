@@ -6,7 +6,7 @@ import difflib
 import inspect
 import operator
 from abc import abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from fractions import Fraction
 from functools import partial
 from typing import Any, cast
@@ -40,8 +40,9 @@ class NumPyProtocols:
             raise AttributeError(name)
         known = [each for each in dir(type(self)) if not each.startswith("_")]
         raise AttributeError(
-            f"a {type(self).__name__} has no attribute {name!r}{_nearest(name, known, 'x.')}; for NumPy's other "
-            "attributes convert: x.to_float()"
+            f"a {type(self).__name__} has no attribute {name!r}; "
+            f"{_nearest_attribute(name, known) or 'needed one of ' + ', '.join(known)}; for NumPy's other attributes "
+            "convert: x.to_float()"
         )
 
     # -- methods of NumPy's arrays ------------------------------------------------------------------------
@@ -57,6 +58,26 @@ class NumPyProtocols:
     def min(self, axis: int | None = None, keepdims: bool = False) -> Any:
         """See :func:`gpbnb.arithmetic.functions.smallest`."""
         return functions.smallest(self, axis, keepdims)
+
+    def argmax(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.argmax`."""
+        return functions.argmax(self, axis, keepdims)
+
+    def argmin(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.argmin`."""
+        return functions.argmin(self, axis, keepdims)
+
+    def argsort(self, axis: int | None = -1) -> Any:
+        """See :func:`gpbnb.arithmetic.functions.argsort`."""
+        return functions.argsort(self, axis)
+
+    def all(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """Whether all entries differ from zero."""
+        return np.all(np.not_equal(self, 0), axis=axis, keepdims=keepdims)
+
+    def any(self, axis: int | None = None, keepdims: bool = False) -> Any:
+        """Whether an entry differs from zero."""
+        return np.any(np.not_equal(self, 0), axis=axis, keepdims=keepdims)
 
     def clip(self, low: Any = None, high: Any = None) -> Any:
         """See :func:`gpbnb.arithmetic.functions.clip`."""
@@ -186,19 +207,20 @@ class NumPyProtocols:
         if method == "__call__" and name in _UFUNCS and not kwargs:
             return _UFUNCS[name](*map(self.operand, inputs))
         if method == "reduce" and name in _REDUCTIONS:
-            axis = kwargs.pop("axis", 0)
+            axis, keepdims = kwargs.pop("axis", 0), kwargs.pop("keepdims", False)
             if not any(value is not None and value is not False for value in kwargs.values()):
-                return _REDUCTIONS[name](inputs[0], axis)
+                return _REDUCTIONS[name](inputs[0], axis, keepdims)
         options = f" with {', '.join(kwargs)}" if kwargs else ""
         called = f"np.{name}" if method == "__call__" else f"np.{name}.{method}"
-        near = "" if name in _UFUNCS else _nearest(name, sorted(_UFUNCS))
+        reductions = ", ".join(f"{each}.reduce" for each in _REDUCTIONS)
+        near = "" if name in _UFUNCS else _nearest(name, _UFUNCS)
         raise TypeError(
             f"got {called}{options} of a {type(self).__name__}; needed one of {', '.join(sorted(_UFUNCS))}, "
-            f"add.reduce, multiply.reduce, without further options{near}; or convert: x.to_float()"
+            f"{reductions}, without further options{near}; or convert: x.to_float()"
         )
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        name = func.__name__
+        name, called = func.__name__, f"{func.__module__.replace('numpy', 'np', 1)}.{func.__name__}"
         if name in _JOINERS or name in _MOVERS:
             return self._rearrange(func, args, kwargs)
         if name in _FUNCTIONS:
@@ -207,11 +229,11 @@ class NumPyProtocols:
                 signature.bind(self, *args, **kwargs)
             except TypeError as error:
                 taken = ", ".join(list(signature.parameters)[1:])
-                raise TypeError(f"np.{name} of a {type(self).__name__}: {error}; needed np.{name}({taken})") from None
+                raise TypeError(f"{called} of a {type(self).__name__}: {error}; needed {called}({taken})") from None
             return _FUNCTIONS[name](self, *args, **kwargs)
         known = sorted((*_JOINERS, *_MOVERS, *_FUNCTIONS))
         raise TypeError(
-            f"got np.{name} of a {type(self).__name__}; needed one of {', '.join(known)}{_nearest(name, known)}; for "
+            f"got {called} of a {type(self).__name__}; needed one of {', '.join(known)}{_nearest(name, known)}; for "
             "linear algebra see gpbnb.linalg; or convert: x.to_float()"
         )
 
@@ -234,17 +256,29 @@ class NumPyProtocols:
 
 
 _OTHER_NAMES = {
-    "argmax": "max", "argmin": "min", "argsort": "sort", "std": "mean", "var": "mean", "exp2": "exp", "log2": "log",
-    "log10": "log", "float_power": "power", "cumprod": "prod", "inner": "dot", "vdot": "dot", "tensordot": "einsum",
-    "average": "mean", "hypot": "sqrt", "cbrt": "sqrt", "conjugate": "copy", "conj": "copy", "real": "copy",
-    "det": "trace", "flat": "ravel", "nbytes": "size", "dtype": "format",
+    "std": "mean", "var": "mean", "average": "mean", "exp2": "exp", "log2": "log", "log10": "log",
+    "float_power": "power", "cumprod": "prod", "inner": "dot", "vdot": "dot", "tensordot": "einsum", "hypot": "sqrt",
+    "conjugate": "copy", "conj": "copy", "real": "copy", "fmax": "maximum", "fmin": "minimum",
+    "array_equiv": "array_equal", "ediff1d": "diff", "lexsort": "argsort", "full": "full_like",
+    "flat": "ravel", "nbytes": "size", "dtype": "format",
 }  # fmt: skip
 
 
-def _nearest(name: str, known: Sequence[str], prefix: str = "np.") -> str:
-    """Return a hint at the intended function or the most similar name; empty if there is none."""
-    near = [_OTHER_NAMES[name]] if _OTHER_NAMES.get(name) in known else difflib.get_close_matches(name, known, 1)
-    return f"; the nearest is {prefix}{near[0]}" if near else ""
+def _nearest(name: str, known: Container[str]) -> str:
+    """Return a hint at the intended function of NumPy; empty if there is none."""
+    found = _OTHER_NAMES.get(name, name.removeprefix("nan"))
+    return f"; the nearest is np.{found}" if found in known else ""
+
+
+def _nearest_attribute(name: str, known: Sequence[str]) -> str:
+    """Return a hint at the intended attribute, or at the function to write in its place; empty if there is none."""
+    if name in {*_MOVERS, *_FUNCTIONS, *_UFUNCS}:
+        return f"write np.{'linalg.' if name == 'norm' else ''}{name}(x)"
+    if (other := _OTHER_NAMES.get(name, name.removeprefix("nan"))) in known:
+        return f"the nearest is x.{other}"
+    # A name of NumPy's means something else than a similar one here; other names may be slips.
+    near = [] if hasattr(np, name) or hasattr(np.ndarray, name) else difflib.get_close_matches(name, known, 1, 0.8)
+    return f"the nearest is x.{near[0]}" if near else ""
 
 
 def broadcast(name: str, a: tuple[int, ...], b: tuple[int, ...]) -> None:
@@ -278,14 +312,27 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "less_equal": operator.le,
     "greater": operator.gt,
     "greater_equal": operator.ge,
+    "maximum": functions.maximum,
+    "minimum": functions.minimum,
+    "sign": functions.sign,
+    "isfinite": lambda a: _everywhere(a, True),
+    "isinf": lambda a: _everywhere(a, False),
+    "isnan": lambda a: _everywhere(a, False),
     "power": lambda a, b: functions.power(a, _exponent(b)),
     **{name: partial(functions.elementary, name) for name in functions.ELEMENTARY},
 }
 
 _REDUCTIONS: dict[str, Callable[..., Any]] = {
-    "add": lambda a, axis: a.sum(axis),
-    "multiply": lambda a, axis: a.prod(axis),
+    "add": lambda a, axis, keepdims: a.sum(axis, keepdims),
+    "multiply": lambda a, axis, keepdims: a.prod(axis, keepdims),
+    "maximum": functions.largest,
+    "minimum": functions.smallest,
 }
+
+
+def _everywhere(x: Any, answer: bool) -> Any:
+    """Return one answer for each entry, as no number of a format is infinite or NaN."""
+    return np.full(x.shape, answer)[()]
 
 
 def _dot(x: NumPyProtocols, a: Any, b: Any) -> Any:
@@ -327,8 +374,17 @@ def _exponent(value: Any) -> Any:
 
 
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
+    "all": lambda x, a, axis=None, keepdims=False: a.all(axis, keepdims),
+    "allclose": lambda x, a, b, rtol=1e-5, atol=1e-8: bool(np.all(functions.isclose(a, b, rtol, atol))),
+    "any": lambda x, a, axis=None, keepdims=False: a.any(axis, keepdims),
+    "argmax": lambda x, a, axis=None, keepdims=False: a.argmax(axis, keepdims),
+    "argmin": lambda x, a, axis=None, keepdims=False: a.argmin(axis, keepdims),
+    "argsort": lambda x, a, axis=-1: a.argsort(axis),
     "array_equal": _array_equal,
+    "diff": lambda x, a, n=1, axis=-1: functions.diff(a, n, axis),
     "dot": _dot,
+    "full_like": lambda x, a, fill_value: functions.full_like(a, fill_value),
+    "isclose": lambda x, a, b, rtol=1e-5, atol=1e-8: functions.isclose(a, b, rtol, atol),
     "ndim": lambda x, a: a.ndim,
     "outer": lambda x, a, b: x.operand(a).reshape(-1, 1) * x.operand(b).reshape(1, -1),
     "amax": lambda x, a, axis=None, keepdims=False: a.max(axis, keepdims),
@@ -341,15 +397,15 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "max": lambda x, a, axis=None, keepdims=False: a.max(axis, keepdims),
     "mean": lambda x, a, axis=None, keepdims=False: a.mean(axis, keepdims),
     "min": lambda x, a, axis=None, keepdims=False: a.min(axis, keepdims),
-    "norm": lambda x, a, ord=None, axis=None: functions.norm(a, ord, axis),
-    "ones_like": lambda x, a: a * 0 + 1,
-    "prod": lambda x, a, axis=None, keepdims=False: functions.kept(a, a.prod(axis), axis, keepdims),
+    "norm": lambda x, a, ord=None, axis=None, keepdims=False: functions.norm(a, ord, axis, keepdims),
+    "ones_like": lambda x, a: functions.full_like(a, 1),
+    "prod": lambda x, a, axis=None, keepdims=False: a.prod(axis, keepdims),
     "save": lambda x, file, arr, **options: np.save(file, np.asarray(arr), **options),
     "sort": lambda x, a, axis=-1: functions.sort(a, axis),
     "shape": lambda x, a: a.shape,
     "size": lambda x, a: a.size,
-    "sum": lambda x, a, axis=None, keepdims=False: functions.kept(a, a.sum(axis), axis, keepdims),
+    "sum": lambda x, a, axis=None, keepdims=False: a.sum(axis, keepdims),
     "trace": lambda x, a: a.trace(),
     "where": _where,
-    "zeros_like": lambda x, a: a * 0,
+    "zeros_like": lambda x, a: functions.full_like(a, 0),
 }

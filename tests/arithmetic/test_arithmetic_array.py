@@ -632,9 +632,10 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("in place", lambda: operator.iadd(np.zeros(3), V), TypeError, "got np.add with out of a FloatArray; needed one"),
     ("outer", lambda: np.add.outer(V, V), TypeError, "got np.add.outer of a FloatArray; needed one of"),
     ("np.median", lambda: np.median(V), TypeError, "got np.median of a FloatArray; needed one of"),
-    ("np.linalg", lambda: np.linalg.inv(rows(2)), TypeError, "for linear algebra see gpbnb.linalg; or convert: x.to_f"),
+    ("np.linalg", lambda: np.linalg.inv(rows(2)), TypeError, "got np.linalg.inv of a FloatArray; needed one of all,"),
+    ("np.linalg, cure", lambda: np.linalg.inv(rows(2)), TypeError, "for linear algebra see gpbnb.linalg; or convert:"),
     ("initial", lambda: np.sum(V, initial=1), TypeError, "needed np.sum(a, axis, keepdims)"),
-    ("keepdims reduce", lambda: np.add.reduce(V, keepdims=True), TypeError, "got np.add.reduce with keepdims of a Fl"),
+    ("initial reduce", lambda: np.add.reduce(V, initial=1), TypeError, "got np.add.reduce with initial of a FloatArr"),
     ("dtype", lambda: np.concatenate([V, V], dtype=float), TypeError, "got np.concatenate of a FloatArray with dtype;"),
     ("place", lambda: np.transpose(a=V), TypeError, "got np.transpose with a FloatArray in an unexpected place; neede"),
     ("condition", lambda: np.where(V, V, V), TypeError, "where: got a FloatArray as condition; needed a boolean arr"),
@@ -717,8 +718,10 @@ class TestLeavingTheFormat:
         [
             (lambda x: x.summ(), "the nearest is x.sum"),
             (lambda x: x.dtype, "the nearest is x.format"),
-            (lambda x: x.argmax(), "the nearest is x.max"),
-            (lambda x: np.argsort(x), "the nearest is np.sort"),
+            (lambda x: x.sort(), r"write np\.sort\(x\)"),
+            (lambda x: x.norm(), r"write np\.linalg\.norm\(x\)"),
+            (lambda x: x.nanmax(), r"the nearest is x\.max"),
+            (lambda x: np.nanmin(x), r"the nearest is np\.min"),
             (lambda x: np.std(x), "the nearest is np.mean"),
             (lambda x: np.log2(x), "the nearest is np.log"),
             (lambda x: np.hypot(x, x), "the nearest is np.sqrt"),
@@ -728,3 +731,11 @@ class TestLeavingTheFormat:
     def test_unknown_names_have_a_hint(self, wrong, near) -> None:
         with pytest.raises((AttributeError, TypeError), match=near):
             wrong(self.HALF)
+
+    @pytest.mark.parametrize("wrong", [lambda x: x.strides, lambda x: x.zzz, lambda x: np.logaddexp(x, x), np.unwrap])
+    def test_a_name_with_nothing_like_it_lists_what_there_is(self, wrong) -> None:
+        with pytest.raises(
+            (AttributeError, TypeError), match=r"needed one of (T, all|absolute, add|all, allclose),"
+        ) as no:
+            wrong(self.HALF)
+        assert "nearest" not in str(no.value)

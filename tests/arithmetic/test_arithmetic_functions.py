@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from fractions import Fraction
+from itertools import pairwise
 
 import flint
 import mpmath
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, Rounding
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.functions import ELEMENTARY
+from gpbnb.arithmetic.named import BINARY16
 
 FORMATS = [FloatFormat(2, 11), FloatFormat(10, 4), FloatFormat(2, 113), FloatFormat(2, 24, Rounding.CHOP)]
 
@@ -62,6 +65,94 @@ def test_choosing_and_moving_rounds_nothing(fmt):
     assert pickle.loads(pickle.dumps(x)).tolist() == x.tolist()
 
 
+@pytest.mark.parametrize("name", ["sum", "prod", "mean", "max", "min", "argmax", "argmin", "any", "all", "norm"])
+@pytest.mark.parametrize("axis", [None, 0, 1, -1])
+def test_reductions_keep_dimensions(name, axis, fmt):
+    """The entries are those without keepdims, and the shape is NumPy's; methods and functions agree."""
+    x = drawn(fmt, 3, 4)
+    function = np.linalg.norm if name == "norm" else getattr(np, name)
+    flat, kept = function(x, axis=axis), function(x, axis=axis, keepdims=True)
+    assert kept.shape == function(x.to_float(), axis=axis, keepdims=True).shape
+    assert np.array_equal(kept.reshape(flat.shape), flat)
+    if name != "norm":
+        assert np.array_equal(getattr(x, name)(axis=axis, keepdims=True), kept)
+        assert np.array_equal(getattr(x, name)(axis), flat)
+
+
+def test_ufuncs_reduce(fmt):
+    x = drawn(fmt, 3, 4)
+    for ufunc, method in ((np.add, x.sum), (np.multiply, x.prod), (np.maximum, x.max), (np.minimum, x.min)):
+        assert ufunc.reduce(x).tolist() == method(0).tolist()
+        assert ufunc.reduce(x, axis=1, keepdims=True).tolist() == method(1, keepdims=True).tolist()
+
+
+def test_finding_and_comparing_rounds_nothing(fmt):
+    x = fmt.array(np.random.default_rng(3).integers(-3, 4, (4, 6)) / 2)  # with ties and zeros
+    rows = x.to_float()
+    for axis in (None, 0, 1):
+        assert np.array_equal(np.argmax(x, axis=axis), np.argmax(rows, axis=axis))
+        assert np.array_equal(np.argmin(x, axis=axis), np.argmin(rows, axis=axis))
+        assert np.array_equal(np.argsort(x, axis=axis), np.argsort(rows, axis=axis, kind="stable"))
+        assert np.array_equal(np.any(x, axis=axis), np.any(rows, axis=axis))
+        assert np.array_equal(np.all(x, axis=axis), np.all(rows, axis=axis))
+    assert x.argsort().tolist() == np.argsort(rows, kind="stable").tolist()
+    assert np.sign(x).tolist() == np.sign(rows).tolist()
+    assert np.sign(x[0, 0]).format == fmt
+    assert np.maximum(x, x[1]).tolist() == np.maximum(rows, rows[1]).tolist()
+    assert np.minimum(0.5, x).tolist() == np.minimum(0.5, rows).tolist()
+    assert np.full_like(x, "2.5").tolist() == [[Fraction(5, 2)] * 6] * 4
+    assert np.full_like(x, 3).format == fmt
+    assert not np.isnan(x).any()
+    assert not np.isinf(x).any()
+    assert np.isfinite(x).all()
+    assert np.isfinite(x).shape == x.shape
+
+
+def test_numbers_that_float64_cannot_tell_apart_are_compared_exactly():
+    fmt = FloatFormat(2, 113)
+    x = fmt.array([1, 1 + Fraction(1, 2**100), 1])
+    assert np.argmax(x) == 1
+    assert np.argsort(-x).tolist() == [1, 0, 2]
+    assert np.sign(x - 1).tolist() == [0, 1, 0]
+    assert np.maximum(x, 1).tolist() == x.tolist()
+    assert np.any(x - 1)
+    assert not np.array_equal(x, [1, 1, 1])
+
+
+def test_closeness_is_computed_exactly_from_any_numbers():
+    fmt = FloatFormat(10, 30)
+    edge = 1 + Fraction(1e-8) + Fraction(1e-5)  # the largest number close to 1, which float64 does not hold
+    x, above = fmt.array([edge, 1]), edge + Fraction(1, 10**28)
+    assert np.isclose(np.array([edge, above], dtype=object), fmt.array(1)).tolist() == [True, False]
+    assert np.allclose(x, 1)
+    assert not np.allclose(x, 1, rtol=0)
+    assert np.allclose(x, [1.1, 1.0], rtol=0, atol="0.1")
+    assert np.allclose(x, FloatFormat(2, 8).array(1))
+
+
+def test_differences_are_one_subtraction_each(fmt):
+    x = drawn(fmt, 3, 5)
+    rows = x.to_fractions()
+    assert np.diff(x).tolist() == [[fmt.round(b - a) for a, b in pairwise(row)] for row in rows]
+    assert np.diff(x, axis=0).tolist() == (x[1:] - x[:-1]).tolist()
+    assert np.diff(x, 2).tolist() == np.diff(np.diff(x)).tolist()
+    assert np.diff(x, n=0).tolist() == x.tolist()
+
+
+def test_products_of_vectors_and_diagonals(fmt):
+    a, b, cube = drawn(fmt, 3, 3), drawn(fmt, 2, 4), drawn(fmt, 2, 2, 3)
+    for first, second in ((a[0], b[0]), (a[0], b), (b, a[0]), (a, cube), (b[0], 2)):
+        exact = np.kron(first.to_fractions(), second if isinstance(second, int) else second.to_fractions())
+        assert np.kron(first, second).tolist() == np.vectorize(fmt.round, otypes=[object])(exact).tolist()
+    assert np.einsum("ii", a).item() == np.trace(a).item()
+    assert np.einsum("ii->i", a).tolist() == np.diagonal(a).tolist()
+    assert np.einsum("iij->j", cube).tolist() == (cube[0, 0] + cube[1, 1]).tolist()
+    assert np.einsum("iji->ij", cube.transpose(0, 2, 1)).tolist() == [cube[0, 0].tolist(), cube[1, 1].tolist()]
+    diagonal = np.diagonal(a)
+    assert np.einsum("ii,i", a, b[0, :3]).item() == (diagonal * b[0, :3]).sum().item()
+    assert np.einsum("ij,jk->ik", a[:0], a).shape == (0, 3)
+
+
 def test_products(fmt):
     a, b = drawn(fmt, 2, 3), drawn(fmt, 3, 2)
     assert np.einsum("ij,jk->ik", a, b).tolist() == (a @ b).tolist() == a.dot(b).tolist()
@@ -110,6 +201,16 @@ def test_elementary_functions_at_exact_points_and_outside():
             getattr(np, name)(fmt.array(value))
 
 
+@pytest.mark.parametrize(("fmt", "high"), [(BINARY16, 12), (FixedFormat(3, 8), 7.5)], ids=["binary16", "fixed"])
+def test_elementary_functions_name_themselves_and_the_entry(fmt, high):
+    with pytest.raises(OverflowError, match=r"^np\.exp at \[1\]: got a result of about .*; needed"):
+        np.exp(fmt.array([1, high]))
+    with pytest.raises(OverflowError, match=r"^np\.exp: got a result"):
+        np.exp(fmt.array(high))
+    with pytest.raises(ValueError, match=r"got np\.log of 0\.0 at \[1, 0\]; needed"):
+        np.log(fmt.array([[1], [0]]))
+
+
 def test_numbers_of_mpmath_and_flint_are_read_exactly():
     fmt = FloatFormat(2, 200)
     with mpmath.workprec(150):
@@ -133,11 +234,18 @@ def test_unknown_names_give_the_nearest():
 @pytest.mark.parametrize(
     ("call", "error"),
     [
-        (lambda x: np.einsum("ii->i", x), ValueError),
+        (lambda x: np.einsum("ii->ii", x), ValueError),
+        (lambda x: np.einsum("ii", x[:1]), ValueError),
         (lambda x: np.einsum("ij...", x), ValueError),
         (lambda x: np.einsum("ij,k->i", x, x), ValueError),
-        (lambda x: np.kron(x[0], x), ValueError),
         (lambda x: np.linalg.norm(x, 3), ValueError),
+        (lambda x: np.linalg.norm(x[None], 1), ValueError),
+        (lambda x: np.diff(x, -1), ValueError),
+        (lambda x: np.diff(x[0, 0]), ValueError),
+        (lambda x: np.max(x, axis=(0, 1)), TypeError),
+        (lambda x: np.argmax(x[:0]), ValueError),
+        (lambda x: np.full_like(x, "1/3"), ValueError),
+        (lambda x: np.allclose(x, float("nan")), ValueError),
         (lambda x: np.mean(x[:0]), ValueError),
         (lambda x: np.max(x[:0]), ValueError),
         (lambda x: np.trace(x[0]), ValueError),
