@@ -47,15 +47,22 @@ def elementary(name: str, x: Any) -> Any:
 
 
 def _rounded(name: str, value: Fraction, fmt: Any, place: str) -> Fraction:
-    before, bits = ctx.prec, 128
+    kernel, before, bits = fmt.kernel, ctx.prec, 128
+    drawn = getattr(kernel, "count", None)
+
+    def rounded(end: Any) -> Fraction:
+        if drawn is not None:
+            kernel.count = drawn  # so that stochastic rounding compares both ends with the same random bits
+        return Fraction(fmt.round(_exactly(end)))
+
     try:
         while bits <= _MOST_BITS:
             ctx.prec = bits
             ball = getattr(arb(value.numerator) / arb(value.denominator), _ARB_NAMES.get(name, name))()
             if ball.is_finite():
-                low, high = (fmt.round(_exactly(end)) for end in (ball.lower(), ball.upper()))
+                low, high = rounded(ball.lower()), rounded(ball.upper())
                 if low == high:
-                    return Fraction(low)
+                    return low
             elif bits > 1024:
                 break
             bits *= 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from fractions import Fraction
 from itertools import pairwise
@@ -189,6 +190,15 @@ def test_elementary_functions_are_correctly_rounded(name, fmt):
             significand, exponent = true.man_exp
             sign = -1 if true < 0 else 1
             assert found == fmt.round(sign * Fraction(int(significand)) * Fraction(2) ** int(exponent))
+
+
+def test_stochastic_rounding_of_elementary_functions_has_the_exact_mean():
+    fmt, count = FloatFormat(2, 4, Rounding.STOCHASTIC, seed=3), 2000
+    fmt.restart()
+    found = np.exp(fmt.array([1] * count)).to_float()
+    up = (math.e - 2.5) / 0.25  # between the neighbours 2.5 and 2.75
+    assert set(found) == {2.5, 2.75}
+    assert abs(np.mean(found == 2.75) - up) < 4 * math.sqrt(up * (1 - up) / count)  # four standard errors
 
 
 def test_elementary_functions_at_exact_points_and_outside():
