@@ -23,7 +23,7 @@ from gpbnb.arithmetic.kernels.limited_backends import (
     mixed_tag,
     run_tag,
 )
-from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules
+from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rational import exact
 
@@ -48,7 +48,7 @@ class FixedFormat:
     ----------
     integer_bits : i, bits before the binary point, without the sign.
     fraction_bits : f, bits after it; the word has 1 + i + f bits.
-    rounding : applied to every stored number and every result.
+    rounding : applied to every stored number and every result; a :class:`Rounding`, or its name, such as "chop".
     overflow : "raise" an OverflowError that names the operation and the entry, "saturate" at the nearest limit, or
         "wrap" around as two's complement does.
     seed : seed for stochastic rounding.
@@ -56,7 +56,7 @@ class FixedFormat:
     Raises
     ------
     TypeError : a parameter is not of its type.
-    ValueError : no bits at all, or an unknown overflow.
+    ValueError : no bits at all, or an unknown rounding or overflow.
 
     Examples
     --------
@@ -77,8 +77,12 @@ class FixedFormat:
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
                 raise TypeError(f"{name}: got {value!r} of type {type(value).__name__}; needed an int")
             object.__setattr__(self, name, int(value))
-        if not isinstance(self.rounding, Rounding):
-            raise TypeError(f"rounding: got {self.rounding!r}; needed one of {', '.join(map(str, Rounding))}")
+        if not isinstance(self.rounding, (Rounding, str)):
+            raise TypeError(
+                f"rounding: got {self.rounding!r} of type {type(self.rounding).__name__}; "
+                f"needed one of {', '.join(map(str, Rounding))}, or its name"
+            )
+        object.__setattr__(self, "rounding", rounding_named(self.rounding))
         if not 1 <= self.precision <= LARGEST_BITS:
             raise ValueError(
                 f"got {self.integer_bits} integer bits and {self.fraction_bits} fraction bits; needed 1 to "
@@ -156,6 +160,7 @@ def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overf
     ----------
     values : numbers that occur, of any shape, such as the range of a variable in a reference run, with a margin.
     bits : bits of the word, including its sign.
+    rounding, overflow : as for :class:`FixedFormat`.
 
     Raises
     ------

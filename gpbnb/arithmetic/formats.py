@@ -26,7 +26,7 @@ from gpbnb.arithmetic.kernels.limited_backends import (
     mixed_tag,
     run_tag,
 )
-from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules
+from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.kernels.tags import Tag
 
 __all__ = ["FloatFormat", "Rounding", "prints_as"]
@@ -42,7 +42,7 @@ class FloatFormat:
     ----------
     base : b, an int of at least 2.
     precision : t, digits of the significand, an int of at least 1.
-    rounding : applied to every stored number and every result.
+    rounding : applied to every stored number and every result; a :class:`Rounding`, or its name, such as "chop".
     emin, emax : exponents of the least normal and of the largest number, as IEEE 754 counts them:
         :math:`b^{\text{emin}}` and :math:`d.dd\dots\times b^{\text{emax}}`. Give both or neither.
     subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Otherwise
@@ -54,8 +54,8 @@ class FloatFormat:
     Raises
     ------
     TypeError : a parameter is not of its type.
-    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; one of `emin` and `emax` without the
-        other, or ``emin > emax``; a largest number that is not in the format.
+    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; no rounding of this name; one of
+        `emin` and `emax` without the other, or ``emin > emax``; a largest number that is not in the format.
 
     Notes
     -----
@@ -91,11 +91,12 @@ class FloatFormat:
             if value < least:
                 raise ValueError(f"{name}: got {value}; needed an int of at least {least}")
             object.__setattr__(self, name, int(value))
-        if not isinstance(self.rounding, Rounding):
+        if not isinstance(self.rounding, (Rounding, str)):
             raise TypeError(
                 f"rounding: got {self.rounding!r} of type {type(self.rounding).__name__}; "
-                f"needed one of {', '.join(map(str, Rounding))}"
+                f"needed one of {', '.join(map(str, Rounding))}, or its name"
             )
+        object.__setattr__(self, "rounding", rounding_named(self.rounding))
         if self.precision > LARGEST_BITS / math.log2(self.base):
             raise ValueError(
                 f"precision: got {self.precision} digits; needed at most "

@@ -5,9 +5,11 @@ from __future__ import annotations
 import operator
 from typing import Any
 
-from gpbnb.arithmetic.formats import Rounding
+from gpbnb.arithmetic.kernels.rules import rounding_named
 from gpbnb.kalman.array_forms import ALIASES, AnyForm, ArrayForm
 from gpbnb.kalman.forms import Form
+
+__all__ = ["compiled_form", "form_named", "rounding_named", "whole_number"]
 
 
 def form_named(form: AnyForm | str) -> AnyForm:
@@ -48,29 +50,6 @@ def compiled_form(form: AnyForm | str) -> Form:
     if isinstance(found, ArrayForm):
         raise ValueError(f"got the {found} form; needed one with compiled loops: {', '.join(map(str, Form))}")
     return found
-
-
-def rounding_named(rounding: Rounding | str) -> Rounding:
-    """Return a rounding, or the rounding with this name.
-
-    Raises
-    ------
-    ValueError : no such rounding.
-
-    Examples
-    --------
-    >>> rounding_named("nearest")
-    <Rounding.NEAREST: 'nearest'>
-    """
-    if isinstance(rounding, Rounding):
-        return rounding
-    if isinstance(rounding, str):
-        wanted = rounding.strip().lower().replace("_", " ")
-        for each in Rounding:
-            if wanted in (each.value.lower(), each.name.lower().replace("_", " ")):
-                return each
-    names = ", ".join(repr(each.value) for each in Rounding)
-    raise ValueError(f"got rounding {rounding!r}; needed a Rounding or one of {names}")
 
 
 def whole_number(name: str, value: Any, least: int = 1) -> int:

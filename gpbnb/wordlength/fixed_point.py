@@ -218,7 +218,7 @@ def required_fraction_bits(
             if basis == "guarantee":
                 if bound is None:
                     bound = bound_per_unit(given, coefficient_bits, wide)
-                error = bound * (float(fmt.unit) * largest_rounding(rounding))
+                error = bound * (float(fmt.unit) * largest_rounding(fmt.rounding))
             else:
                 error = abs(emulated(given, z, fmt, coefficient_bits, wide)).max(axis=0)
             ratio = float((error[asked] / goal[asked]).max())

@@ -24,6 +24,7 @@ from hypothesis import strategies as st
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=1000)
@@ -574,8 +575,14 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("precision 0", lambda: FloatFormat(10, 0), ValueError, "precision: got 0; needed an int of at least 1"),
     ("precision 2.5", lambda: FloatFormat(10, 2.5), TypeError, "precision: got 2.5 of type float; needed an int of at"),
     ("precision vast", lambda: FloatFormat(2, 10**12), ValueError, "precision: got 1000000000000 digits; needed at mo"),
-    ("rounding str", lambda: FloatFormat(10, 4, "nearest"), TypeError,
-     "rounding: got 'nearest' of type str; needed one of Rounding.NEAREST, Rounding.CHOP"),
+    ("rounding int", lambda: FloatFormat(10, 4, 0), TypeError,
+     "rounding: got 0 of type int; needed one of Rounding.NEAREST, Rounding.CHOP"),
+    ("rounding None", lambda: FixedFormat(2, 4, None), TypeError,
+     "rounding: got None of type NoneType; needed one of Rounding.NEAREST, Rounding.CHOP"),
+    ("rounding str", lambda: FloatFormat(10, 4, "sideways"), ValueError,
+     "got rounding 'sideways'; needed a Rounding or one of 'nearest', 'chop'"),
+    ("rounding str, fixed", lambda: FixedFormat(2, 4, "sideways"), ValueError,
+     "got rounding 'sideways'; needed a Rounding or one of 'nearest', 'chop'"),
     # operands
     ("mixed +", lambda: V + W, ValueError, f"got operands in {D4} and {B8}; needed one format; convert one of them"),
     ("mixed @", lambda: V @ W, ValueError, f"got operands in {D4} and {B8}; needed one format"),

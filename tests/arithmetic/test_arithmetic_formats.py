@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from decimal import ROUND_DOWN, ROUND_HALF_UP, Context, Decimal
 from fractions import Fraction
 from itertools import pairwise
@@ -16,6 +17,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.fixed import FixedFormat, scaling
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
@@ -28,6 +30,21 @@ formats = st.builds(FloatFormat, bases, st.integers(1, 30), roundings)
 
 def oracle(x: Fraction, fmt: FloatFormat) -> Fraction:
     return oracles.rounded(x, fmt.base, fmt.precision, fmt.rounding is NEAREST)
+
+
+@pytest.mark.parametrize("name", ["nearest", "CHOP", " even ", "stochastic"])
+def test_a_rounding_is_accepted_by_its_name(name: str) -> None:
+    rounding = Rounding[name.strip().upper()]
+    for named, same in (
+        (FloatFormat(2, 8, name), FloatFormat(2, 8, rounding)),
+        (FixedFormat(2, 8, name), FixedFormat(2, 8, rounding)),
+        (replace(FloatFormat(2, 8), rounding=name), FloatFormat(2, 8, rounding)),
+        (scaling([3], 8, name), scaling([3], 8, rounding)),
+    ):
+        assert named == same
+        assert named.rounding is rounding
+        assert repr(named) == repr(same)
+        assert hash(named) == hash(same)
 
 
 @st.composite

@@ -108,6 +108,8 @@ def test_answers_count_fraction_bits() -> None:
         assert ratios[bits - 1] > 1
         assert f"{bits} fraction bits in a word of" in str(answer)
         assert f"{bits - 1} fraction bits give" in answer.why
+    named = fixed_point.required_fraction_bits(given, z, tolerance, "guarantee", "nearest")
+    assert named.tried == proved.tried
 
 
 def test_overflow_names_operation_and_step() -> None:

@@ -31,6 +31,29 @@ class Rounding(Enum):
         return Rounding.NEAREST, Rounding.CHOP
 
 
+def rounding_named(rounding: Rounding | str) -> Rounding:
+    """Return a rounding, or the rounding with this name; case is ignored.
+
+    Raises
+    ------
+    ValueError : no such rounding.
+
+    Examples
+    --------
+    >>> rounding_named("nearest")
+    <Rounding.NEAREST: 'nearest'>
+    """
+    if isinstance(rounding, Rounding):
+        return rounding
+    if isinstance(rounding, str):
+        wanted = rounding.strip().lower().replace("_", " ")
+        for each in Rounding:
+            if wanted in (each.value.lower(), each.name.lower().replace("_", " ")):
+                return each
+    names = ", ".join(repr(each.value) for each in Rounding)
+    raise ValueError(f"got rounding {rounding!r}; needed a Rounding or one of {names}")
+
+
 #: Order in which a sum of products is added: from left to right, pairwise, or in blocks.
 Order = Literal["left", "pairwise", "blocked"]
 
