@@ -26,7 +26,7 @@ from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.guarantee.gains import pack, widened_array
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
-from gpbnb.kalman.guarantee.program import advance
+from gpbnb.kalman.guarantee.program import Program, advance
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import rounding_named, whole_number
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
@@ -125,7 +125,8 @@ class LinearSystem:
 
         Raises
         ------
-        OverflowError : a number is beyond the range of the format's compiled loops.
+        OverflowError : a number is beyond the range of float64 or of the format's compiled loops. The message names
+            the state or output, counted from 0, and the step, counted from 1.
         """
         given, inputs = self.as_filter(), _inputs(self, u)
         start = np.concatenate([self.x0, exact([0] * self.p)])
@@ -138,9 +139,48 @@ class LinearSystem:
             tag = fmt.run_tag()
             coefficients, z, x = (pack(fmt, each) for each in (given.coefficients, inputs, start))
         program, out = given.program, np.zeros((len(inputs), *x.shape), x.dtype)
-        advance(tag, program.operations, program.outputs, coefficients[None], 0, z, x, out)
+        first = x.copy()
+        try:
+            advance(tag, program.operations, program.outputs, coefficients[None], 0, z, x, out)
+        except OverflowError as error:
+            raise OverflowError(f"{self._overflow(tag, program, coefficients, z, first)}: {error}") from None
         outputs = np.ascontiguousarray(out[:, self.n :])
-        return outputs if fmt is None else widened_array(outputs)
+        return outputs if fmt is None else self._widened(outputs)
+
+    def _overflow(self, tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> str:
+        """Return the first state or output that cannot be stored, and its step; `x` is the first state."""
+        for k in range(len(z)):
+            for i, value in enumerate(program.outputs):
+                operations = program.operations[: value - len(x) - z.shape[1] + 1]  # those that lead to this value
+                try:
+                    advance(
+                        tag,
+                        operations,
+                        np.minimum(program.outputs, value),
+                        coefficients[None],
+                        0,
+                        z[k : k + 1],
+                        x.copy(),
+                        np.empty((1, *x.shape), x.dtype),
+                    )
+                except OverflowError:
+                    return f"{f'state {i}' if i < self.n else f'output {i - self.n}'} at step {k + 1}"
+            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[k : k + 1], x, x[None].copy())
+        return "the run"
+
+    def _widened(self, outputs: NDArray[Any]) -> NDArray[np.float64]:
+        """Return packed outputs (steps, p) of any format as pairs of float64."""
+        try:
+            return widened_array(outputs)
+        except OverflowError:
+            for k, i in np.ndindex(outputs.shape[:2]):
+                try:
+                    widened_array(outputs[k : k + 1, i : i + 1])
+                except OverflowError:
+                    raise OverflowError(
+                        f"output {i} at step {k + 1}: got a number beyond the range of float64; scale the numbers"
+                    ) from None
+            raise
 
 
 def required_system_precision(
@@ -170,6 +210,7 @@ def required_system_precision(
     ------
     ValueError : inputs are missing or do not fit; the tolerance is not positive; or a bound is required for a system
         that does not start from rest.
+    OverflowError : an output of the system as given is beyond the range of float64.
     """
     tolerances = checked_tolerance(tolerance, system.p, "outputs", base, basis)
     steps, rounding = whole_number("steps", steps), rounding_named(rounding)
