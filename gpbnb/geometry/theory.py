@@ -103,7 +103,7 @@ class Case:
 
     def with_angle(self, name: str, size: float) -> Case:
         """Return a copy with one angle changed, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
-        which, axis = name[:-1], name[-1:]
+        which, axis = str(name)[:-1], str(name)[-1:]
         if which == "drift" or which not in vars(self) or axis not in ("1", "2", "3"):
             raise ValueError(f"got angle {name!r}; needed alpha, beta, gamma or their _rate and 1, 2 or 3: 'gamma1'")
         values = list(getattr(self, which))

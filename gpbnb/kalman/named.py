@@ -9,7 +9,7 @@ from gpbnb.arithmetic.kernels.rules import rounding_named
 from gpbnb.kalman.array_forms import ALIASES, AnyForm, ArrayForm
 from gpbnb.kalman.forms import Form
 
-__all__ = ["compiled_form", "form_named", "rounding_named", "whole_number"]
+__all__ = ["checked_name", "compiled_form", "form_named", "rounding_named", "whole_number"]
 
 
 def form_named(form: AnyForm | str) -> AnyForm:
@@ -68,3 +68,15 @@ def whole_number(name: str, value: Any, least: int = 1) -> int:
             if number >= least:
                 return number
     raise ValueError(f"got {value!r} {name}; needed a whole number, at least {least}")
+
+
+def checked_name(name: Any) -> str:
+    """Return the name of a model, which is text.
+
+    Raises
+    ------
+    TypeError : anything else.
+    """
+    if isinstance(name, str):
+        return name
+    raise TypeError(f"got name {name!r} of type {type(name).__name__}; needed text")

@@ -28,7 +28,7 @@ from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import Program, advance
 from gpbnb.kalman.missing import real_numbers
-from gpbnb.kalman.named import rounding_named, whole_number
+from gpbnb.kalman.named import checked_name, rounding_named, whole_number
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
 
 
@@ -49,6 +49,7 @@ class LinearSystem:
 
     Raises
     ------
+    TypeError : an entry that is not a number, or a name that is not text.
     ValueError : shapes that do not fit; NaN or infinity.
 
     Examples
@@ -68,6 +69,7 @@ class LinearSystem:
     name: str = "a linear system"
 
     def __post_init__(self) -> None:
+        checked_name(self.name)
         for letter in ("A", "B", "C", "D", "x0"):
             given = getattr(self, letter)
             if given is None and letter in ("C", "D", "x0"):

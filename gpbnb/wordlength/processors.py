@@ -18,6 +18,7 @@ from gpbnb.arithmetic.named import BFLOAT16, BINARY32
 from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import checked_name
 
 Format = FloatFormat | FixedFormat
 
@@ -34,6 +35,10 @@ class Processor:
     fused : whether products are added by fused multiply-add.
     compensated : whether the program updates the estimate by Kahan's compensated summation.
     order : of the additions in matrix products.
+
+    Raises
+    ------
+    TypeError : a name that is not text.
     """
 
     name: str
@@ -42,6 +47,9 @@ class Processor:
     fused: bool = False
     compensated: bool = False
     order: Order = "left"
+
+    def __post_init__(self) -> None:
+        checked_name(self.name)
 
 
 #: A microcontroller with single precision, an accelerator with and without wide sums, and 16-bit fixed point.

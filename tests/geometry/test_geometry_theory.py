@@ -136,6 +136,7 @@ def test_cases():
         (lambda: Case(drift=(1, math.nan)), "got drift = .*; needed 2 finite"),
         (lambda: Case().with_angle("delta1", 1), "got angle 'delta1'; needed alpha, beta"),
         (lambda: Case().with_angle("alpha4", 1), "got angle 'alpha4'"),
+        (lambda: Case().with_angle(5, 1), "got angle 5; needed alpha, beta"),
         (lambda: Case().with_angle("drift1", 1), "got angle 'drift1'"),
         (lambda: theory.small_angle_loss("theta1", 1), "got angle 'theta1'; needed one of alpha1"),
         (lambda: theory.reach("gamma1", -1), "got allowed = -1"),

@@ -11,6 +11,7 @@ from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.guarantee import linear
 from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.guarantee.linear import peak_gain
 from gpbnb.kalman.precision import required_precision
@@ -163,3 +164,19 @@ def test_an_overflow_names_output_and_step(C, place, fmt):
     assert np.isfinite(system.outputs([[0]] * (int(place[-1]) - 1), fmt)).all()
     with pytest.raises(OverflowError, match=rf"^{place}: got a (result|number) beyond the range of float64"):
         system.outputs([[0]] * 6, fmt)
+
+
+@pytest.mark.parametrize(
+    "named",
+    [
+        lambda name: LinearSystem([[1]], [[1]], name=name),
+        lambda name: linear.state_space([[1]], [[1]], name=name),
+        lambda name: linear.biquad(1, 0, 0, 0, 0, name),
+        lambda name: linear.controller("0.9", 1, 1, 0, name),
+    ],
+)
+def test_a_name_is_text(named):
+    assert named("mine").name == "mine"
+    for wrong in (5, None, b"mine"):
+        with pytest.raises(TypeError, match=r"got name .* of type .*; needed text"):
+            named(wrong)

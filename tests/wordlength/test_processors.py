@@ -111,3 +111,8 @@ def test_variants_differ_in_one_property_each() -> None:
     names = [each.name for each in processors.variants(8)]
     assert len(names) == len(set(names)) == 8
     assert len(processors.variants(24)) == 7
+
+
+def test_the_name_of_a_processor_is_text():
+    with pytest.raises(TypeError, match="got name 5 of type int; needed text"):
+        processors.Processor(5, BINARY32)

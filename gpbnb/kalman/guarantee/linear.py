@@ -26,6 +26,7 @@ from gpbnb.kalman.guarantee.program import (
     functionals,
     state_space_program,
 )
+from gpbnb.kalman.named import checked_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,11 +38,18 @@ class LinearFilter:
     program : operations of a step.
     coefficients : (c,), exact design values; a format stores each rounded.
     name : name in tables.
+
+    Raises
+    ------
+    TypeError : a name that is not text.
     """
 
     program: Program
     coefficients: NDArray[Any]
     name: str = "a linear filter"
+
+    def __post_init__(self) -> None:
+        checked_name(self.name)
 
     def schedule(self, fmt: FloatFormat) -> Schedule:
         """Return the filter in a format, for :func:`gpbnb.kalman.guarantee.bound.from_schedule`."""
