@@ -5,16 +5,24 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, get_args
 
+from gpbnb.kalman.guarantee.bound import limits
+from gpbnb.kalman.guarantee.envelope import Limits
+from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named
+from gpbnb.kalman.requirement import Basis
+from gpbnb.kalman.system import LinearSystem
 from gpbnb.wordlength.models import read_measurements, read_model
 from gpbnb.wordlength.report import study
 
 EPILOG = """
 The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. A filter may have known inputs
 B and u (or --inputs) and known offsets b of the states and d of the measurements. Numbers are read as decimals.
+The bases guarantee and probable hold for ever and need limits: --state and --innovation, or --measurement. A system
+needs --measurement.
 Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.
 """
 
@@ -46,34 +54,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--basis",
         action="append",
-        choices=("emulation", "bound"),
-        help="how to find the precision; may be given twice; default: both",
+        choices=get_args(Basis),
+        help="how to find the precision; may be given more than once; default: emulation and bound",
     )
+    for quantity in Limits._fields:
+        parser.add_argument(
+            f"--{quantity}",
+            metavar="LIMITS",
+            help=f"for the bases guarantee and probable: largest size of each {quantity} of the filter without "
+            "rounding, one number or one for each, such as 5,0.1",
+        )
     parser.add_argument("--report", type=Path, help="HTML file to write, with a JSON file of the same name beside it")
     given = parser.parse_args(arguments)
     command = shlex.join(["python", "-m", "gpbnb.wordlength", *map(str, arguments or sys.argv[1:])])
     try:
-        try:
-            tolerance = [float(each) for each in given.tolerance.split(",")]
-        except ValueError:
-            raise ValueError(
-                f"got --tolerance {given.tolerance}; needed numbers with commas between: 0.01,inf"
-            ) from None
+        tolerance = _numbers("tolerance", given.tolerance)
         form_named(given.form), rounding_named(given.rounding)
         model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
         z = read_measurements(given.measurements) if given.measurements else None
+        bases: Sequence[Basis] = given.basis or ("emulation", "bound")
+        sizes = {each: text for each in Limits._fields if (text := getattr(given, each)) is not None}
+        within = _limits(model, bases, {each: _numbers(each, text) for each, text in sizes.items()})
         report = study(
             model,
-            tolerance if len(tolerance) > 1 else tolerance[0],
+            tolerance,
             z,
             given.steps,
             given.base,
             given.rounding,
             given.form,
-            given.basis or ("emulation", "bound"),
-            str(given.measurements) if given.measurements else "simulated by the model, seed 0",
+            bases,
+            str(given.measurements) if given.measurements else "",
             command,
             lambda text: print(text, file=sys.stderr, flush=True),
+            within=within,
         )
         if given.report:
             given.report.write_text(report.to_html(), encoding="utf-8")
@@ -83,6 +97,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     print(report.text)
     return 0 if report.digits is not None else 1
+
+
+def _numbers(option: str, text: str) -> float | list[float]:
+    """Read the value of an option, one number or several with commas between."""
+    try:
+        found = [float(each) for each in text.split(",")]
+    except ValueError:
+        raise ValueError(f"got --{option} {text}; needed numbers with commas between: 0.01,inf") from None
+    return found if len(found) > 1 else found[0]
+
+
+def _limits(model: LinearModel | LinearSystem, bases: Sequence[Basis], sizes: Mapping[str, Any]) -> Limits | None:
+    """Return the limits that the bases need; None if they need none."""
+    asked = [each for each in bases if each in ("guarantee", "probable")]
+    options = ", ".join(f"--{each}" for each in sizes)
+    if not asked:
+        if sizes:
+            raise ValueError(f"got {options} without a basis that uses limits; needed --basis guarantee or probable")
+        return None
+    of_system = isinstance(model, LinearSystem)
+    needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
+    if not sizes or (of_system and set(sizes) != {"measurement"}):
+        raise ValueError(f"got --basis {asked[0]} with {options or 'no limits'}; needed {needed}")
+    return limits(model.n, model.m, **sizes)
 
 
 if __name__ == "__main__":

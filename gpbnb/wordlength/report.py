@@ -6,13 +6,14 @@ import html
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from gpbnb.kalman.array_forms import AnyForm
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
@@ -52,6 +53,8 @@ class Report:
     errors : error / tolerance of each state at the answer; None if the tolerance is infinite.
     ranges : name, smallest and largest power of two.
     command : the command that reproduces the report. versions : versions of the machine and packages.
+    limits : for the bases "guarantee" and "probable", the limits on each state, innovation and measurement of the
+        filter without rounding; None if there is no limit.
     """
 
     name: str
@@ -68,6 +71,7 @@ class Report:
     ranges: tuple[tuple[str, int, int], ...]
     command: str
     versions: dict[str, str]
+    limits: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
 
     @property
     def limiting(self) -> int | None:
@@ -97,6 +101,7 @@ def study(
     command: str = "",
     tell: Callable[[str], Any] = lambda text: None,
     progress: bool = False,
+    within: Limits | None = None,
 ) -> Report:
     """Find the answer for each basis and form, and collect what explains it.
 
@@ -104,12 +109,16 @@ def study(
     ----------
     z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
     steps : number of steps to simulate; by default the number of measurements, or 1000.
+    bases : as in :func:`gpbnb.kalman.precision.required_precision`; the first gives the answer.
     tell : function called with a line of text before each search.
+    within : result of :func:`gpbnb.kalman.guarantee.bound.limits`, for the bases "guarantee" and "probable".
 
     Raises
     ------
-    ValueError : for a reason given in :func:`gpbnb.kalman.precision.required_precision`.
+    ValueError : for a reason given in :func:`gpbnb.kalman.precision.required_precision`; missing measurements with a
+        basis that holds for all of them.
     """
+    given = z is not None
     count = steps if steps is not None else 1000 if z is None else len(z)
     if isinstance(model, LinearSystem):
         questions: list[tuple[str, Basis, AnyForm | None]] = [(basis, basis, None) for basis in bases]
@@ -117,13 +126,20 @@ def study(
         first = form_named(form)
         forms = [first, *(each for each in SIDE_BY_SIDE if each is not first)]
         questions = [(f"{each}, {basis}", basis, each) for each in forms for basis in bases]
-        if z is None:
+        if given and {*bases} & {"guarantee", "probable"} and without_missing(model, z)[0] is not model:
+            raise ValueError(
+                "got measurements of which some are missing, and a basis that holds for ever; needed measurements "
+                "without gaps; leave them out for this basis, which does not depend on them"
+            )
+        if not given:
             z = simulated_measurements(model, count)
     found: list[tuple[str, Requirement]] = []
     for label, basis, chosen in questions:
         tell(f"{label} …")
         chosen = Form.INNOVATION if chosen is None else chosen
-        answer = required_precision(model, count, tolerance, base, rounding, chosen, basis, z, progress=progress)
+        answer = required_precision(
+            model, count, tolerance, base, rounding, chosen, basis, z, within=within, progress=progress
+        )
         found.append((label, answer))
         tell(f"{label}: {answer}")
     main = found[0][1]
@@ -144,12 +160,13 @@ def study(
         str(rounding),
         count,
         tuple(_finite(float(each)) for each in tolerances),
-        source or ("given" if z is not None else "simulated by the model"),
+        source or ("given" if given else "simulated by the model, seed 0" if z is not None else "none"),
         tuple(_plain(label, answer) for label, answer in found),
         errors,
         ranges,
         command,
         machine(),
+        {} if within is None else {name: tuple(map(_finite, each.tolist())) for name, each in within._asdict().items()},
     )
 
 
@@ -197,6 +214,15 @@ svg { display: block; width: 100%; height: auto; fill: var(--text) }
 """
 
 
+_MEANINGS = {
+    "emulation": "An emulation holds for these measurements.",
+    "bound": "A bound holds for the arithmetic of this run, whatever its roundings.",
+    "guarantee": "A guarantee holds for ever, for all measurements within the limits.",
+    "probable": "A probable error is three standard deviations, if roundings are independent of each other and values "
+    "are as large as the limits allow.",
+}
+
+
 def page(report: Report) -> str:
     """Return a report as a self-contained HTML page."""
     unit = "bits" if report.base == 2 else f"digits of base {report.base}"
@@ -221,12 +247,13 @@ def page(report: Report) -> str:
             [
                 ("steps", f"{report.steps}"),
                 ("measurements", report.source),
-                ("tolerance", ", ".join("any" if t is None else f"{t:.6g}" for t in report.tolerance)),
+                ("tolerance", _numbers(report.tolerance)),
+                *((f"limit on the {name}", _numbers(each)) for name, each in report.limits.items()),
                 ("rounding", report.rounding),
             ],
         ),
-        "<p>An emulation holds for these measurements. A bound holds for the arithmetic of this run, whatever its "
-        "roundings. Neither limits the exponent range: see the ranges below.</p>",
+        f"<p>{' '.join(_MEANINGS[each] for each in dict.fromkeys(each.basis for each in report.answers))} "
+        "None of this limits the exponent range: see the ranges below.</p>",
         "<h2>Forms and bases compared</h2>",
         _table(("form and basis", unit, "answer"), rows),
         "<h2>Error against precision</h2>",
@@ -251,6 +278,10 @@ def page(report: Report) -> str:
     )
 
 
+def _numbers(limits: Sequence[float | None]) -> str:
+    return ", ".join("any" if each is None else f"{each:.6g}" for each in limits)
+
+
 def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
     head = "".join(f'<th scope="col">{html.escape(cell)}</th>' for cell in header)
     lines = ("".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in body)
@@ -269,7 +300,7 @@ def _power(base: int, exponent: int) -> str:
 
 
 _COLOURS = 6  # of _STYLE, one a form
-_DASHES = (("", "solid"), ("7 3", "dashed"), ("2 3", "dotted"))  # one a basis
+_DASHES = (("", "solid"), ("7 3", "dashed"), ("2 3", "dotted"), ("9 3 2 3", "double"))  # one a basis
 
 
 def _curves(answers: Sequence[Answer], unit: str) -> str:

@@ -13,6 +13,7 @@ from markup import Elements
 from scipy import signal
 
 from gpbnb import __main__ as top
+from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.system import LinearSystem
@@ -78,6 +79,89 @@ def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
     given = [str(files[0] / "model.toml"), "--tolerance", "1e-30", "--steps", "20", "--basis", "emulation"]
     assert main(given) == 1
     assert "no precision up to 53 digits" in capsys.readouterr().out
+
+
+def test_a_guarantee_takes_limits_and_shows_them(files, capsys):
+    folder = files[0]
+    given = [
+        str(folder / "model.toml"),
+        "--tolerance",
+        "0.01,inf",
+        "--steps",
+        "50",
+        "--report",
+        str(folder / "out.html"),
+    ]
+    bases = ["--basis", "guarantee", "--basis", "probable"]
+    assert main([*given, *bases, "--state", "1e4,50", "--innovation", "30"]) == 0
+    model, within = read_model(folder / "model.toml"), limits(2, 1, [1e4, 50], 30)
+    expected = required_precision(model, 50, (0.01, math.inf), basis="guarantee", within=within)
+    probable = required_precision(model, 50, (0.01, math.inf), form="UD", basis="probable", within=within)
+    assert capsys.readouterr().out.strip() == str(expected)
+    found = json.loads((folder / "out.json").read_text(encoding="utf-8"))
+    assert found["digits"] == expected.precision
+    assert found["limits"] == {"state": [1e4, 50], "innovation": [30], "measurement": [None]}
+    answers = {each["label"]: each["digits"] for each in found["answers"]}
+    assert answers["innovation, guarantee"] == expected.precision
+    assert answers["UD, probable"] == probable.precision
+    text = (folder / "out.html").read_text(encoding="utf-8")
+    assert "<td>limit on the state</td><td>10000, 50</td>" in text
+    assert "<td>limit on the measurement</td><td>any</td>" in text
+    assert "for all measurements within the limits" in text
+    assert "holds for these measurements" not in text
+    wider = [*given, "--basis", "guarantee", "--state", "1e8", "--innovation", "3e5"]
+    assert main(wider) == 0
+    assert json.loads((folder / "out.json").read_text(encoding="utf-8"))["digits"] > expected.precision
+
+
+def test_a_guarantee_refuses_measurements_with_gaps(files, capsys):
+    """The gaps would become a part of the model that repeats for ever."""
+    given = [str(files[0] / "model.toml"), "--tolerance", "0.01,inf", "--basis", "guarantee", "--measurement", "9"]
+    assert main([*given, "--measurements", str(files[0] / "z.csv")]) == 2
+    assert "got measurements of which some are missing, and a basis that holds for ever" in capsys.readouterr().err
+
+
+def test_a_guarantee_for_a_system_takes_limits_on_the_measurement(tmp_path, capsys):
+    path = tmp_path / "system.toml"
+    path.write_text("A = [[0.5]]\nB = [[1]]\n", encoding="utf-8")
+    given = [str(path), "--tolerance", "1e-4", "--basis", "guarantee", "--report", str(tmp_path / "out.html")]
+    assert main([*given, "--measurement", "2"]) == 0
+    expected = required_precision(read_model(path), 1000, 1e-4, basis="guarantee", within=limits(1, 1, measurement=2))
+    assert capsys.readouterr().out.strip() == str(expected)
+    found = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
+    assert found["limits"]["measurement"] == [2]
+    assert found["source"] == "none"
+    for wrong in ([], ["--state", "1", "--innovation", "1"], ["--state", "1", "--measurement", "2"]):
+        assert main([*given, *wrong]) == 2
+        shown = capsys.readouterr().err
+        assert "got --basis guarantee with" in shown
+        assert "needed --measurement" in shown
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ["--basis", "guarantee"],
+            "got --basis guarantee with no limits; needed --state and --innovation, or --measure",
+        ),
+        (["--basis", "probable"], "got --basis probable with no limits; needed --state and --innovation, or --measure"),
+        (["--basis", "guarantee", "--state", "5"], "needed a finite limit for each measurement, or for each state and"),
+        (["--basis", "guarantee", "--state", "5,x"], "got --state 5,x; needed numbers with commas between"),
+        (["--basis", "guarantee", "--measurement", "1,2,3"], "on the measurement; needed one number, or 1"),
+        (["--basis", "guarantee", "--measurement=-1"], "on the measurement; needed numbers that are not negative"),
+        (
+            ["--state", "5", "--innovation", "1"],
+            "got --state, --innovation without a basis that uses limits; needed --",
+        ),
+        (["--basis", "bound", "--measurement", "5"], "got --measurement without a basis that uses limits; needed --ba"),
+        (["--basis", "guarantee", "--measurement", "5", "--form", "Cholesky"], "got the Carlson form and basis"),
+    ],
+)
+def test_limits_that_are_missing_or_of_no_use_are_refused(files, capsys, options, message):
+    given = [str(files[0] / "model.toml"), "--tolerance", "0.01", "--steps", "20"]
+    assert main([*given, *options]) == 2
+    assert message in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

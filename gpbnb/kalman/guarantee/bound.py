@@ -95,12 +95,15 @@ def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, me
 
     Raises
     ------
-    ValueError : a limit is negative or NaN, or too few limits are finite.
+    ValueError : a limit is negative or NaN; neither one number nor one per entry; or too few limits are finite.
     """
-    X, V, Z = (
-        np.array(np.broadcast_to(np.asarray(each, dtype=np.float64), (size,)))
-        for each, size in ((state, n), (innovation, m), (measurement, m))
-    )
+    found = []
+    for name, each, size in (("state", state, n), ("innovation", innovation, m), ("measurement", measurement, m)):
+        given = np.asarray(each, dtype=np.float64)
+        if given.shape not in ((), (1,), (size,)):
+            raise ValueError(f"got limits {given} on the {name}; needed one number, or {size}")
+        found.append(np.array(np.broadcast_to(given, (size,))))
+    X, V, Z = found
     for name, each in (("state", X), ("innovation", V), ("measurement", Z)):
         if np.isnan(each).any() or (each < 0).any():
             raise ValueError(f"got a limit {each} on the {name}; needed numbers that are not negative")
