@@ -10,6 +10,7 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
+from exact_terms import plain
 
 from gpbnb.kalman import contraction
 from gpbnb.kalman.kernels import contraction as kernels
@@ -17,11 +18,6 @@ from gpbnb.kalman.kernels.contraction import Contraction
 
 SHARE = F(1, 64)
 NAMES = ("_many", "_times", "_norm", "_norm2", "_is_positive", "_weights", "_inverse", "_inverse_general")
-
-
-def plain(function):
-    """The function as Python runs it."""
-    return getattr(function, "py_func", function)
 
 
 @pytest.fixture
