@@ -64,8 +64,11 @@ class ArrayRun:
         self.steps, self.reason = 0, ""
         self.indefinite: int | None = None
         self.stopped: int | None = None
+        self._sound = model.definite_in(fmt)
+        #: Changes of the covariances, including those of the model.
+        self.repairs = list(self._sound.repairs)
         self._given = {letter: self._cycle(letter) for letter in ("Phi", "H", "Q", "R", "B", "u", "b", "d")}
-        self.x, self.P = fmt.array(model.x0), fmt.array(model.P0)
+        self.x, self.P = fmt.array(model.x0), fmt.array(self._sound.P0)
         self._identity = fmt.array(np.eye(model.n, dtype=int))
         if form is ArrayForm.COMPENSATED:
             self._given["increment"] = [fmt.array(each - np.eye(model.n, dtype=int)) for each in model.Phi]
@@ -213,7 +216,7 @@ class ArrayRun:
     # -- what it needs ----------------------------------------------------------------------------------
 
     def _cycle(self, letter: str) -> list[FloatArray]:
-        members = getattr(self.model, letter)
+        members = getattr(self._sound, letter)
         if members is None:
             return []
         return [self.fmt.array(each) for each in (members[np.newaxis] if members.ndim == 1 else members)]
@@ -224,7 +227,8 @@ class ArrayRun:
 
     def _factor(self) -> None:
         """Compute factors of P0, Q and R as the compiled UD form does."""
-        start = Run(self.model.without_inputs(), self.fmt, Form.UD, ())
+        start = Run(self._sound.without_inputs(), self.fmt, Form.UD, ())
+        self.repairs += start.repairs
         first, Q, R = (self._unpacked(each) for each in (start.P, start.UQ, start.UR))
         self._given["UR"] = list(R)
         if self.form in _ROOTS:

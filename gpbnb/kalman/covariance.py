@@ -8,22 +8,32 @@ semidefinite matrix is the size of its least negative eigenvalue (Halmos 1972), 
 or equals :data:`LEAST_SHIFT`.
 
 Both changes are relative to the variances. A change of units by powers of two therefore changes neither.
+
+A covariance that is close to singular may also become indefinite when a format stores it. Its stored variances are
+then raised in the same way, and rounded again.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+
 REPAIR_TOLERANCE = 2.0**-26
-"""The largest repair, relative to the variances. It is half the digits of float64."""
+"""The largest repair of a covariance in float64, relative to the variances. It is half the digits of float64."""
 
 LEAST_SHIFT = 2.0**-58
 """Smallest δ, with which the search begins."""
+
+LARGEST_STORED_SHIFT = 0.5
+"""Largest δ by which stored variances are raised."""
 
 
 class Repair(NamedTuple):
@@ -34,63 +44,115 @@ class Repair(NamedTuple):
     letter : letter of the covariance; `member` is its index in a cycle, from 0.
     asymmetry : largest :math:`|M_{ij} - M_{ji}|/\sqrt{M_{ii}M_{jj}}` that the mean removed.
     shift : δ, the relative increase of each variance.
+    fmt : the format whose rounding made it indefinite; None for a covariance as given.
     """
 
     letter: str
     member: int
     asymmetry: float
     shift: float
+    fmt: FloatFormat | FixedFormat | None = None
 
     def __str__(self) -> str:
         done = []
         if self.asymmetry:
             done.append(f"made symmetric (it missed that by {self.asymmetry:.1g} of its variances)")
         if self.shift:
-            done.append(f"made semidefinite (its variances were raised by {self.shift:.1g} of themselves)")
-        return f"{self.letter} was {' and '.join(done)}"
+            kind = "definite" if self.letter == "R" else "semidefinite"
+            done.append(f"made {kind} (its variances were raised by {self.shift:.1g} of themselves)")
+        stored = "" if self.fmt is None else f", stored in {self.fmt},"
+        return f"{self.letter}{stored} was {' and '.join(done)}"
 
 
 def in_floats(values: Any) -> bool:
     """Whether a matrix was given in floats, whose rounding errors a repair may undo."""
+    return repair_tolerance(values) is not None
+
+
+def repair_tolerance(values: Any) -> float | None:
+    """Return the largest repair of a matrix given in floats: half the digits of their type. None for other input."""
     if hasattr(values, "to_fractions"):
-        return False
+        return None
     dtype = getattr(values, "dtype", None)
+    if isinstance(dtype, np.dtype) and np.issubdtype(dtype, np.floating):
+        return max(REPAIR_TOLERANCE, math.sqrt(float(np.finfo(dtype).eps)))
     if isinstance(values, np.ndarray) and values.dtype.hasobject:
-        return any(isinstance(each, (float, np.floating)) for each in values.ravel())
-    if isinstance(dtype, np.dtype):
-        return bool(np.issubdtype(dtype, np.floating))
+        values = values.ravel().tolist()
     if isinstance(values, (list, tuple)):
-        return any(in_floats(each) for each in values)
-    return isinstance(values, float)
+        return max((found for each in values if (found := repair_tolerance(each)) is not None), default=None)
+    return REPAIR_TOLERANCE if isinstance(values, float) else None
 
 
-def repaired(letter: str, member: int, matrix: NDArray[Any], strictly: bool) -> tuple[NDArray[Any], Repair | None]:
+def repaired(
+    letter: str, member: int, matrix: NDArray[Any], strictly: bool, tolerance: float = REPAIR_TOLERANCE
+) -> tuple[NDArray[Any], Repair | None]:
     """Return the covariance, repaired if necessary, and the change.
 
     Parameters
     ----------
     matrix : (n, n), exact.
     strictly : whether it must be positive definite; its variances are then not raised.
+    tolerance : the largest change, relative to the variances.
 
     Raises
     ------
-    ValueError : it needs a larger change than :data:`REPAIR_TOLERANCE`, or has a fault not due to rounding.
+    ValueError : it needs a larger change than the tolerance, or has a fault not due to rounding.
     """
-    symmetric, asymmetry = matrix, 0.0
-    if np.any(matrix != matrix.T):
-        asymmetry = _asymmetry(matrix)
-        if asymmetry > REPAIR_TOLERANCE:
-            check_covariance(letter, matrix, strictly)
-        symmetric = (matrix + matrix.T) / 2
-    shift = 0.0
-    if not strictly and not _semidefinite(symmetric):
-        shift = _least_shift(symmetric)
-        if shift > REPAIR_TOLERANCE:
-            check_covariance(letter, symmetric, strictly)
-        symmetric = _raised(symmetric, shift)
-    check_covariance(letter, symmetric, strictly)
-    changed = Repair(letter, member, asymmetry, shift) if asymmetry or shift else None
-    return symmetric, changed
+    symmetric, asymmetry, shift = matrix, 0.0, 0.0
+    try:
+        if np.any(matrix != matrix.T):
+            asymmetry = _asymmetry(matrix)
+            if asymmetry > tolerance:
+                check_covariance(letter, matrix, strictly)
+            symmetric = (matrix + matrix.T) / 2
+        if not strictly and not is_definite(symmetric):
+            found = raised_until(symmetric, is_definite, LEAST_SHIFT, tolerance)
+            if found is None:
+                check_covariance(letter, symmetric, strictly)
+            else:
+                symmetric, shift = found
+        check_covariance(letter, symmetric, strictly)
+    except ValueError as error:
+        raise ValueError(f"{error}; roundings are repaired up to {tolerance:.1g} of the variances") from None
+    return symmetric, Repair(letter, member, asymmetry, shift) if asymmetry or shift else None
+
+
+def stored_in(
+    fmt: FloatFormat | FixedFormat, letter: str, member: int, matrix: NDArray[Any], strictly: bool
+) -> tuple[NDArray[Any], Repair] | None:
+    """Return a covariance as a format stores it, with raised variances, and the change.
+
+    Parameters
+    ----------
+    matrix : (n, n), exact.
+    strictly : whether it must be positive definite.
+
+    Returns
+    -------
+    stored : None if no change is necessary, or if none helps: a variance overflows, or becomes zero while a covariance
+        does not.
+    """
+
+    def sound(candidate: NDArray[Any]) -> bool:
+        return is_definite(candidate, strictly)
+
+    def store(candidate: NDArray[Any]) -> NDArray[Any]:
+        return np.asarray(fmt.array(candidate).to_fractions(), dtype=object)
+
+    try:
+        if sound(store(matrix)):
+            return None
+        found = raised_until(matrix, sound, least_shift(fmt), LARGEST_STORED_SHIFT, store)
+    except OverflowError:  # nothing can store it
+        return None
+    return None if found is None else (found[0], Repair(letter, member, 0.0, found[1], fmt))
+
+
+def least_shift(fmt: FloatFormat | FixedFormat | None) -> float:
+    """Return the δ with which the search for stored variances begins; None is double-double."""
+    if fmt is None:
+        return 2.0**-104
+    return float(fmt.unit_roundoff) if isinstance(fmt, FloatFormat) else LEAST_SHIFT
 
 
 def _asymmetry(matrix: NDArray[Any]) -> float:
@@ -103,30 +165,40 @@ def _asymmetry(matrix: NDArray[Any]) -> float:
     return largest
 
 
-def _least_shift(matrix: NDArray[Any]) -> float:
-    """Return the smallest power of two by which to raise the variances for semidefiniteness, or infinity."""
-    if any(d < 0 or (d == 0 and np.any(row != 0)) for d, row in zip(matrix.diagonal(), matrix, strict=True)):
-        return math.inf
-    shift = LEAST_SHIFT
-    while shift <= REPAIR_TOLERANCE:
-        if _semidefinite(_raised(matrix, shift)):
-            return shift
+def raised_until(
+    matrix: NDArray[Any],
+    sound: Callable[[NDArray[Any]], bool],
+    least: float,
+    largest: float,
+    store: Callable[[NDArray[Any]], NDArray[Any]] = lambda candidate: candidate,
+) -> tuple[NDArray[Any], float] | None:
+    """Raise variances by δ = least, 2 least, … of themselves until the matrix is sound; None beyond the largest δ.
+
+    Parameters
+    ----------
+    matrix : (n, n) or (p, n, n), exact; all members are raised alike.
+    sound : what is asked of the raised matrix.
+    store : applied to the raised matrix before it is judged and returned.
+    """
+    variances = np.diagonal(matrix, axis1=-2, axis2=-1)
+    i = np.arange(matrix.shape[-1])
+    shift = least
+    while shift <= largest:
+        raised = matrix.copy()
+        raised[..., i, i] = variances * (1 + Fraction(shift))
+        raised = store(raised)
+        if sound(raised):
+            return raised, shift
         shift *= 2
-    return math.inf
+    return None
 
 
-def _raised(matrix: NDArray[Any], shift: float) -> NDArray[Any]:
-    raised = matrix.copy()
-    np.fill_diagonal(raised, matrix.diagonal() * (1 + Fraction(shift)))
-    return raised
-
-
-def _semidefinite(matrix: NDArray[Any]) -> bool:
+def is_definite(matrix: NDArray[Any], strictly: bool = False) -> bool:
+    """Whether a symmetric matrix is exactly positive semidefinite or, with `strictly`, definite."""
     try:
-        factor(matrix)
+        return bool(np.all(factor(matrix)[1] > 0)) or not strictly
     except ValueError:
         return False
-    return True
 
 
 def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -163,11 +235,7 @@ def check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None:
             f"needed a symmetric matrix; take ({letter} + {letter}.T) / 2 if you mean their mean"
         )
     needed = "definite" if strictly else "semidefinite"
-    try:
-        definite = bool(np.all(factor(matrix)[1] > 0)) or not strictly
-    except ValueError:
-        definite = False
-    if not definite:
+    if not is_definite(matrix, strictly):
         values = np.linalg.eigvalsh(matrix.astype(np.float64))
         cure = ""
         # such as G @ G.T in floats, or stored in few bits

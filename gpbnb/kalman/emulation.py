@@ -31,7 +31,9 @@ class History:
     gain, covariance : (c, n, m) and (c, n, n), likewise.
     reference : the reference at the same steps.
     indefinite : the first step at which a variance or a pivot of the innovation covariance was not positive, if any.
-    stopped : the step at which a division by zero or a number beyond the backend's range ended the run, if any.
+    stopped : the step at which a division by zero or a number beyond the format's range ended the run, if any.
+    reason : what ended it, such as "overflow in the gain at step 812".
+    repairs : changes of covariances that would otherwise be indefinite, each as text.
     """
 
     model: LinearModel
@@ -44,6 +46,8 @@ class History:
     reference: Checkpoints
     indefinite: int | None
     stopped: int | None
+    reason: str = ""
+    repairs: tuple[str, ...] = ()
 
     @property
     def state_norm(self) -> NDArray[np.float64]:
@@ -90,7 +94,8 @@ def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
         for each, other in ((checkpoints.x, true.x), (checkpoints.K, true.K), (checkpoints.P, true.P))
     )
     fmt, steps = cast(FloatFormat, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
-    return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped)
+    repairs = tuple(str(each) for each in run.repairs)
+    return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped, run.reason, repairs)
 
 
 def emulate(

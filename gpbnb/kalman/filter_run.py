@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, cast
@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.kalman.factors import combined_gain, covariance_of_factors
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.bounded import widen
@@ -34,6 +35,10 @@ from gpbnb.kalman.kernels.step import (
 )
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import compiled_form
+from gpbnb.kalman.precise_reference import precise_steps
+
+LEAST_SHARE = 2.0**-60
+"""Smallest share of the noise in an innovation, as :func:`_loses_digits` counts it, that double-double resolves."""
 
 BLOCK = 256
 """Number of steps whose results are kept at a time."""
@@ -97,18 +102,21 @@ class Run:
             raise ValueError(f"got {order} sums in the UD form; needed another form")
         #: The arithmetic of the compiled loops.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
-        Phi, H, Q, R = (self.as_packed(each) for each in (model.Phi, model.H, model.Q, model.R))
+        stored = model if fmt is None else model.definite_in(fmt)
+        #: Changes of the covariances, including those of the model.
+        self.repairs = list(stored.repairs)
+        Phi, H, Q, R, x0, P0 = (self._packed_matrix(stored, letter) for letter in ("Phi", "H", "Q", "R", "x0", "P0"))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         identity = self.as_packed(np.eye(n, dtype=int))
-        self.x, self.P = self.as_packed(model.x0.reshape(n, 1)), self.as_packed(model.P0)
+        self.x, self.P = np.ascontiguousarray(x0[:, np.newaxis]), P0
         RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, 1), (n, m), (n, n))
         )
         self.notes = np.zeros(4, dtype=np.int64)
         try:
-            definite = self._prepare(Q, R, RI)
+            definite = self._prepare(stored, Q, R, RI)
         except ZeroDivisionError:
             definite = False
         if not definite:
@@ -123,15 +131,36 @@ class Run:
         #: Why the run stopped, if it did.
         self.reason = ""
 
-    def _prepare(self, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
+    def _prepare(self, stored: LinearModel, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
         """Compute what the form needs beside the model; whether the covariances are definite in this arithmetic."""
         if self.form is Form.HUNG_SECOND_GAIN:
             return bool(invert_each(self.tag, R, RI))
         if self.form is Form.UD:
             given, self.P = self.P, np.empty_like(self.P)
-            pairs = (Q, self.UQ), (R, self.UR), (given[np.newaxis], self.P[np.newaxis])
-            return all(factor_each(self.tag, *pair) for pair in pairs)
+            return all(
+                factor_each(self.tag, packed, factors)
+                or self._factored_higher(letter, getattr(stored, letter), factors)
+                for letter, packed, factors in (
+                    ("Q", Q, self.UQ),
+                    ("R", R, self.UR),
+                    ("P0", given[np.newaxis], self.P[np.newaxis]),
+                )
+            )
         return True
+
+    def _factored_higher(self, letter: str, matrices: NDArray[Any], factors: NDArray[Any]) -> bool:
+        """Compute factors of covariances whose variances are raised until the factors are definite, if any are."""
+        if self.model.repair is False:
+            return False
+        found = raised_until(
+            matrices.reshape(-1, *matrices.shape[-2:]),
+            lambda raised: bool(factor_each(self.tag, self.as_packed(raised), factors)),
+            least_shift(self.fmt),
+            LARGEST_STORED_SHIFT,
+        )
+        if found is not None:
+            self.repairs.append(Repair(letter, 0, 0.0, found[1], self.fmt))
+        return found is not None
 
     @property
     def steps(self) -> int:
@@ -169,13 +198,18 @@ class Run:
         -------
         x : (steps done, n, 2), as double-double.
         """
+        found = [np.zeros((0, self.model.n, 2))]
+        found += [widened(x)[1:, :, 0] for x, _ in self.blocks(z)]
+        return np.concatenate(found)
+
+    def blocks(self, z: Any) -> Iterator[tuple[NDArray[Any], NDArray[Any]]]:
+        """Continue as :meth:`take` does, and give estimates and covariances, as :meth:`take_block`."""
         self.model.check_measurements(z, self.steps)
-        packed, found = self.pack_measurements(z), [np.zeros((0, self.model.n, 2))]
+        packed = self.pack_measurements(z)
         for begin in range(0, len(packed), BLOCK):
             if not self.stopped:
-                x, _, _ = self.take_block(packed[begin : begin + BLOCK])
-                found.append(widened(x[1:])[:, :, 0])
-        return np.concatenate(found)
+                x, _, P = self.take_block(packed[begin : begin + BLOCK])
+                yield x, P
 
     def pack_measurements(self, z: Any) -> NDArray[Any]:
         """Round measurements (steps, m) into the format, as :meth:`advance` expects them."""
@@ -231,6 +265,12 @@ class Run:
         """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
+
+    def _packed_matrix(self, model: LinearModel, letter: str) -> NDArray[Any]:
+        try:
+            return self.as_packed(getattr(model, letter))
+        except OverflowError as error:
+            raise OverflowError(f"{letter}: {error}") from None
 
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Round numbers into the format, and return them as the compiled loops expect them."""
@@ -328,6 +368,8 @@ def reference(
 ) -> Checkpoints:
     """Run the filter in double-double, whose operations have relative errors below 2**-102.
 
+    Where it would lose half of these digits, :mod:`gpbnb.kalman.precise_reference` computes the filter instead.
+
     Parameters
     ----------
     model : also with known inputs and offsets.
@@ -336,20 +378,46 @@ def reference(
 
     Raises
     ------
-    ArithmeticError : a division by zero or a number beyond 2**1000; the model is degenerate.
+    ArithmeticError : the model is degenerate, or more digits are necessary for too many steps.
     """
     run = Run(model.without_inputs(), None, form, checkpoint_steps)
     if model.has_inputs:
         _take_with_inputs(run, model, z)
     else:
         run.take(z)
-    _check_reference(run, model)
+    if run.form is not Form.UD:
+        start = Run(model.without_inputs(), None, run.form, ()).P
+        at = np.array([0, *run.checkpoint_steps[: len(run.checkpoints().steps)]])
+        if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[: len(at) - 1]])):
+            steps = precise_steps(model, z)
+            x, K, P = zip(*(steps[step - 1] for step in run.checkpoint_steps), strict=True)
+            return Checkpoints(tuple(int(each) for each in run.checkpoint_steps), *(np.array(v) for v in (x, K, P)))
+    if run.stopped:
+        raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
     return run.checkpoints()
 
 
-def _check_reference(run: Run, model: LinearModel) -> None:
-    if run.stopped:
-        raise ArithmeticError(f"{model.name}: the reference stopped at step {run.stopped}; scale or correct the model")
+def _loses_digits(model: LinearModel, at: NDArray[np.int64], P: NDArray[np.float64]) -> bool:
+    r"""Whether innovations are so much larger than their noise that the innovation form loses half of double-double.
+
+    Scale innovations to unit variances, so that S has ones on its diagonal. The relative error of the covariance is
+    then roughly that of one operation over :math:`\lambda(R)\,\lambda(S)`, the least eigenvalues.
+
+    Parameters
+    ----------
+    at : (k,), numbers of steps done.
+    P : (k, n, n, 2), the covariances after them.
+    """
+    given = model.to_float()
+    Phi, H, Q, R = (given[letter][at % len(given[letter])] for letter in ("Phi", "H", "Q", "R"))
+    with np.errstate(all="ignore"):
+        S = H @ (Phi @ P[..., 0] @ np.swapaxes(Phi, 1, 2) + Q) @ np.swapaxes(H, 1, 2) + R
+        deviations = np.sqrt(np.diagonal(S, axis1=1, axis2=2))
+        both = np.stack([R, S]) / deviations[:, :, None] / deviations[:, None, :]
+    if not np.isfinite(both).all():
+        return True
+    noise, whole = np.linalg.eigvalsh(both)[..., 0]
+    return bool(np.any(noise * np.maximum(whole, noise) < LEAST_SHARE))
 
 
 def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
@@ -359,15 +427,21 @@ def reference_states(model: LinearModel, z: Any) -> NDArray[np.float64]:
     ------
     ArithmeticError : as for :func:`reference`.
     """
-    every = range(1, len(z) + 1) if model.has_inputs else ()
-    run = Run(model.without_inputs(), None, Form.INNOVATION, every)
+    run = Run(model.without_inputs(), None, Form.INNOVATION, range(1, len(z) + 1) if model.has_inputs else ())
     if model.has_inputs:
+        start = run.x.copy()[np.newaxis], run.P.copy()[np.newaxis]
         _take_with_inputs(run, model, z)
-        found = run.X[:, :, 0]
+        kept = run.X[: run.steps], run.C[: run.steps]
+        blocks = iter([(np.concatenate([start[0], kept[0]]), np.concatenate([start[1], kept[1]]))])
     else:
-        found = run.states(z)
-    _check_reference(run, model)
-    return found
+        blocks = run.blocks(z)
+    found, done = [np.zeros((0, model.n, 2))], 0
+    for x, P in blocks:
+        if run.stopped or _loses_digits(model, np.arange(done, done + len(P)), P):
+            return double_doubles(np.array([each for each, *_ in precise_steps(model, z)], dtype=object))
+        found.append(x[1:, :, 0])
+        done += len(x) - 1
+    return np.concatenate(found)
 
 
 def _take_with_inputs(run: Run, model: LinearModel, z: Any) -> None:

@@ -5,14 +5,24 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.covariance import Repair, check_covariance, in_floats, repaired
+from gpbnb.kalman.covariance import (
+    REPAIR_TOLERANCE,
+    Repair,
+    check_covariance,
+    in_floats,
+    repair_tolerance,
+    repaired,
+    stored_in,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +49,8 @@ class LinearModel:
     P0 : (n, n), its covariance, positive semidefinite.
     name : name in tables and figures.
     repair : whether to repair rounding errors in Q, R and P0, as described in :mod:`gpbnb.kalman.covariance`. By
-        default, only covariances given in floats are repaired, not those of strings, whole numbers or Fractions.
+        default, only covariances given in floats are repaired, not those of strings, whole numbers or Fractions; but
+        one that becomes indefinite when a format stores it is repaired unless `repair` is False.
     B : (n, p) or (c, n, p), input matrix.
     u : (steps, p), known inputs, row k - 1 for step k; or (p,), the same in every step.
     b : (n,) or (c, n), known offset of the states.
@@ -86,11 +97,12 @@ class LinearModel:
     def __post_init__(self) -> None:
         if self.repair is not None and not isinstance(self.repair, bool):
             raise ValueError(f"got repair {self.repair!r}; needed True, False or None")
+        if not isinstance(self.name, str):
+            raise TypeError(f"got name {self.name!r}; needed text")
         self._evaluate_functions()
-        repairable = {
-            letter: in_floats(getattr(self, letter)) if self.repair is None else self.repair
-            for letter in ("Q", "R", "P0")
-        }
+        tolerances: dict[str, float | None] = dict.fromkeys(_COVARIANCES)
+        if self.repair is not False:
+            tolerances = {letter: repair_tolerance(getattr(self, letter)) for letter in _COVARIANCES}
         for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
             try:
                 entries = exact(getattr(self, letter))
@@ -120,10 +132,11 @@ class LinearModel:
             raise ValueError(f"got P0 of shape {self.P0.shape}; needed ({n}, {n}), as x0 has {n} states")
         self._read_inputs()
         repairs: list[Repair] = []
-        for letter, strictly in (("Q", False), ("R", True), ("P0", False)):
-            matrices = getattr(self, letter)
-            if repairable[letter]:
-                object.__setattr__(self, letter, _repaired_cycle(letter, matrices, strictly, repairs))
+        for letter, strictly in _COVARIANCES.items():
+            matrices, tolerance = getattr(self, letter), tolerances[letter]
+            if tolerance is not None or self.repair:
+                least = REPAIR_TOLERANCE if tolerance is None else tolerance
+                object.__setattr__(self, letter, _repaired_cycle(letter, matrices, strictly, least, repairs))
                 continue
             different = {tuple(matrix.flat): matrix for matrix in matrices.reshape(-1, *matrices.shape[-2:])}
             for matrix in different.values():
@@ -195,7 +208,7 @@ class LinearModel:
 
     def without_inputs(self) -> LinearModel:
         """Return the same model without known inputs and offsets."""
-        return replace(self, B=None, u=None, b=None, d=None, repair=False) if self.has_inputs else self
+        return replace(self, B=None, u=None, b=None, d=None) if self.has_inputs else self
 
     def known(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the exact input of step k + 1, :math:`Bu + b`, (n,), and the measurement offset d, (m,)."""
@@ -259,16 +272,29 @@ class LinearModel:
         """Number of steps after which all four matrices repeat."""
         return math.lcm(*(len(each) for each in (self.Phi, self.H, self.Q, self.R)))
 
-    def rounded(self, fmt: FloatFormat) -> LinearModel:
+    def definite_in(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
+        """Return this model, or a copy with other covariances where those stored in a format would be indefinite.
+
+        The variances of such a covariance are raised as described in :mod:`gpbnb.kalman.covariance`; `repairs` lists
+        the changes. Nothing is changed where that does not help, if `repair` is False, or for stochastic rounding.
+        """
+        if self.repair is False or fmt.rounding is Rounding.STOCHASTIC:
+            return self
+        return _definite_in(self, fmt)
+
+    def rounded(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
         """Return the model as a computer with this format stores it, with each entry rounded.
 
         Raises
         ------
-        ValueError : rounding to so few digits makes a covariance indefinite.
+        ValueError : a stored covariance is indefinite in spite of :meth:`definite_in`.
         """
+        sound = self.definite_in(fmt)
         given = [letter for letter in (*_LETTERS, *_INPUTS) if getattr(self, letter) is not None]
-        stored = {letter: fmt.array(getattr(self, letter)).to_fractions() for letter in given}
-        return LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
+        stored = {letter: fmt.array(getattr(sound, letter)).to_fractions() for letter in given}
+        made = LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
+        object.__setattr__(made, "repairs", sound.repairs)
+        return made
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
         """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter."""
@@ -277,13 +303,39 @@ class LinearModel:
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 _INPUTS = ("B", "u", "b", "d")
+_COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
 
 
-def _repaired_cycle(letter: str, matrices: NDArray[Any], strictly: bool, repairs: list[Repair]) -> NDArray[Any]:
+@lru_cache(maxsize=16)
+def _definite_in(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearModel:
+    changed: dict[str, NDArray[Any]] = {}
+    repairs: list[Repair] = []
+    for letter, strictly in _COVARIANCES.items():
+        matrices = getattr(model, letter)
+        stored = matrices.reshape(-1, *matrices.shape[-2:]).copy()
+        found: dict[tuple[Fraction, ...], tuple[NDArray[Any], Repair] | None] = {}
+        for member, matrix in enumerate(stored):
+            key = tuple(matrix.flat)
+            if key not in found:
+                found[key] = stored_in(fmt, letter, member, matrix, strictly)
+            if (better := found[key]) is not None:
+                stored[member], repair = better
+                repairs.append(repair._replace(member=member))
+                changed[letter] = stored.reshape(matrices.shape)
+    if not changed:
+        return model
+    made = replace(model, **changed)  # type: ignore[arg-type]
+    object.__setattr__(made, "repairs", (*model.repairs, *repairs))
+    return made
+
+
+def _repaired_cycle(
+    letter: str, matrices: NDArray[Any], strictly: bool, tolerance: float, repairs: list[Repair]
+) -> NDArray[Any]:
     """Repair the covariances of a cycle, or the only one, where necessary; append the changes to `repairs`."""
     result = []
     for member, matrix in enumerate(matrices.reshape(-1, *matrices.shape[-2:])):
-        sound, changed = repaired(letter, member, matrix, strictly)
+        sound, changed = repaired(letter, member, matrix, strictly, tolerance)
         result.append(sound)
         if changed is not None:
             repairs.append(changed)

@@ -197,14 +197,17 @@ def test_what_a_run_refuses():
     with pytest.raises(OverflowError, match="beyond the range of the compiled loops"):
         Run(scalar(Fraction(10**400)), FloatFormat(2, 24), Form.HUNG, (1,))
     # In two digits 1.04 * 1.07 > 1.05**2 becomes 1.0 * 1.1 < 1.1**2.
-    close = LinearModel(np.eye(2), [[1, 0]], np.eye(2), [[1]], [0, 0], [["1.04", "1.05"], ["1.05", "1.07"]])
+    near = [["1.04", "1.05"], ["1.05", "1.07"]]
+    close = LinearModel(np.eye(2), [[1, 0]], np.eye(2), [[1]], [0, 0], near, repair=False)
     with pytest.raises(ValueError, match="needed covariances that stay definite"):
         Run(close, FloatFormat(10, 2), Form.UD, (1,))
     assert Run(close, FloatFormat(10, 3), Form.UD, (1,)).steps == 0
     with pytest.raises(ValueError, match="needed equal steps"):
         compare_runs(run(FloatFormat(2, 24), Form.HUNG), reference(given, measurements(), (2, 4)))
+    huge = LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]])
     with pytest.raises(ArithmeticError, match="the reference stopped at step 1"):
-        reference(LinearModel([["1e200"]], [[1]], [[0]], [[1]], [1], [[1]]), np.ones((3, 1)), (1,))
+        reference(huge, np.ones((3, 1)), (1,), Form.UD)
+    assert float(reference(huge, np.ones((3, 1)), (3,)).x[0, 0]) == 1
 
 
 def test_checkpoint_steps():

@@ -1,0 +1,85 @@
+"""gpbnb.kalman.precise_reference: filters whose reference double-double cannot compute."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman import precise_reference
+from gpbnb.kalman.exact_step import exact_step
+from gpbnb.kalman.filter_run import Run, reference, reference_states
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.model import LinearModel
+
+EYE = np.eye(2, dtype=int)
+Z = np.array([[1.5, 3.0], [-0.25, -0.5], [2.0, 4.0], [0.75, 1.5], [1.0, 2.0]])
+
+
+def sensor(R, **inputs):
+    """Two precise sensors of almost the same quantity; the innovation covariance is almost singular."""
+    Phi, H, P0 = [[1, "0.1"], [0, 1]], [["0.3", "0.7"], ["0.6", "1.4"]], [[1, "0.4"], ["0.4", 2]]
+    R2 = [[R, 0], [0, R]]
+    return LinearModel(Phi, H, [["1e-3", 0], [0, "1e-3"]], R2, [0, 1], P0, "two precise sensors", **inputs)
+
+
+def exactly(model, z):
+    """The filter in Fractions; with inputs, as the exact step of a filter without them."""
+    x, P, states = model.x0, model.P0, []
+    for k, measured in enumerate(exact(z)):
+        state, offset = model.known(k)
+        shifted = measured - offset - model.H[0] @ state
+        step = exact_step(model.Phi[0], model.H[0], model.Q[0], model.R[0], x, P, shifted)
+        x, P = step.x + state, step.P
+        states.append(x)
+    return states, step
+
+
+def distance(states, expected):
+    found = np.array([[Fraction(h) + Fraction(e) for h, e in row] for row in states.tolist()])
+    return float(max(np.abs(found - np.array(expected)).ravel()))
+
+
+@pytest.mark.parametrize("R", ["1e-20", "1e-30", "1e-60"])
+def test_a_precise_sensor_has_the_exact_reference(R):
+    model = sensor(R)
+    expected, last = exactly(model, Z)
+    assert distance(reference_states(model, Z), expected) < 1e-30
+    checkpoints = reference(model, Z, (2, 5))
+    assert float(max(np.abs(checkpoints.x - np.array([expected[1], expected[4]])).ravel())) < 1e-30
+    assert float(np.abs(checkpoints.K[1] - last.gain).max()) < 1e-29
+    assert float(np.abs(checkpoints.P[1] - last.P).max()) < 1e-30
+
+
+def test_double_double_alone_is_wrong_there():
+    model = sensor("1e-30")
+    run = Run(model, None, Form.INNOVATION, ())
+    assert distance(run.states(Z), exactly(model, Z)[0][: run.steps]) > 1e-3
+
+
+def test_inputs_and_offsets_are_known_to_it():
+    model = sensor("1e-40", B=[["0.5"], [1]], u=[[1], [2], [-1], [0], [3]], b=["0.1", 0], d=["0.25", "0.5"])
+    assert distance(reference_states(model, Z), exactly(model, Z)[0]) < 1e-30
+
+
+def test_only_such_models_need_it(monkeypatch):
+    def never(model, z):
+        raise AssertionError("the reference was computed again")
+
+    monkeypatch.setattr("gpbnb.kalman.filter_run.precise_steps", never)
+    expected = exactly(sensor("1e-6"), Z)[0]
+    assert distance(reference_states(sensor("1e-6"), Z), expected) < 1e-18
+    with pytest.raises(AssertionError, match="computed again"):
+        reference(sensor("1e-30"), Z, (3,))
+
+
+def test_what_it_refuses(monkeypatch):
+    singular = sensor("1e-300")
+    monkeypatch.setattr(precise_reference, "MOST_BITS", 512)
+    with pytest.raises(ArithmeticError, match="not determined in 512 bits"):
+        precise_reference.precise_steps(singular, Z)
+    monkeypatch.setattr(precise_reference, "MOST_STEPS", 4)
+    with pytest.raises(ArithmeticError, match="needed at most 4"):
+        reference_states(sensor("1e-30"), Z)
