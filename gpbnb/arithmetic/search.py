@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -57,6 +58,11 @@ def smallest_precision(
     def suffices(precision: int) -> bool:
         return meets(FloatFormat(base, precision, rounding))
 
+    answer = _smallest(suffices, least, largest, monotone)
+    return None if answer is None else FloatFormat(base, answer, rounding)
+
+
+def _smallest(suffices: Callable[[int], bool], least: int, largest: int | None, monotone: bool) -> int | None:
     if largest is None:
         largest = least
         while not suffices(largest):
@@ -66,7 +72,7 @@ def smallest_precision(
     answer = least + bisect_left(range(least, largest), True, key=suffices)
     while answer < largest and not (suffices(answer) and (monotone or suffices(answer + 1))):
         answer += 1
-    return FloatFormat(base, answer, rounding) if suffices(answer) else None
+    return answer if suffices(answer) else None
 
 
 class Search:
@@ -75,6 +81,7 @@ class Search:
     Parameters
     ----------
     error : function that returns error / tolerance in a format, and why it is infinite.
+    like : a format of any precision, with the base, the rounding and the range of those to try.
     checks : precisions that are tried if they lie above the answer.
     tick : called after each run.
     bounds : whether the errors are bounds, which may not exist. Precisions above the answer that have no bound are
@@ -84,8 +91,7 @@ class Search:
     def __init__(
         self,
         error: Callable[[FloatFormat], tuple[float, str]],
-        base: int,
-        rounding: Rounding,
+        like: FloatFormat,
         checks: Sequence[int],
         tick: Callable[[], object] = lambda: None,
         bounds: bool = False,
@@ -95,32 +101,32 @@ class Search:
         self.undecided: tuple[int, ...] = ()
         #: Precisions that met the tolerance although a higher one missed it; usually empty.
         self.irregular: tuple[int, ...] = ()
-        largest = LARGEST_PRECISION[base]
-        while largest > 2 and not isinstance(FloatFormat(base, largest, rounding).backend, Compiled):
+        largest = LARGEST_PRECISION[like.base]
+        while largest > 2 and not isinstance(replace(like, precision=largest).backend, Compiled):
             largest -= 1  # stochastic rounding has fewer digits
 
-        def meets(fmt: FloatFormat) -> bool:
-            if fmt.precision not in self._ratios:
-                self._ratios[fmt.precision], self._why[fmt.precision] = error(fmt)
+        def meets(digits: int) -> bool:
+            if digits not in self._ratios:
+                self._ratios[digits], self._why[digits] = error(replace(like, precision=digits))
                 tick()
-            return self._ratios[fmt.precision] <= 1
+            return self._ratios[digits] <= 1
 
+        answer = _smallest(meets, 2, largest, monotone=False)
         #: The answer, or None.
-        self.fmt = smallest_precision(meets, base, rounding, least=2, largest=largest)
-        if self.fmt is None or not checks:
+        self.fmt = None if answer is None else replace(like, precision=answer)
+        if answer is None or not checks:
             return
-        above = {digits for digits in (self.fmt.precision + 2, *checks) if self.fmt.precision < digits <= largest}
-        missed = [digits for digits in sorted(above) if not meets(FloatFormat(base, digits, rounding))]
+        above = {digits for digits in (answer + 2, *checks) if answer < digits <= largest}
+        missed = [digits for digits in sorted(above) if not meets(digits)]
         if not missed:
             return
         if bounds and all(math.isinf(self._ratios[digits]) for digits in missed):
             self.undecided = tuple(missed)
             return
-        every = [FloatFormat(base, digits, rounding) for digits in range(self.fmt.precision, largest + 1)]
-        most = max(fmt.precision for fmt in every if not meets(fmt))
+        most = max(digits for digits in range(answer, largest + 1) if not meets(digits))
         self.irregular = tuple(digits for digits, ratio in self.tried if ratio <= 1 and digits < most)
         # a single precision above could be chance
-        self.fmt = FloatFormat(base, most + 1, rounding) if most + 1 < largest else None
+        self.fmt = replace(like, precision=most + 1) if most + 1 < largest else None
 
     @property
     def tried(self) -> tuple[tuple[int, float], ...]:

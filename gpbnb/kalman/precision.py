@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
@@ -26,7 +27,7 @@ from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
+from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, format_like, largest_ratio, listed
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
 MOST_SIMULATED = 10**8
@@ -45,6 +46,9 @@ def required_precision(
     seed: int = 0,
     progress: bool = False,
     within: Limits | None = None,
+    emin: int | None = None,
+    emax: int | None = None,
+    subnormal: bool = True,
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a tolerance.
 
@@ -71,6 +75,9 @@ def required_precision(
         roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
+    emin, emax, subnormal : range of the formats, as of a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
+        unlimited. A format in which a number overflows does not meet the tolerance; the answer names the quantity and
+        the step.
     z : (steps, m), measurements, NaN or masked if missing; by default simulated with the model, from its first
         estimate, and rounded to :func:`gpbnb.kalman.simulation.fine_resolution`.
     seed : seed of the simulation.
@@ -83,8 +90,10 @@ def required_precision(
         them.
     TypeError : another kind of model, or of limits.
     OverflowError : an output of a linear system, or its reference, leaves the range of float64.
+    ArithmeticError : the filter is degenerate even without rounding; see :func:`gpbnb.kalman.filter_run.reference`.
     """
     form, rounding = form_named(form), rounding_named(rounding)
+    like = format_like(base, rounding, emin, emax, subnormal)
     if within is not None and not isinstance(within, Limits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     if not isinstance(model, LinearModel) and form is not Form.INNOVATION:
@@ -93,9 +102,9 @@ def required_precision(
         if within is not None:
             raise ValueError("got limits for a function; needed none: they are for models")
         steps = whole_number("steps", steps)
-        return required_recursion_precision(model, steps, tolerance, z, base, rounding, basis, progress)
+        return required_recursion_precision(model, steps, tolerance, z, like, basis, progress)
     if isinstance(model, LinearSystem):
-        return required_system_precision(model, steps, tolerance, z, base, rounding, basis, within, progress)
+        return required_system_precision(model, steps, tolerance, z, like, basis, within, progress)
     tolerances = _checked(model, tolerance, base, basis)
     steps = whole_number("steps", steps)
     for_ever = basis in ("guarantee", "probable")
@@ -131,25 +140,26 @@ def required_precision(
 
     checks = () if for_ever else CHECKED[base]
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(errors_of(form), base, rounding, checks, bar.update, bounds=basis == "bound")
+        found = Search(errors_of(form), like, checks, bar.update, bounds=basis == "bound")
         advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
         if not for_ever and (found.irregular or found.fmt is None):
-            advice = _better_form(errors_of, form, base, rounding, checks, bar.update, basis == "bound")
+            advice = _better_form(errors_of, form, like, checks, bar.update, basis == "bound")
+    if found.fmt is not None:
+        repairs += tuple(map(str, _opened(model, found.fmt, form, (), False).repairs[len(model.repairs) :]))
     return Requirement(found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs)
 
 
 def _better_form(
     errors_of: Callable[[AnyForm], Callable[[FloatFormat], tuple[float, str]]],
     form: AnyForm,
-    base: int,
-    rounding: Rounding,
+    like: FloatFormat,
     checks: Sequence[int],
     tick: Callable[[], Any],
     bounds: bool,
 ) -> str:
     """Name the form that meets the tolerance with the fewest digits, as advice; empty if there is none."""
     others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not form]
-    answers = [(other, Search(errors_of(other), base, rounding, checks, tick, bounds).fmt) for other in others]
+    answers = [(other, Search(errors_of(other), like, checks, tick, bounds).fmt) for other in others]
     met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
     return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
 
@@ -163,6 +173,9 @@ def survey(
     rounding: Rounding | str = Rounding.NEAREST,
     form: AnyForm | str = Form.INNOVATION,
     basis: Basis = "emulation",
+    emin: int | None = None,
+    emax: int | None = None,
+    subnormal: bool = True,
 ) -> tuple[tuple[int, float], ...]:
     """Run a filter in each of some precisions; for the arguments, see :func:`required_precision`.
 
@@ -174,21 +187,32 @@ def survey(
     ------
     ValueError : for a reason given in :func:`required_precision`; a precision without compiled loops.
     """
-    form, rounding = form_named(form), rounding_named(rounding)
+    form, like = form_named(form), format_like(base, rounding_named(rounding), emin, emax, subnormal)
+    formats = _formats(like, precisions)
     if not isinstance(model, LinearModel) and callable(model):
         if form is not Form.INNOVATION:
             raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
-        return survey_recursion(model, z, tolerance, _formats(base, precisions, rounding), basis)
-    tolerances = _checked(model, tolerance, base, basis)
+        return survey_recursion(model, z, tolerance, formats, basis)
+    found = survey_formats(model, z, tolerance, formats, form, basis)
+    return tuple((fmt.precision, ratio) for fmt, (ratio, _) in zip(formats, found, strict=True))
+
+
+def survey_formats(
+    model: LinearModel,
+    z: Any,
+    tolerance: Any,
+    formats: Sequence[FloatFormat],
+    form: AnyForm = Form.INNOVATION,
+    basis: Basis = "emulation",
+) -> list[tuple[float, str]]:
+    """Run a filter in each format; return largest error or bound / tolerance, and why it is infinite."""
+    tolerances = _checked(model, tolerance, formats[0].base, basis)
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
-    formats = _formats(base, precisions, rounding)
     true = reference_states(model, measured) if basis == "emulation" else None
-    return tuple(
-        (fmt.precision, _error_over_tolerance(model, measured, fmt, form, true, tolerances)[0]) for fmt in formats
-    )
+    return [_error_over_tolerance(model, measured, fmt, form, true, tolerances) for fmt in formats]
 
 
 def largest_errors(
@@ -199,10 +223,10 @@ def largest_errors(
     return np.abs((run.states(fmt.array(z)) - reference_states(model, z)).sum(axis=2)).max(axis=0)
 
 
-def _formats(base: int, precisions: Sequence[int], rounding: Rounding) -> list[FloatFormat]:
-    formats = [FloatFormat(base, precision, rounding) for precision in precisions]
-    if beyond := [fmt.precision for fmt in formats if fmt.precision > LARGEST_PRECISION.get(base, 0)]:
-        raise ValueError(f"got {beyond} digits of base {base}; needed at most {LARGEST_PRECISION.get(base, 0)}")
+def _formats(like: FloatFormat, precisions: Sequence[int]) -> list[FloatFormat]:
+    formats = [replace(like, precision=precision) for precision in precisions]
+    if beyond := [fmt.precision for fmt in formats if not isinstance(fmt.backend, Compiled)]:
+        raise ValueError(f"got {beyond} digits of base {like.base}; needed at most {LARGEST_PRECISION[like.base]}")
     if not formats:
         raise ValueError("got no precisions; needed at least one")
     return formats
@@ -241,11 +265,14 @@ def _error_over_tolerance(
     tolerances: NDArray[np.float64],
 ) -> tuple[float, str]:
     """Return the largest error, or without `true` the largest bound, over tolerance; or infinity and the reason."""
-    asked, measured = np.isfinite(tolerances), fmt.array(z)
+    asked = np.isfinite(tolerances)
     try:
+        measured = fmt.array(z)
         run = _opened(model, fmt, form, range(1, len(z) + 1) if true is None else (), true is None)
     except ValueError as error:  # with so few digits, a covariance is not definite
         return math.inf, str(error)
+    except OverflowError as error:
+        return math.inf, f"overflow in the model or the measurements: {error}"
     if true is None:
         run.take(measured)
     else:

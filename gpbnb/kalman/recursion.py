@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.missing import real_numbers
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio
+from gpbnb.kalman.requirement import ANY_BINARY, Basis, Requirement, checked_tolerance, largest_ratio
 
 Recursion = Callable[..., Any]
 """A function ``run(fmt, z)``, or ``run(fmt)`` without z, that returns the outputs of all steps in the format."""
@@ -32,8 +32,7 @@ def required_recursion_precision(
     steps: int,
     tolerance: Any,
     z: Any = None,
-    base: int = 2,
-    rounding: Rounding = Rounding.NEAREST,
+    like: FloatFormat = ANY_BINARY,
     basis: Basis = "emulation",
     progress: bool = False,
 ) -> Requirement:
@@ -46,6 +45,7 @@ def required_recursion_precision(
         ``fmt.array("0.1")``.
     tolerance : largest error of each output, in its unit; one number, or (p,).
     z : inputs, one row for each step.
+    like : a format of any precision, with base, rounding and range of those to try.
     basis : only "emulation", where errors are differences from the same function in :data:`REFERENCE_DIGITS`.
 
     Raises
@@ -65,9 +65,9 @@ def required_recursion_precision(
     >>> print(required_recursion_precision(smoother, 4, 0.01, z=[1, 2, 3, 4]))
     7 digits of base 2, nearest: 0.15 of the tolerance (emulation, 4 steps)
     """
-    error = _question(run, steps, tolerance, z, base, basis)
+    error = _question(run, steps, tolerance, z, like.base, basis)
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(error, base, rounding, CHECKED[base], bar.update)
+        found = Search(error, like, CHECKED[like.base], bar.update)
     return Requirement(found.fmt, basis, steps, found.tried, found.why, None, found.irregular)
 
 

@@ -10,9 +10,12 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 from gpbnb.kalman.array_forms import AnyForm
+
+ANY_BINARY = FloatFormat(2, 2)
+"""A binary format; its precision does not matter."""
 
 Basis = Literal["emulation", "bound", "guarantee", "probable"]
 
@@ -108,9 +111,32 @@ def checked_tolerance(tolerance: Any, count: int, what: str, base: int, basis: s
         raise ValueError(f"got tolerance {tolerance}; {needed}")
     if not isinstance(basis, str) or basis not in get_args(Basis):
         raise ValueError(f"got basis {basis!r}; needed one of {', '.join(map(repr, get_args(Basis)))}")
+    check_base(base)
+    return np.broadcast_to(tolerances, (count,))
+
+
+def check_base(base: Any) -> None:
+    """Reject a base without compiled loops.
+
+    Raises
+    ------
+    ValueError : another base.
+    """
     if isinstance(base, bool) or not isinstance(base, int) or base not in LARGEST_PRECISION:
         raise ValueError(f"got base {base!r}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}")
-    return np.broadcast_to(tolerances, (count,))
+
+
+def format_like(
+    base: Any, rounding: Rounding, emin: int | None = None, emax: int | None = None, subnormal: bool = True
+) -> FloatFormat:
+    """Return a format with base, rounding and range of those to try; its precision does not matter.
+
+    Raises
+    ------
+    ValueError : a base without compiled loops; a range that ``FloatFormat`` refuses.
+    """
+    check_base(base)
+    return FloatFormat(base, 2, rounding, emin, emax, subnormal)
 
 
 def largest_ratio(errors: NDArray[np.float64], tolerances: NDArray[np.float64]) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.rational import exact
@@ -28,8 +28,8 @@ from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import Program, advance
 from gpbnb.kalman.missing import real_numbers
-from gpbnb.kalman.named import checked_name, rounding_named, whole_number
-from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, largest_ratio, listed
+from gpbnb.kalman.named import checked_name, whole_number
+from gpbnb.kalman.requirement import ANY_BINARY, Basis, Requirement, checked_tolerance, largest_ratio, listed
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,8 +190,7 @@ def required_system_precision(
     steps: int,
     tolerance: Any,
     u: Any = None,
-    base: int = 2,
-    rounding: Rounding | str = Rounding.NEAREST,
+    like: FloatFormat = ANY_BINARY,
     basis: Basis = "emulation",
     within: Limits | None = None,
     progress: bool = False,
@@ -202,6 +201,7 @@ def required_system_precision(
     ----------
     tolerance : largest error of each output, in its unit; one number, or (p,).
     u : (steps, m), inputs.
+    like : a format of any precision, with base, rounding and range of those to try.
     basis : "emulation" compares with the system as given, for these inputs. "bound" holds forever and for every input
         that is never larger than the largest of `u`, from rest; "guarantee" for inputs within the limits on the
         measurement. Both bound rounding, and the errors of storing coefficients and inputs. "probable" takes three
@@ -214,8 +214,8 @@ def required_system_precision(
         that does not start from rest.
     OverflowError : an output of the system as given is beyond the range of float64.
     """
-    tolerances = checked_tolerance(tolerance, system.p, "outputs", base, basis)
-    steps, rounding = whole_number("steps", steps), rounding_named(rounding)
+    tolerances = checked_tolerance(tolerance, system.p, "outputs", like.base, basis)
+    steps = whole_number("steps", steps)
     if u is None and (within is None or basis in ("emulation", "bound")):
         raise ValueError(f'got no inputs for basis "{basis}"; needed z=, of shape ({steps}, {system.m})')
     largest = np.array([np.inf])
@@ -239,7 +239,7 @@ def required_system_precision(
         return (ratio, "") if ratio < math.inf else (math.inf, "an output is not finite")
 
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(error, base, rounding, CHECKED[base], bar.update, bounds=basis != "emulation")
+        found = Search(error, like, CHECKED[like.base], bar.update, bounds=basis != "emulation")
     advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
     return Requirement(found.fmt, basis, steps, found.tried, found.why, None, found.irregular, advice)
 

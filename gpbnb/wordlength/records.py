@@ -6,6 +6,7 @@ import hashlib
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.array_forms import AnyForm
+from gpbnb.kalman.filter_run import check_compiled
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, whole_number
-from gpbnb.kalman.precision import survey
+from gpbnb.kalman.precision import survey_formats
 from gpbnb.kalman.requirement import Basis, checked_tolerance
 from gpbnb.sweeps import Column, Sweep
 
@@ -44,6 +46,8 @@ class RecordSurvey(NamedTuple):
 
     formats: tuple[FloatFormat, ...]
     ratios: NDArray[np.float64]
+    #: For each record and format, why the ratio is infinite; otherwise an empty text.
+    reasons: tuple[tuple[str, ...], ...]
 
     @property
     def shares(self) -> tuple[float, ...]:
@@ -51,15 +55,16 @@ class RecordSurvey(NamedTuple):
         return tuple(float(share) for share in (self.ratios <= 1).mean(axis=0))
 
     def enough(self) -> tuple[FloatFormat, ...]:
-        """For each base and rounding, the format of fewest digits with which all records stay within the tolerance.
+        """For each base, rounding and range, the format of fewest digits with which all records meet the tolerance.
 
         A format counts only if the formats with more digits in the survey also meet the tolerance.
         """
         met = {fmt: bool((self.ratios[:, i] <= 1).all()) for i, fmt in enumerate(self.formats)}
         found = []
-        for kind in dict.fromkeys((fmt.base, fmt.rounding) for fmt in self.formats):
+        kinds = {fmt: replace(fmt, precision=1, largest=None) for fmt in self.formats}
+        for kind in dict.fromkeys(kinds.values()):
             least = None
-            falling = sorted((fmt for fmt in met if (fmt.base, fmt.rounding) == kind), key=lambda fmt: -fmt.precision)
+            falling = sorted((fmt for fmt in met if kinds[fmt] == kind), key=lambda fmt: -fmt.precision)
             for fmt in falling:
                 if not met[fmt]:
                     break
@@ -89,7 +94,7 @@ def survey_records(
     records : (records, steps, m), or a list of (steps, m) of any lengths, NaN where a measurement is missing. Or the
         number of records to simulate, with the seeds 0, 1, …, of `steps` steps each.
     tolerance, form, basis : as for :func:`gpbnb.kalman.precision.required_precision`; basis "emulation" or "bound".
-    formats : formats of any base and rounding, with compiled loops and an unlimited range.
+    formats : formats of any base, rounding and range, with compiled loops.
     executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
     directory : folder for finished records. After an interruption, the same call resumes; other arguments start a new
         survey. By default nothing is saved.
@@ -98,7 +103,7 @@ def survey_records(
 
     Raises
     ------
-    ValueError : no records or formats; a format with a limited range; or for a reason given in ``survey``.
+    ValueError : no records or formats; a format without compiled loops; or for a reason given in ``survey``.
 
     Examples
     --------
@@ -115,8 +120,9 @@ def survey_records(
     if not given or len(set(given)) != len(given):
         raise ValueError(f"got {len(given)} formats, {len(set(given))} different; needed different ones, at least one")
     for fmt in given:
-        if not isinstance(fmt, FloatFormat) or fmt != FloatFormat(fmt.base, fmt.precision, fmt.rounding):
-            raise ValueError(f"got {fmt!r}; needed a FloatFormat without limits on its range")
+        if not isinstance(fmt, FloatFormat):
+            raise ValueError(f"got {fmt!r}; needed a FloatFormat")
+        check_compiled(fmt)
     tolerances = checked_tolerance(tolerance, model.n, "states", given[0].base, basis)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"')
@@ -130,17 +136,18 @@ def survey_records(
         key=1,
         cells=lambda: cells,
         compute=partial(_ratios, model, data, tolerances, given, form, basis),
-        rows=lambda cell, ratios: [(str(cell.record), " ".join(f"{ratio:.6g}" for ratio in ratios))],
+        rows=lambda cell, found: [(str(cell.record), " ".join(f"{ratio:.6g}" for ratio, _ in found))],
         command="gpbnb.wordlength.records.survey_records(...)",
         seed=0,
-        version="1",
+        version="2",
     )
     if directory is None:
         with tempfile.TemporaryDirectory() as folder:
             found = sweep.run(Path(folder), executor, chunk=chunk, progress=progress)
     else:
         found = sweep.run(Path(directory), executor, chunk=chunk, progress=progress)
-    return RecordSurvey(given, np.array([ratios for _, ratios in found], dtype=np.float64))
+    ratios = np.array([[ratio for ratio, _ in each] for _, each in found], dtype=np.float64)
+    return RecordSurvey(given, ratios, tuple(tuple(reason for _, reason in each) for _, each in found))
 
 
 def _data(model: LinearModel, records: Any, steps: int | None) -> tuple[Any, ...]:
@@ -171,15 +178,9 @@ def _ratios(
     basis: Basis,
     cell: RecordCell,
     directory: Path | None,
-) -> list[float]:
-    """Return the error / tolerance of one record in each format."""
-    found: dict[FloatFormat, float] = {}
-    for base, rounding in dict.fromkeys((fmt.base, fmt.rounding) for fmt in formats):
-        alike = [fmt for fmt in formats if (fmt.base, fmt.rounding) == (base, rounding)]
-        precisions = [fmt.precision for fmt in alike]
-        tried = survey(model, data[cell.record], tolerances.tolist(), precisions, base, rounding, form, basis)
-        found |= {fmt: ratio for fmt, (_, ratio) in zip(alike, tried, strict=True)}
-    return [found[fmt] for fmt in formats]
+) -> list[tuple[float, str]]:
+    """Return the error / tolerance of one record in each format, and why it is infinite."""
+    return survey_formats(model, data[cell.record], tolerances.tolist(), formats, form, basis)
 
 
 def _digest(

@@ -137,11 +137,13 @@ def guarantee(
 
     Raises
     ------
-    TypeError : `within` is not a result of :func:`limits`.
+    TypeError : `within` is not a result of :func:`limits`, or `fmt` is no FloatFormat.
     ValueError : the format has no compiled loops, or a covariance is not definite in it.
     """
     if not isinstance(within, Limits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
+    if not isinstance(fmt, FloatFormat):
+        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat")
     model.refuse_inputs("a guarantee")
     return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
 
@@ -170,6 +172,8 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget:
     else:
         new = np.full(n, math.inf)
     ended = None if for_ever else (steps if np.isfinite(new).all() else 0)
+    if ended is None and given.fmt.limits is not None and not np.isfinite(new).all():
+        ended, why = 0, f"no bound was found within the range of {given.fmt}: a number may exceed the largest"
     at = history.argmax(axis=0)
     worst = np.array([parts[at[i], i] for i in range(n)])
     return Guarantee(b if np.isfinite(new).all() else new, ended, why, history, worst, known, given, lags, radius)

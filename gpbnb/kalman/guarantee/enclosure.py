@@ -241,8 +241,10 @@ def enclose(stored: LinearModel, run: Run, fmt: FloatFormat, form: Form, trials:
 
     Returns
     -------
-    enclosure : None for another form or if no such set was found.
+    enclosure : None for another form, for a format with a limited range, or if no such set was found.
     """
+    if fmt.limits is not None:  # relative errors exceed the unit roundoff where numbers underflow
+        return None
     start = _settled(stored, run.steps, float(fmt.unit_roundoff)) if form in FORMS else None
     if start is None:
         return None

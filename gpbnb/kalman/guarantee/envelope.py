@@ -45,32 +45,40 @@ ROUNDING, LOOP, GAIN, START = range(4)
 class Units(NamedTuple):
     r"""The largest rounding error of a result of at most a given size, :math:`\tfrac12 b^{e-t}` or :math:`b^{e-t}`.
 
-    The size is below :math:`b^e`. Exponents are unlimited in a ``FloatFormat``; the table spans 2**±900.
+    The size is below :math:`b^e`. The table spans 2**±900, or the range of the format: the error does not fall below
+    that of the least numbers, and none is given beyond the largest.
     """
 
     #: powers of the base, rounded down.
     powers: NDArray[np.float64]
     #: error of a result up to this power, rounded up.
     errors: NDArray[np.float64]
-    #: double-double powers of the base, by which a product is exact.
+    #: double-double powers of the base, by which a product is exact; with a limited range, only one.
     exact: NDArray[np.float64]
 
 
 @lru_cache(maxsize=64)
 def units(fmt: FloatFormat) -> Units:
     """Tables of :class:`Units` for a format."""
-    most = int(850 / np.log2(fmt.base))
-    powers, errors, exact = [], [], []
-    share = 2 if fmt.rounding is Rounding.NEAREST else 1
-    for k in range(-most, most + 1):
-        power = Fraction(fmt.base) ** k
-        near = float(power)
+    limits, most = fmt.limits, int(850 / np.log2(fmt.base))
+    sizes = [Fraction(fmt.base) ** k for k in range(-most, most + 1)]
+    exact = [(float(power), float(power - Fraction(float(power)))) for power in sizes]
+    share = 2 if fmt.rounding in (Rounding.NEAREST, Rounding.EVEN) else 1
+    errors = [power / fmt.base**fmt.precision / share for power in sizes]
+    if limits is not None:
+        normal = Fraction(fmt.base) ** limits.emin
+        least = normal / fmt.base ** (fmt.precision - 1) / share if limits.subnormal else normal
+        errors = [max(each, least) for each in errors]
+        last = next((i for i, power in enumerate(sizes) if power >= limits.largest), None)
+        if last is not None:
+            sizes, errors = [*sizes[:last], limits.largest], errors[: last + 1]
+        exact = [(1.0, 0.0)]
+    powers, above = [], []
+    for power, error in zip(sizes, errors, strict=True):
+        near, near_error = float(power), float(error)
         powers.append(near if Fraction(near) <= power else np.nextafter(near, 0))
-        error = power / fmt.base**fmt.precision / share
-        near_error = float(error)
-        errors.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
-        exact.append((near, float(power - Fraction(near))))
-    return Units(np.array(powers), np.array(errors), np.array(exact))
+        above.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
+    return Units(np.array(powers), np.array(above), np.array(exact))
 
 
 @compiled
