@@ -23,6 +23,7 @@ from gpbnb.kalman.covariance import (
     repaired,
     stored_in,
 )
+from gpbnb.kalman.named import checked_name
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +98,7 @@ class LinearModel:
     def __post_init__(self) -> None:
         if self.repair is not None and not isinstance(self.repair, bool):
             raise ValueError(f"got repair {self.repair!r}; needed True, False or None")
-        if not isinstance(self.name, str):
-            raise TypeError(f"got name {self.name!r}; needed text")
+        checked_name(self.name)
         self._evaluate_functions()
         tolerances: dict[str, float | None] = dict.fromkeys(_COVARIANCES)
         if self.repair is not False:
