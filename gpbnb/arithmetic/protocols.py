@@ -277,7 +277,7 @@ def _nearest_attribute(name: str, known: Sequence[str]) -> str:
     if (other := _OTHER_NAMES.get(name, name.removeprefix("nan"))) in known:
         return f"the nearest is x.{other}"
     # A name of NumPy's means something else than a similar one here; other names may be slips.
-    near = [] if hasattr(np, name) or hasattr(np.ndarray, name) else difflib.get_close_matches(name, known, 1, 0.8)
+    near = [] if name in vars(np) or hasattr(np.ndarray, name) else difflib.get_close_matches(name, known, 1, 0.8)
     return f"the nearest is x.{near[0]}" if near else ""
 
 

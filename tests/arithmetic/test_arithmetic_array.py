@@ -447,7 +447,9 @@ class TestLeavingTheFormat:
         with pytest.raises((AttributeError, TypeError), match=near):
             wrong(self.HALF)
 
-    @pytest.mark.parametrize("wrong", [lambda x: x.strides, lambda x: x.zzz, lambda x: np.logaddexp(x, x), np.unwrap])
+    @pytest.mark.parametrize(
+        "wrong", [lambda x: x.strides, lambda x: x.str, lambda x: x.zzz, lambda x: np.logaddexp(x, x), np.unwrap]
+    )
     def test_a_name_with_nothing_like_it_lists_what_there_is(self, wrong) -> None:
         with pytest.raises(
             (AttributeError, TypeError), match=r"needed one of (T, all|absolute, add|all, allclose),"
