@@ -116,10 +116,14 @@ class FixedFormat:
         """The lowest number."""
         return -(Fraction(2) ** self.integer_bits)
 
+    @property
+    def limits(self) -> Limits:
+        """The limits of the range."""
+        return Limits(self.integer_bits - 1, True, self.largest, self.lowest, self.overflow, fixed=True)
+
     @cached_property
     def _rules(self) -> Rules:
-        limits = Limits(self.integer_bits - 1, True, self.largest, self.lowest, self.overflow, fixed=True)
-        return Rules(2, self.precision, self.rounding, limits, self.seed)
+        return Rules(2, self.precision, self.rounding, self.limits, self.seed)
 
     @property
     def kernel(self) -> ExactKernel:

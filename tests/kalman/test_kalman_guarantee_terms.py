@@ -30,7 +30,7 @@ def test_units_are_rounded_outwards(base: int, rounding: Rounding) -> None:
     assert base**most > 2**840
     share = 2 if rounding is Rounding.NEAREST else 1
     inexact = 0
-    for k, power, error, (high, low) in zip(range(-most, most + 1), *table, strict=True):
+    for k, power, error, (high, low) in zip(range(-most, most + 1), *table[:3], strict=True):
         true = F(base) ** k
         assert true * (1 - F(1, 2**52)) < F(power) <= true
         size = true / base**digits / share

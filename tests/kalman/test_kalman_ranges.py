@@ -12,6 +12,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import Run, reference_states
+from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import guarantee, limits
 from gpbnb.kalman.guarantee.envelope import units
 from gpbnb.kalman.model import LinearModel
@@ -143,6 +144,41 @@ def test_no_rounding_error_exceeds_its_unit(fmt):
     assert table.exact.tolist() == [[1.0, 0.0]]
 
 
-def test_fixed_point_has_no_guarantee_of_this_kind():
-    with pytest.raises((TypeError, ValueError), match="needed a FloatFormat"):
-        guarantee(WALK, FixedFormat(8, 8), WITHIN)
+CAR = LinearModel([[1, "0.5"], [0, 1]], [[1, 0]], [["0.01", 0], [0, "0.01"]], [["0.25"]], [0, 0], np.eye(2, dtype=int))
+ROAD = limits(2, 1, state=(100, 20), innovation=10)
+
+
+@pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
+@pytest.mark.parametrize("rounding", [Rounding.NEAREST, Rounding.DOWN])
+def test_a_filter_in_fixed_point_has_a_guarantee(form, rounding):
+    """Covariance and gain are computed in fixed point, too."""
+    found = guarantee(CAR, FixedFormat(8, 12, rounding), ROAD, form)
+    against = attack(found, 300, 20)
+    assert found.for_ever
+    assert against.admissible
+    assert 0.1 < against.ratio <= 1
+    finer = guarantee(CAR, FixedFormat(8, 20, rounding), ROAD, form)
+    assert (finer.bound < found.bound / 50).all()
+
+
+def test_in_fixed_point_only_products_are_rounded():
+    """The bound of x + K (z - x) in the steady state: the rounding of one product, and the error of the gain."""
+    fmt = FixedFormat(8, 12)
+    found = guarantee(WALK, fmt, WITHIN)
+    schedule = found.schedule
+    half, gain = 2.0**-13, schedule.coefficients[-1, -1, 0]
+    off = abs(gain - schedule.exact[-1, 0, 0, 0]) * 10
+    assert found.bound[0] == pytest.approx((half + off) / gain, rel=0.02)
+    table = units(fmt)
+    assert (table.powers.tolist(), table.errors.tolist()) == ([256 - 2.0**-12], [half])
+    assert table.sums_exact
+    assert not units(BINARY16).sums_exact
+    assert units(FixedFormat(8, 12, Rounding.DOWN)).errors.tolist() == [2 * half]
+
+
+def test_fixed_point_that_may_overflow_has_no_guarantee():
+    found = guarantee(WALK, FixedFormat(5, 16), WITHIN)
+    assert found.bound[0] == math.inf
+    assert "a number may exceed the largest" in found.why
+    with pytest.raises(TypeError, match="needed a FloatFormat or a FixedFormat"):
+        guarantee(WALK, 24, WITHIN)

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.envelope import (
@@ -117,7 +118,7 @@ def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, me
 
 def guarantee(
     model: LinearModel,
-    fmt: FloatFormat,
+    fmt: FloatFormat | FixedFormat,
     within: Limits,
     form: Form | str = Form.INNOVATION,
     most: int = 20_000,
@@ -137,13 +138,13 @@ def guarantee(
 
     Raises
     ------
-    TypeError : `within` is not a result of :func:`limits`, or `fmt` is no FloatFormat.
+    TypeError : `within` is not a result of :func:`limits`, or `fmt` is no format.
     ValueError : the format has no compiled loops, or a covariance is not definite in it.
     """
     if not isinstance(within, Limits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
-    if not isinstance(fmt, FloatFormat):
-        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat")
+    if not isinstance(fmt, (FloatFormat, FixedFormat)):
+        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
     return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
 

@@ -33,6 +33,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
@@ -230,7 +231,9 @@ class _Phase:
     after: Any
 
 
-def enclose(stored: LinearModel, run: Run, fmt: FloatFormat, form: Form, trials: int = 60) -> Enclosure | None:
+def enclose(
+    stored: LinearModel, run: Run, fmt: FloatFormat | FixedFormat, form: Form, trials: int = 60
+) -> Enclosure | None:
     """Find a step from which on the computed covariance stays in a set forever, and enclose its gains.
 
     Parameters
@@ -243,7 +246,8 @@ def enclose(stored: LinearModel, run: Run, fmt: FloatFormat, form: Form, trials:
     -------
     enclosure : None for another form, for a format with a limited range, or if no such set was found.
     """
-    if fmt.limits is not None:  # relative errors exceed the unit roundoff where numbers underflow
+    if not isinstance(fmt, FloatFormat) or fmt.limits is not None:
+        # relative errors exceed the unit roundoff where numbers underflow
         return None
     start = _settled(stored, run.steps, float(fmt.unit_roundoff)) if form in FORMS else None
     if start is None:

@@ -30,6 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.kalman.guarantee.program import MULTIPLY, effects, functionals
@@ -55,17 +56,25 @@ class Units(NamedTuple):
     errors: NDArray[np.float64]
     #: double-double powers of the base, by which a product is exact; with a limited range, only one.
     exact: NDArray[np.float64]
+    #: whether sums are exact, as in fixed point.
+    sums_exact: bool
 
 
 @lru_cache(maxsize=64)
-def units(fmt: FloatFormat) -> Units:
+def units(fmt: FloatFormat | FixedFormat) -> Units:
     """Tables of :class:`Units` for a format."""
     limits, most = fmt.limits, int(850 / np.log2(fmt.base))
     sizes = [Fraction(fmt.base) ** k for k in range(-most, most + 1)]
     exact = [(float(power), float(power - Fraction(float(power)))) for power in sizes]
     share = 2 if fmt.rounding in (Rounding.NEAREST, Rounding.EVEN) else 1
     errors = [power / fmt.base**fmt.precision / share for power in sizes]
-    if limits is not None:
+    if limits is not None and limits.fixed:
+        sizes, errors, exact = (
+            [limits.largest],
+            [Fraction(1, 2) ** (fmt.precision - 1 - limits.emin) / share],
+            [(1.0, 0.0)],
+        )
+    elif limits is not None:
         normal = Fraction(fmt.base) ** limits.emin
         least = normal / fmt.base ** (fmt.precision - 1) / share if limits.subnormal else normal
         errors = [max(each, least) for each in errors]
@@ -78,7 +87,7 @@ def units(fmt: FloatFormat) -> Units:
         near, near_error = float(power), float(error)
         powers.append(near if Fraction(near) <= power else np.nextafter(near, 0))
         above.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
-    return Units(np.array(powers), np.array(above), np.array(exact))
+    return Units(np.array(powers), np.array(above), np.array(exact), limits is not None and limits.fixed)
 
 
 @compiled
@@ -235,12 +244,14 @@ def disturbances(
                 before = off[a] + off[c]
                 drift[v] = drift[a] + drift[c]
                 none[v] = none[a] and none[c]
-                is_exact = none[a] or none[c]
+                is_exact = none[a] or none[c] or units.sums_exact
             drift[v] *= _UP
             size = (size + before + drift[v]) * _UP
             if result_of[v] >= 0:
                 size = min(size, (X[result_of[v]] + b[result_of[v]]) * _UP)
-            h = 0.0 if is_exact else _largest_error(units, size)
+            h = _largest_error(units, size)
+            if is_exact and h < np.inf:
+                h = 0.0
             off[v] = (before + h) * _UP
             largest[v] = (size + h) * _UP
             lim[k, groups[o]] += h

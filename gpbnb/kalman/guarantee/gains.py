@@ -16,6 +16,7 @@ import numpy as np
 from flint import arb, arb_mat
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
@@ -53,7 +54,7 @@ class Schedule:
     """
 
     program: Program
-    fmt: FloatFormat
+    fmt: FloatFormat | FixedFormat
     coefficients: NDArray[np.float64]
     packed: NDArray[Any]
     Phi: NDArray[np.float64]
@@ -105,7 +106,7 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
 
 
 def schedule(
-    model: LinearModel, fmt: FloatFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
+    model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
 ) -> Schedule:
     """Find the coefficients of a Kalman filter until its computed covariance repeats and the exact gain has settled.
 
@@ -176,11 +177,13 @@ def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int6
     return np.where(k < repeat + period, k, repeat + (k - repeat) % period)
 
 
-def _emulated(stored: LinearModel, fmt: FloatFormat, form: Form, most: int) -> tuple[Run, int | None, int | None]:
+def _emulated(
+    stored: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
+) -> tuple[Run, int | None, int | None]:
     """Return a run that keeps every gain, and the number of steps after which the computed covariance first repeats."""
     steps = min(most, max(128, 2 * stored.cycle))
     while True:
-        run = Run(stored, fmt, form, range(1, steps + 1))
+        run = Run(stored, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
         start = np.array(run.P)
         run.take(np.zeros((steps, stored.m)))
         done = run.steps
@@ -231,7 +234,7 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
     return innovation_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
 
 
-def pack(fmt: FloatFormat, values: Any) -> NDArray[Any]:
+def pack(fmt: FloatFormat | FixedFormat, values: Any) -> NDArray[Any]:
     """Convert numbers to the form that the compiled loops of a format expect."""
     array = fmt.array(values)
     if not isinstance(array.backend, Compiled):
@@ -260,7 +263,7 @@ def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
 
 
 def _exact_gains(
-    stored: LinearModel, repeat: int, period: int | None, most: int, fmt: FloatFormat
+    stored: LinearModel, repeat: int, period: int | None, most: int, fmt: FloatFormat | FixedFormat
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], bool, int]:
     """Return the exact gain in double-double, a bound of its error, whether it holds forever, and from which row.
 
@@ -272,7 +275,7 @@ def _exact_gains(
     if period is None:
         run = _bounded_run(stored, repeat)
         return run.G.reshape(repeat, n, m, 2), run.bounds[1], False, repeat
-    unit = float(fmt.unit_roundoff)
+    unit = float(fmt.unit if isinstance(fmt, FixedFormat) else fmt.unit_roundoff)
     steps = repeat + 2 * period
     while True:
         run = _bounded_run(stored, steps)

@@ -16,6 +16,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.guarantee.gains import Schedule, pack, widened_array
@@ -51,7 +52,7 @@ class LinearFilter:
     def __post_init__(self) -> None:
         checked_name(self.name)
 
-    def schedule(self, fmt: FloatFormat) -> Schedule:
+    def schedule(self, fmt: FloatFormat | FixedFormat) -> Schedule:
         """Return the filter in a format, for :func:`gpbnb.kalman.guarantee.bound.from_schedule`."""
         program, first = self.program, self.program.n + self.program.m
         packed = pack(fmt, self.coefficients.reshape(1, -1))
