@@ -16,6 +16,7 @@ from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.filter_run import Checkpoints, Run, log_spaced, reference
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named
 
@@ -116,7 +117,7 @@ def emulate(
     Parameters
     ----------
     model : a model with n states and m measurements.
-    z : (steps, m), measurements.
+    z : (steps, m), measurements; NaN or masked if missing.
     fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13; or fixed point.
     form : a form or its name, such as "UD".
     checkpoint_steps : steps at which to compare; by default four per decade.
@@ -135,6 +136,8 @@ def emulate(
         raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
+    if not hasattr(z, "to_fractions"):
+        model, z = without_missing(model, z)
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     model.check_measurements(measured, 0)
     if not len(measured):

@@ -25,6 +25,9 @@ from gpbnb.kalman.covariance import (
 )
 from gpbnb.kalman.named import checked_name
 
+LARGEST_EXPONENT = 450
+"""Largest size of an exponent of two in a model for compiled loops of a format with any exponent."""
+
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
@@ -256,6 +259,24 @@ class LinearModel:
         """
         if self.steps is not None and count > self.steps:
             raise ValueError(f"got {count} steps; needed at most {self.steps}: {self.name} describes no more")
+
+    def check_sizes(self) -> None:
+        """Reject entries whose products leave the exponents of float64, which compiled loops compute with.
+
+        Raises
+        ------
+        OverflowError : an entry is not between 2**-:data:`LARGEST_EXPONENT` and 2**:data:`LARGEST_EXPONENT` in size.
+        """
+        for letter in (*_LETTERS, *_INPUTS):
+            given = getattr(self, letter)
+            for entry in () if given is None else {abs(each) for each in given.flat if each}:
+                exponent = entry.numerator.bit_length() - entry.denominator.bit_length()
+                if abs(exponent) > LARGEST_EXPONENT:
+                    raise OverflowError(
+                        f"got {letter} with an entry near 2**{exponent}; needed 2**-{LARGEST_EXPONENT} to "
+                        f"2**{LARGEST_EXPONENT}, or products leave the exponents of float64; scale the model by powers "
+                        "of two"
+                    )
 
     @property
     def n(self) -> int:

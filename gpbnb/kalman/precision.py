@@ -89,7 +89,8 @@ def required_precision(
         or fewer measurements than steps; a model with known inputs, or an ``ArrayForm``, where a basis does not cover
         them.
     TypeError : another kind of model, or of limits.
-    OverflowError : an output of a linear system, or its reference, leaves the range of float64.
+    OverflowError : an output of a linear system, or its reference, leaves the range of float64; the entries of a model
+        are too large or too small for compiled loops.
     ArithmeticError : the filter is degenerate even without rounding; see :func:`gpbnb.kalman.filter_run.reference`.
     """
     form, rounding = form_named(form), rounding_named(rounding)
@@ -106,6 +107,8 @@ def required_precision(
     if isinstance(model, LinearSystem):
         return required_system_precision(model, steps, tolerance, z, like, basis, within, progress)
     tolerances = _checked(model, tolerance, base, basis)
+    if like.limits is None:
+        model.check_sizes()
     steps = whole_number("steps", steps)
     for_ever = basis in ("guarantee", "probable")
     if for_ever and within is None:
@@ -127,7 +130,10 @@ def required_precision(
     if z is None:
         z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
     repairs = tuple(str(each) for each in model.repairs)
+    given = model
     model, z = without_missing(model, z)
+    if for_ever and model is not given:
+        raise ValueError(f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record')
     measured = _measured(model, z, steps)
     model.check_steps(steps)
     true = reference_states(model, measured) if basis == "emulation" else None
@@ -207,6 +213,8 @@ def survey_formats(
 ) -> list[tuple[float, str]]:
     """Run a filter in each format; return largest error or bound / tolerance, and why it is infinite."""
     tolerances = _checked(model, tolerance, formats[0].base, basis)
+    if any(fmt.limits is None for fmt in formats):
+        model.check_sizes()
     model, z = without_missing(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):

@@ -418,3 +418,8 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     step = reference(alone, z[3:4, 1:], [1])
     assert step.x[0].astype(float) == pytest.approx(found.x[1].astype(float), rel=1e-14)
     assert step.P[0].astype(float) == pytest.approx(found.P[1].astype(float), rel=1e-14)
+    history, again = emulate(two, with_nan, FloatFormat(2, 24)), emulate(replaced, filled, FloatFormat(2, 24))
+    assert np.array_equal(history.state, again.state)
+    within = limits(2, 2, state=100, innovation=20)
+    with pytest.raises(ValueError, match='got missing measurements and basis "guarantee"'):
+        required_precision(two, 12, 1e-4, basis="guarantee", within=within, z=with_nan)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -182,3 +183,30 @@ def test_fixed_point_that_may_overflow_has_no_guarantee():
     assert "a number may exceed the largest" in found.why
     with pytest.raises(TypeError, match="needed a FloatFormat or a FixedFormat"):
         guarantee(WALK, 24, WITHIN)
+
+
+# -- formats of any exponent ------------------------------------------------------------------------------
+
+
+def in_units(exponent):
+    """The car, in units of 2**-exponent."""
+    square = Fraction(4) ** exponent
+    return LinearModel(CAR.Phi, CAR.H, CAR.Q * square, CAR.R * square, CAR.x0, CAR.P0 * square)
+
+
+@pytest.mark.parametrize("form", ["innovation", "Joseph", "UD"])
+@pytest.mark.parametrize("basis", ["emulation", "bound"])
+def test_units_far_from_one_change_nothing(form, basis):
+    answers = {required_precision(in_units(e), 30, 0.01 * 2.0**e, form=form, basis=basis).tried for e in (0, 210, -210)}
+    assert len(answers) == 1
+
+
+@pytest.mark.parametrize("exponent", [230, -230])
+def test_units_too_far_from_one_are_refused(exponent):
+    """Compiled loops of a format with any exponent have the exponents of float64."""
+    with pytest.raises(OverflowError, match=r"got Q with an entry near 2.*; needed 2.*; scale the model"):
+        required_precision(in_units(exponent), 30, 0.01)
+    with pytest.raises(OverflowError, match="scale the model"):
+        survey(in_units(exponent), np.ones((3, 1)), 0.01, [24])
+    wide = required_precision(in_units(exponent), 30, 0.01 * 2.0**exponent, emin=-1000, emax=1000)
+    assert wide.tried
