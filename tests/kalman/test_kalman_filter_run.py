@@ -193,7 +193,7 @@ def test_what_a_run_refuses():
             with pytest.raises(ValueError, match=r"needed \(steps, 2\)"):
                 kind(given, FloatFormat(2, 24), Form.HUNG, (1,)).take(z)
     with pytest.raises(ValueError, match="finite"):
-        emulate(given, [[1.0, math.nan]], FloatFormat(2, 24))
+        emulate(given, [[1.0, math.inf]], FloatFormat(2, 24))
     with pytest.raises(OverflowError, match="beyond the range of the compiled loops"):
         Run(scalar(Fraction(10**400)), FloatFormat(2, 24), Form.HUNG, (1,))
     # In two digits 1.04 * 1.07 > 1.05**2 becomes 1.0 * 1.1 < 1.1**2.
