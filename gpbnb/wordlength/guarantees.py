@@ -22,7 +22,7 @@ from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.display.tables import Table
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.adversary import attack, random_errors
+from gpbnb.kalman.guarantee.adversary import attack, ceiling, random_errors
 from gpbnb.kalman.guarantee.bound import BUDGET, Guarantee, from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.linear import LinearFilter, biquad, controller, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
@@ -113,6 +113,7 @@ class Row(NamedTuple):
     period: str
     bound: str
     ratio: str
+    ceiling: str
     probable: str
     scatter: str
     guarantee: str
@@ -164,6 +165,7 @@ def compute(case: Case) -> Row:
         str(schedule.period or ""),
         f"{found.bound[worst]:.3g}",
         f"{outcome.ratio:.2f}",
+        f"{ceiling(found, outcome.z[: outcome.step], outcome.state) / found.bound[outcome.state]:.2f}",
         noise,
         scatter,
         bits["guarantee"],
@@ -250,15 +252,15 @@ def load(file: Path = FILE) -> tuple[Row, ...]:
 def table() -> Table:
     """Tabulate the bound of each filter and its sharpness."""
     header = (
-        "filter", "n, m", "repeats from step", "period", "bound", "achieved / bound", "probable error",
-        "scatter / probable",
+        "filter", "n, m", "repeats from step", "period", "bound", "achieved / bound", "ceiling / bound",
+        "probable error", "scatter / probable",
     )  # fmt: skip
     body = [
         tuple(
             cell or "–"
             for cell in (
-                each.name, f"{each.n}, {each.m}", each.repeat, each.period, each.bound, each.ratio, each.probable,
-                each.scatter,
+                each.name, f"{each.n}, {each.m}", each.repeat, each.period, each.bound, each.ratio, each.ceiling,
+                each.probable, each.scatter,
             )
         )
         for each in load()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 
@@ -14,7 +15,7 @@ from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee import derivation
-from gpbnb.kalman.guarantee.adversary import attack, random_errors
+from gpbnb.kalman.guarantee.adversary import attack, ceiling, random_errors
 from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
 from gpbnb.kalman.guarantee.gains import pack, schedule
@@ -366,3 +367,42 @@ def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:
 def test_the_algebra(name: str) -> None:
     for step in getattr(derivation, name)().steps:
         assert step.holds, step.name
+
+
+def test_the_ceiling_of_a_run_lies_between_its_error_and_the_guarantee():
+    """A constant is measured: only the rounding of one product in each step, of known size, has an effect."""
+    model = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+    found = guarantee(model, FloatFormat(2, 11), limits(1, 1, state=100, innovation=10))
+    outcome = attack(found, 200, 50)
+    z = outcome.z[: outcome.step]
+    most = ceiling(found, z, outcome.state)
+    assert outcome.errors[outcome.state] <= most <= found.bound[outcome.state]
+    assert ceiling(found, z / 2**20, 0) < most / 1000
+
+
+def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():
+    """x = 0.5625 x + 0.4375 z in five bits, with z = 0.75."""
+    schedule = state_space([["0.5625"]], [["0.4375"]], [[1]], [[0]]).schedule(FloatFormat(2, 5))
+    found = from_schedule(schedule, limits(2, 1, measurement=1.0))
+    z = np.full((3, 1), 0.75)
+    x, total = 0.0, 0.0
+    half = {k: 2.0 ** (k - 6) for k in range(-8, 2)}  # largest error of results below 2**k
+    for _ in range(3):
+        products = 0.5625 * x, 0.4375 * 0.75
+        sizes = [abs(each) for each in (*products, sum(products)) if each]
+        sizes = sizes if x else sizes[:1]
+        total = 0.5625 * total + sum(half[math.frexp(each)[1]] for each in sizes)
+        x = sum(products)
+    assert ceiling(found, z, 0) == pytest.approx(total, rel=1e-12)
+
+
+def test_outputs_and_delays_have_a_guarantee():
+    """A delayed copy of a state has no disturbance of its own, nor has an output without a direct term."""
+    A, B = [["0.5625", 0, 0], [1, 0, 0], [0, 1, 0]], [["0.4375"], [0], [0]]
+    schedule = state_space(A, B, [[0, 0, 1]], [[0]]).schedule(FloatFormat(2, 11))
+    found = from_schedule(schedule, limits(4, 1, measurement=1.0))
+    assert found.for_ever
+    assert found.limits.state == pytest.approx(np.ones(4), rel=1e-6)
+    assert found.bound == pytest.approx(np.full(4, found.bound[0]), rel=1e-6)
+    outcome = attack(found, 200, 50)
+    assert 0.1 < outcome.ratio <= 1

@@ -19,9 +19,10 @@ from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
-from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops
+from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops, unit_disturbances
+from gpbnb.kalman.guarantee.envelope import units
 from gpbnb.kalman.guarantee.gains import Schedule, pack
-from gpbnb.kalman.guarantee.program import execute
+from gpbnb.kalman.guarantee.program import MULTIPLY, SUBTRACT, effects, execute
 from gpbnb.kalman.kernels.bounded import widened
 
 
@@ -36,6 +37,7 @@ class Attack:
     ratios : (n,), the ratio of each state.
     runs, steps : number of runs, and steps of each.
     z : (steps, m), measurements of the run with the largest ratio, numbers of the format, in float64.
+    state, step : where the largest ratio occurs: index of the state, and number of steps done.
     admissible : whether the exact filter stayed within its limits in all runs.
     """
 
@@ -45,6 +47,8 @@ class Attack:
     runs: int
     steps: int
     z: NDArray[np.float64]
+    state: int
+    step: int
     admissible: bool
 
 
@@ -254,6 +258,7 @@ def attack(
     n, m = given.program.n, given.program.m
     by_range = not np.isfinite(found.limits.measurement).all()
     errors, best, best_z, allowed, runs = np.zeros(n), 0.0, np.zeros((steps, m)), True, 0
+    at: tuple[Any, ...] = (0, 0)
     F = closed_loops(given)
     for state in range(n) if states is None else states:
         rows = responses(given, F, state, steps)
@@ -267,11 +272,53 @@ def attack(
             if outcome[0]:
                 continue
             errors = np.maximum(errors, np.abs(outcome[2]).max(axis=0))
-            ratio = float((np.abs(outcome[2][:, state]) / found.bound[state]).max())
-            if ratio > best:
-                best, best_z = ratio, outcome[1]
+            reached = np.abs(outcome[2]) / found.bound
+            if reached.max() > best:
+                best, best_z, at = float(reached.max()), outcome[1], np.unravel_index(reached.argmax(), reached.shape)
     ratios = errors / found.bound
-    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, allowed)
+    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(at[1]), int(at[0]) + 1, allowed)
+
+
+def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:
+    """Return the error that a state would have after a run if all roundings of this run had the same effect.
+
+    Each rounding error is as large as a result of that size allows. The errors of gain and closed loop are those of the
+    run. The guarantee, on the other hand, allows for the largest sizes at every step. So the ceiling tells whether
+    an attack fails because it does not control all roundings, or because no run keeps all numbers as large as the
+    limits allow.
+
+    Parameters
+    ----------
+    z : (steps, m), measurements of the run, such as those of an :class:`Attack`.
+    state : index of the state.
+    """
+    given, program = found.schedule, found.schedule.program
+    first, steps = program.n + program.m, len(z)
+    parts, table = unit_disturbances(given), units(given.fmt)
+    rows, known = responses(given, parts.F, state, steps), 0.0
+    values, x = np.empty(first + len(program.operations)), given.x0.astype(np.float64)
+    effect, sizes = np.empty((len(values), program.n)), np.empty((len(values), program.n))
+    powers, total = {0.0, *table.exact[:, 0].tolist()}, 0.0
+    for k in range(steps):
+        at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
+        coefficients = np.ascontiguousarray(given.coefficients[at, :, 0])
+        values[:first] = *x, *z[k]
+        errors = np.zeros(len(program.operations))
+        for o, (code, a, b) in enumerate(program.operations):
+            if code == MULTIPLY:
+                values[first + o] = coefficients[a] * values[b]
+                exact = abs(coefficients[a]) in powers
+            else:
+                values[first + o] = values[a] - values[b] if code == SUBTRACT else values[a] + values[b]
+                exact = values[a] == 0 or values[b] == 0 or table.sums_exact
+            if not exact and values[first + o]:
+                errors[o] = table.errors[np.searchsorted(table.powers, abs(values[first + o]))]
+        effects(program.operations, program.outputs, coefficients, first, effect, sizes)
+        total += float(np.abs(effect[first:] @ rows[k]) @ errors)
+        innovation = z[k] - given.HPhi[at, :, :, 0] @ x
+        known += float(rows[k] @ (parts.loop[at] @ x + parts.gain[at] @ innovation))
+        x = values[program.outputs]
+    return total + abs(known)
 
 
 def random_errors(found: Guarantee, steps: int, center: Any = None, seed: int = 0) -> NDArray[np.float64]:

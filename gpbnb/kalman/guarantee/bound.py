@@ -219,8 +219,13 @@ def _parts_of(given: Schedule) -> NDArray[np.int64]:
 
 def closed_loops(given: Schedule) -> NDArray[np.float64]:
     """Return the closed loop of each step of a schedule, (steps, n, n), in float64."""
-    known = Limits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
-    return _disturbances(given, known, np.zeros(given.program.n)).F
+    return unit_disturbances(given).F
+
+
+def unit_disturbances(given: Schedule) -> Disturbances:
+    """Return closed loops and disturbances of the steps of a schedule, for limits of one."""
+    ones = Limits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
+    return _disturbances(given, ones, np.zeros(given.program.n))
 
 
 def _radius(given: Schedule) -> float:
@@ -314,8 +319,7 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     the last terms are small. The certificate of the error bound gives its worst-case peak gain.
     """
     n, m = given.program.n, given.program.m
-    ones = Limits(np.ones(n), np.ones(m), np.ones(m))
-    found = _disturbances(given, ones, np.zeros(n))
+    found = unit_disturbances(given)
     G = np.concatenate([found.K, found.loop, found.gain], axis=2)
     part = np.array([ROUNDING] * m + [LOOP] * n + [GAIN] * m)
     X, V = np.zeros(n), np.array(within.measurement)

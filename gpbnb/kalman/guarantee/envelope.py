@@ -393,7 +393,7 @@ def certify(
             for j in range(n):
                 size += abs(c[j]) * scale[j]
                 sums[i, ROUNDING] += abs(c[j]) * slack[at, j]
-            if size < small:
+            if size < small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
                 break
             for g in range(g_count):
                 if limits[at, g] != 0.0:
