@@ -71,6 +71,16 @@ def frames(
     }
 
 
+#: Alignment of the labels that would otherwise lie on an arrow.
+BESIDE = {
+    "xg": ("left", "top"),
+    "yi": ("right", "bottom"),
+    "ya": ("left", "bottom"),
+    "xφ": ("center", "bottom"),
+    "yt": ("right", "center"),
+}
+
+
 def triads(matrices: Frames, ax: Any, ring: str | None = None) -> list[Artist]:
     """Draw Figure IV-1: the axes of some frames in space, and the readout ring of the frame `ring`."""
     artists: list[Artist] = []
@@ -78,7 +88,8 @@ def triads(matrices: Frames, ax: Any, ring: str | None = None) -> list[Artist]:
         colour, letter = FRAME_COLOURS[name], r"\varphi" if name == "φ" else name
         for axis, row in zip("xyz", matrix * (1 + 0.18 * k), strict=True):
             artists.append(ax.quiver(0, 0, 0, *row, color=colour, lw=1.6, arrow_length_ratio=0.07))
-            artists.append(ax.text(*(row * 1.1), f"${axis}_{{{letter}}}$", color=colour, ha="center", va="center"))
+            across, along = BESIDE.get(axis + name, ("center", "center"))
+            artists.append(ax.text(*(row * 1.1), f"${axis}_{{{letter}}}$", color=colour, ha=across, va=along))
     if ring is not None:
         turn = np.linspace(0, 2 * np.pi, 90)
         around = 0.55 * (np.cos(turn)[:, None] * matrices[ring][0] + np.sin(turn)[:, None] * matrices[ring][1])

@@ -215,12 +215,18 @@ def _beside(
 
 def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[Artist]:
     """Draw the error of one state (points) and its contraction bound (line) against the step."""
-    steps, error = found.history.steps, np.abs(found.history.state[:, state])
+    steps, error, bound = found.history.steps, np.abs(found.history.state[:, state]), found.state[:, state]
     seen = error > 0
     artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
-    artists += ax.plot(steps, found.state[:, state], color=VALID, label="contraction bound")
+    artists += ax.plot(steps, bound, color=VALID, label="contraction bound")
+    middle = 2 * len(steps) // 3
+    places: list[tuple[str, float, str, dict[str, Any]]] = [
+        ("contraction bound", bound[middle], VALID, {"xytext": (-4, 6), "ha": "right"}),
+        ("observed", error[middle], OBSERVED, {"xytext": (8, -6), "ha": "left", "va": "top"}),
+    ]
+    for text, y, colour, where in places:
+        artists.append(ax.annotate(text, (steps[middle], y), color=colour, textcoords="offset points", **where))
     loglog(ax)
-    legend(ax)
     label(ax, "step $k$", f"error of {name}")
     return artists
 

@@ -233,11 +233,15 @@ def test_contraction(ax):
     state = np.array([[9.0, -1.0], [9.0, 0.0], [9.0, 3.0]])
     bound = np.array([[8.0, 2.0], [8.0, 4.0], [8.0, 6.0]])
     found = SimpleNamespace(history=SimpleNamespace(steps=STEPS, state=state), state=bound)
-    points, line = figures.contraction(found, 1, ax, "rate (mas/yr)")
+    points, line, *labels = figures.contraction(found, 1, ax, "rate (mas/yr)")
     assert at(points, (1, 1), (100, 3))  # a logarithmic axis has no place for zero
     assert at(line, (1, 2), (10, 4), (100, 6))
-    assert labelled(ax) == {"observed": (BLUE, "", "o"), "contraction bound": (GREEN, "-", "")}
+    assert (points.get_color(), line.get_color()) == (BLUE, GREEN)
     assert (points.get_label(), line.get_label()) == ("observed", "contraction bound")
+    assert [(each.get_text(), each.get_color(), each.xy) for each in labels] == [
+        ("contraction bound", GREEN, (100, 6)),
+        ("observed", BLUE, (100, 3)),
+    ]
     return ax.figure
 
 

@@ -105,12 +105,16 @@ def test_contraction(ax):
     found = emulate_with_bound(
         model, np.arange(1.0, 9.0).reshape(8, 1) / 3, FloatFormat(2, 24), checkpoint_steps=range(1, 9)
     )
-    points, line = figures.contraction(found, 0, ax, "x (m)")
+    points, line, *labels = figures.contraction(found, 0, ax, "x (m)")
     error = np.abs(found.history.state[:, 0])
     assert list(points.get_ydata()) == [e for e in error if e > 0]
     assert np.array_equal(line.get_ydata(), found.state[:, 0])
     assert points.get_linestyle() == "None"
     assert (colour(points), colour(line)) == (style.OBSERVED, style.VALID)
+    assert [(each.get_text(), each.get_color(), each.xy) for each in labels] == [
+        ("contraction bound", style.VALID, (6, found.state[5, 0])),
+        ("observed", style.OBSERVED, (6, error[5])),
+    ]
     assert ax.get_ylabel() == "error of x (m)"
 
 
