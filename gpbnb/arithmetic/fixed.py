@@ -48,7 +48,7 @@ class FixedFormat:
     ----------
     integer_bits : i, bits before the binary point, without the sign.
     fraction_bits : f, bits after it; the word has 1 + i + f bits.
-    rounding : applied to every stored number and every result; a :class:`Rounding`, or its name, such as "chop".
+    rounding : applied to every stored number and every result; a ``Rounding``, or its name, such as "chop".
     overflow : "raise" an OverflowError that names the operation and the entry, "saturate" at the nearest limit, or
         "wrap" around as two's complement does.
     seed : seed for stochastic rounding.

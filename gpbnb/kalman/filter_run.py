@@ -38,7 +38,7 @@ from gpbnb.kalman.named import compiled_form
 from gpbnb.kalman.precise_reference import precise_steps
 
 LEAST_SHARE = 2.0**-60
-"""Smallest share of the noise in an innovation, as :func:`_loses_digits` counts it, that double-double resolves."""
+"""Smallest share of the noise in an innovation that double-double resolves; see :func:`reference`."""
 
 BLOCK = 256
 """Number of steps whose results are kept at a time."""
