@@ -29,7 +29,7 @@ from typing import Any
 
 from tests.mutants.concern import Concern, module_of
 from tests.mutants.operators import Mutant, mutants, mutated
-from tests.mutants.runs import Collected, How, Outcome, load_libraries, run, with_collected
+from tests.mutants.runs import Collected, Fresh, How, Outcome, load_libraries, with_collected
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -101,8 +101,6 @@ def changed_line(source: str, other: str) -> tuple[str, str]:
 
 
 _COMPILES = re.compile(r"^@(compiled|inner|njit|overload|intrinsic)", re.MULTILINE)
-#: Their functions work only when compiled.
-_KERNELS = ("gpbnb/arithmetic/kernels/", "gpbnb/kalman/kernels/")
 
 
 def is_compiled(source: str, line: int) -> bool:
@@ -123,8 +121,8 @@ Codes = Mapping[Any, Any] | None
 class Judges:
     """The tests that judge the mutants of a module."""
 
-    def __init__(self, tree: Path, budget: float, collected: Collected) -> None:
-        self.tree, self.budget, self.collected = tree, budget, collected
+    def __init__(self, tree: Path, budget: float, collected: Collected, fresh: Fresh) -> None:
+        self.tree, self.budget, self.collected, self.fresh = tree, budget, collected, fresh
         self.concern = Concern(tree)
         self.file = CACHE / "tests.json"
         #: What is known of tests: durations, which are too slow or fail without a fault, and which are not.
@@ -151,18 +149,16 @@ class Judges:
     def ways(self, name: str, line: int) -> tuple[str, How]:
         """How to run the tests on a fault in a line of a file, and a name for it.
 
-        A fault that no compiled function contains leaves all of them valid. Python runs the others, unless they work
-        only when compiled: those are compiled again, for which there is more time.
+        A fault that no compiled function contains leaves all of them valid. Otherwise they are compiled again, and
+        there is more time.
         """
         seconds = self.known["seconds"]
         module = module_of(self.tree / name, self.tree)
         if not any(self.concern.reaches(each, module) for each in self._compiled):
-            return "compiled", How(self.budget, seconds=seconds)
+            return "valid", How(self.budget, seconds=seconds)
         if not is_compiled((self.tree / name).read_text(encoding="utf-8"), line):
-            return "compiled", How(self.budget, stamps=self._stamps, seconds=seconds)
-        if name.startswith(_KERNELS):
-            return "compiled", How(4 * self.budget, seconds=seconds)
-        return "not compiled", How(self.budget, compiled=False, seconds=seconds)
+            return "valid", How(self.budget, stamps=self._stamps, seconds=seconds)
+        return "compiled again", How(4 * self.budget, seconds=seconds)
 
     def run(self, files: Sequence[str], way: str, how: How, codes: Codes = None) -> Outcome:
         """Run test files, without those tests that fail or take too long without a fault."""
@@ -171,7 +167,7 @@ class Judges:
         if how.pictures:
             files = [each for each in files if "pictured" in (self.tree / each).read_text(encoding="utf-8")]
         how = how._replace(left_out=unfit)
-        found = run(self.tree, files, how) if codes is None else self.collected.run(files, codes, how)
+        found = self.fresh.run(self.tree, files, how) if codes is None else self.collected.run(files, codes, how)
         if not how.pictures:
             for test, seconds in found.seconds.items():
                 self.known["seconds"].setdefault(test, round(seconds, 2))
@@ -185,7 +181,7 @@ class Judges:
         if not new:
             return False
         how = how._replace(stop=False)
-        found = run(self.tree, new, how) if codes is None else self.collected.run(new, {}, how)
+        found = self.fresh.run(self.tree, new, how) if codes is None else self.collected.run(new, {}, how)
         bad = [each for each in new if found.stuck or found.failed]
         sound += [each for each in new if each not in bad]
         unfit += bad
@@ -203,6 +199,10 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     other = mutated(source, mutant)
     if other is None or other == source:
         return {"outcome": "no change"}
+    try:
+        compile(other, name, "exec")
+    except SyntaxError:  # not every f-string survives the change of its quotes
+        return {"outcome": "no change"}
     before, after = changed_line(source, other)
     row = {"before": before, "after": after}
     files = [str(test.relative_to(judges.tree)) for test in judges.concern.judges(module_of(path, judges.tree))]
@@ -213,7 +213,7 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     begun = time.monotonic()
 
     codes: Codes = None
-    if way == "compiled" and not is_compiled(source, mutant.line):
+    if way == "valid":
         codes = judges.collected.changed(path, source, other)
 
     def with_the_fault(how: How) -> Outcome:
@@ -221,12 +221,14 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
             if codes is not None:
                 found = judges.run(files, way, how, codes)
             else:
-                compiled = set(COMPILED.glob("*"))
+                compiled, times = set(COMPILED.glob("*")), path.stat()
                 try:
                     path.write_text(other, encoding="utf-8")
                     found = judges.run(files, way, how)
                 finally:
                     path.write_text(source, encoding="utf-8")
+                    # To the tests imported already, a newer file is another source, and they compile again.
+                    os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
                 if how.stamps is None:  # what was compiled from a fault is of no further use
                     for file in set(COMPILED.glob("*")) - compiled:
                         file.unlink()
@@ -234,7 +236,7 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
                 return found
 
     found, outcome = with_the_fault(how), "caught"
-    if not found.stuck and not found.failed and how.compiled:
+    if not found.stuck and not found.failed:
         count = len(found.seconds)
         found, outcome = with_the_fault(how._replace(pictures=True)), "caught by a stored picture"
         found.seconds.update({str(i): 0.0 for i in range(count)})
@@ -329,9 +331,10 @@ def main() -> None:
     tree = CACHE / f"tree-{os.getpid()}"
     copy_tree(tree)
     load_libraries()
+    fresh = Fresh()
 
     def campaign(collected: Collected) -> None:
-        judges = Judges(tree, chosen.budget, collected)
+        judges = Judges(tree, chosen.budget, collected, fresh)
         end = time.monotonic() + 60 * chosen.minutes
         for number, (name, mutant) in enumerate(plan):
             place = (name, mutant.operator, str(mutant.occurrence), str(mutant.line))

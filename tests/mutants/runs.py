@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from inspect import CO_OPTIMIZED
 from itertools import zip_longest
+from multiprocessing import Pipe, get_context
 from pathlib import Path
 from types import CodeType, FunctionType
 from typing import Any, NamedTuple
@@ -64,8 +65,6 @@ class How(NamedTuple):
     #: seconds of processor time after which no further test begins. A process that takes three times as long, and ten
     #: seconds, is ended.
     budget: float
-    #: compile what is to be compiled; otherwise Python runs it.
-    compiled: bool = True
     #: digest by source file: compiled functions of these files are taken from the cache although a source has changed.
     stamps: Mapping[str, str] | None = None
     #: compare figures with their stored pictures, and run no other tests; otherwise leave these comparisons out.
@@ -181,10 +180,7 @@ def _import_and_run(root: Path, tests: Sequence[str], recorder: _Recorder) -> No
     sys.path[:] = [str(root), *(each for each in sys.path if Path(each or ".").resolve() not in (root, _CHECKOUT))]
     for name in [name for name in sys.modules if name.split(".")[0] in ("gpbnb", "tests")]:
         del sys.modules[name]
-    if not how.compiled:
-        os.environ["NUMBA_DISABLE_JIT"] = "1"
-        importlib.import_module("numba").config.DISABLE_JIT = 1
-    elif how.stamps is not None:
+    if how.stamps is not None:
         compiling = importlib.import_module("gpbnb.arithmetic.kernels.compiling")
         stamps, known = compiling._stamp, how.stamps
         compiling._stamp = lambda path: known.get(str(path)) or stamps(path)
@@ -199,6 +195,30 @@ def _import_and_run(root: Path, tests: Sequence[str], recorder: _Recorder) -> No
             code = int(pytest.main([*options, test], plugins=[recorder]))
             if code not in (0, 1, 2, 5) and not recorder.failed:
                 recorder.failed.append(f"{test}: pytest ended with {code}")
+
+
+class Fresh:
+    """A process without the package, which forks the runs of :func:`run`.
+
+    Forked from a process that has imported the package, they would import it twice, and numba refuses its types then.
+    """
+
+    def __init__(self) -> None:
+        self._pipe, other = Pipe()
+        get_context("fork").Process(target=_serve, args=(other,), daemon=True).start()
+
+    def run(self, root: Path, tests: Sequence[str], how: How) -> Outcome:
+        self._pipe.send((root, tests, how))
+        return Outcome(*self._pipe.recv())
+
+
+def _serve(pipe: Any) -> None:
+    while True:
+        try:
+            asked = pipe.recv()
+        except EOFError:
+            return
+        pipe.send(tuple(run(*asked)))
 
 
 class Collected:
