@@ -31,6 +31,9 @@ from gpbnb.arithmetic.kernels.tags import Tag
 
 __all__ = ["FloatFormat", "Rounding", "prints_as"]
 
+LARGEST_EXPONENT = 2**20
+"""Largest size of an exponent of a range, in base 2; that of binary128 is 16383."""
+
 
 @dataclass(frozen=True)
 class FloatFormat:
@@ -55,7 +58,8 @@ class FloatFormat:
     ------
     TypeError : a parameter is not of its type.
     ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; no rounding of this name; one of
-        `emin` and `emax` without the other, or ``emin > emax``; a largest number that is not in the format.
+        `emin` and `emax` without the other, ``emin > emax``, or exponents too large to compute with; a largest number
+        that is not in the format.
 
     Notes
     -----
@@ -122,6 +126,11 @@ class FloatFormat:
         object.__setattr__(self, "emax", int(self.emax))
         if self.emin > self.emax:
             raise ValueError(f"got emin={self.emin} above emax={self.emax}; needed emin <= emax")
+        if max(-self.emin, self.emax) > LARGEST_EXPONENT / math.log2(self.base):
+            raise ValueError(
+                f"got emin={self.emin}, emax={self.emax}; needed exponents of at most "
+                f"{int(LARGEST_EXPONENT / math.log2(self.base))} in size, or the limits are too long to compute with"
+            )
         last = Fraction(self.base) ** (self.emax - self.precision + 1)
         nines = (self.base**self.precision - 1) * last
         if self.largest is None:

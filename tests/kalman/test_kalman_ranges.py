@@ -210,3 +210,10 @@ def test_units_too_far_from_one_are_refused(exponent):
         survey(in_units(exponent), np.ones((3, 1)), 0.01, [24])
     wide = required_precision(in_units(exponent), 30, 0.01 * 2.0**exponent, emin=-1000, emax=1000)
     assert wide.tried
+
+
+def test_a_range_too_long_to_compute_with_is_refused():
+    for range_ in ({"emin": -(10**12), "emax": 5}, {"emin": -5, "emax": 10**12}):
+        with pytest.raises(ValueError, match="needed exponents of at most 1048576"):
+            FloatFormat(2, 8, **range_)
+    assert FloatFormat(2, 113, emin=-16382, emax=16383).limits is not None
