@@ -296,7 +296,7 @@ def norm(x: Any, order: Any = None, axis: int | None = None, keepdims: bool = Fa
 def einsum(x: Any, subscripts: Any, *operands: Any) -> Any:
     """Multiply entries, and sum the products from left to right.
 
-    A letter that an operand repeats takes its diagonal, so that ``"ii"`` is a trace. Products are formed in the order
+    A letter that occurs twice in an operand selects its diagonal: ``"ii"`` is a trace. Products are formed in the order
     of the operands. The sum runs over the indices that do not appear in the result, in the order in which they first
     appear; the last index runs fastest.
 

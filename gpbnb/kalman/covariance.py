@@ -172,13 +172,18 @@ def raised_until(
     largest: float,
     store: Callable[[NDArray[Any]], NDArray[Any]] = lambda candidate: candidate,
 ) -> tuple[NDArray[Any], float] | None:
-    """Raise variances by δ = least, 2 least, … of themselves until the matrix is sound; None beyond the largest δ.
+    """Raise the variances by a share δ of themselves, which is doubled until the matrix is sound.
 
     Parameters
     ----------
     matrix : (n, n) or (p, n, n), exact; all members are raised alike.
-    sound : what is asked of the raised matrix.
+    sound : function that tells whether a raised matrix will do.
+    least, largest : first and last δ.
     store : applied to the raised matrix before it is judged and returned.
+
+    Returns
+    -------
+    raised : the matrix and δ; None if no δ is sufficient.
     """
     variances = np.diagonal(matrix, axis1=-2, axis2=-1)
     i = np.arange(matrix.shape[-1])

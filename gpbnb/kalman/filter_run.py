@@ -64,7 +64,7 @@ class Run:
     ------
     ValueError : a format or form without compiled loops; checkpoint steps that do not ascend; compensation or another
         order of additions in a form that does not have it.
-    TypeError : sums that are no format.
+    TypeError : `sums` is not a format.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
@@ -387,8 +387,9 @@ def reference(
         run.take(z)
     if run.form is not Form.UD:
         start = Run(model.without_inputs(), None, run.form, ()).P
-        at = np.array([0, *run.checkpoint_steps[: len(run.checkpoints().steps)]])
-        if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[: len(at) - 1]])):
+        count = int(run.notes[NEXT_CHECKPOINT])
+        at = np.array([0, *run.checkpoint_steps[:count]])
+        if run.stopped or _loses_digits(model, at, np.concatenate([start[None], run.C[:count]])):
             steps = precise_steps(model, z)
             x, K, P = zip(*(steps[step - 1] for step in run.checkpoint_steps), strict=True)
             return Checkpoints(tuple(int(each) for each in run.checkpoint_steps), *(np.array(v) for v in (x, K, P)))
