@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from concurrent.futures import Future
 from enum import Enum
 from pathlib import Path
 from types import SimpleNamespace
@@ -228,16 +229,39 @@ def table(*rows):
 notebooks = load("gpbnb_notebooks")
 
 
-def test_a_changed_output_makes_all_pages_be_read_again():
-    env = SimpleNamespace(found_docs={"book/b", "book/a"})
+def book_with(tmp_path, outputs, env):
+    """A build of a book with one notebook, whose execution gives some outputs."""
+    cells = [SimpleNamespace(get=lambda name: outputs)]
+    executed: Future = Future()
+    executed.set_result({Path("a.ipynb"): SimpleNamespace(cells=cells)})
+    config = SimpleNamespace(gpbnb_outputs="")
+    return SimpleNamespace(config=config, env=env, outdir=tmp_path / "html", gpbnb_executed=executed)
+
+
+def test_a_changed_output_makes_all_pages_be_read_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(notebooks.execute_notebooks, "write", lambda path, notebook: None)
+    env = SimpleNamespace(found_docs={"book/b", "book/a"}, doc2path=lambda name: f"{name}.md")
 
     def outdated(outputs):
-        return notebooks.outdated(SimpleNamespace(config=SimpleNamespace(gpbnb_outputs=outputs)), env, *3 * (set(),))
+        app = book_with(tmp_path, outputs, env)
+        found = notebooks.outdated(app, env, *3 * (set(),))
+        notebooks.use_copy(app, "book/a", [""])
+        return found
 
     assert outdated("first") == []  # Sphinx reads all of a new book anyway
     assert outdated("first") == []
     assert outdated("second") == ["book/a", "book/b"]
     assert outdated("second") == []
+
+
+def test_only_pages_of_the_package_are_read_before_the_outputs_are_known(tmp_path):
+    env = SimpleNamespace(doc2path=lambda name: f"{name}.md")
+    app = book_with(tmp_path, "first", env)
+    app.gpbnb_executed = Future()
+    app.gpbnb_executed.set_exception(ExceptionGroup("notebooks failed", [RuntimeError("a.ipynb failed")]))
+    notebooks.use_copy(app, "book/api/gpbnb", [""])
+    with pytest.raises(notebooks.ExtensionError, match=r"a\.ipynb failed"):
+        notebooks.use_copy(app, "book/a", [""])
 
 
 def test_pages_whose_source_is_gone_are_removed(tmp_path):

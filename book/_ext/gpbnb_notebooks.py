@@ -8,6 +8,7 @@ import gc
 import hashlib
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -25,11 +26,20 @@ MOST_JOBS = 8
 
 
 def execute(app: Sphinx) -> None:
-    """Execute the notebooks whose outputs are not known, and lay executed copies of all beside the pages."""
+    """Begin to execute the notebooks whose outputs are not known."""
     found = app.project.discover(app.config.exclude_patterns, app.config.include_patterns)
     paths = [path for each in sorted(found) if (path := Path(app.env.doc2path(each))).suffix == ".ipynb"]
+    pool = ThreadPoolExecutor(1)
+    app.gpbnb_executed = pool.submit(execute_notebooks.executed, paths, say=LOGGER.info)
+    pool.shutdown(wait=False)
+
+
+def lay_copies(app: Sphinx) -> None:
+    """Wait for the outputs of all notebooks, and lay executed copies beside the pages."""
+    if app.config.gpbnb_outputs:
+        return
     try:
-        notebooks = execute_notebooks.executed(paths, say=LOGGER.info)
+        notebooks = app.gpbnb_executed.result()
     except ExceptionGroup as group:
         raise ExtensionError("\n\n".join(map(str, group.exceptions))) from group
     folder = copies(app)
@@ -39,7 +49,7 @@ def execute(app: Sphinx) -> None:
         execute_notebooks.write(folder / path.name, notebook)
         for cell in notebook.cells:
             digest.update(repr(cell.get("outputs")).encode())
-    app.config.gpbnb_outputs = digest.hexdigest()
+    app.config.gpbnb_outputs = app.env.gpbnb_outputs = digest.hexdigest()
 
 
 def copies(app: Sphinx) -> Path:
@@ -47,7 +57,12 @@ def copies(app: Sphinx) -> Path:
 
 
 def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
-    """Read the executed copy of a notebook in place of the notebook."""
+    """Read the executed copy of a notebook in place of the notebook.
+
+    In a new book the pages of the package come first. They show no outputs, and are read while notebooks run.
+    """
+    if not docname.startswith("book/api"):
+        lay_copies(app)
     path = Path(app.env.doc2path(docname))
     if path.suffix == ".ipynb":
         copy = copies(app) / path.name
@@ -84,9 +99,11 @@ def write_in_parallel(app: Sphinx, env: BuildEnvironment) -> list[str]:
 
 def outdated(app: Sphinx, env: BuildEnvironment, added: set[str], changed: set[str], removed: set[str]) -> list[str]:
     """Read all pages again if an output has changed, as any page may show a number of any notebook, or one is gone."""
-    before, now = getattr(env, "gpbnb_outputs", None), app.config.gpbnb_outputs
-    env.gpbnb_outputs = now
-    return [] if before in (None, now) and not removed else sorted(env.found_docs)
+    before = getattr(env, "gpbnb_outputs", None)
+    if before is None and not removed:
+        return []
+    lay_copies(app)
+    return [] if before == app.config.gpbnb_outputs and not removed else sorted(env.found_docs)
 
 
 def remove_old_pages(app: Sphinx, error: Exception | None) -> None:
