@@ -1,8 +1,9 @@
 """Seed faults in the package and list those that no test catches: ``make mutants``.
 
 Faults are the changes of :mod:`tests.mutants.operators`, made with cosmic-ray in a copy of the checkout. The tests of a
-mutant are those that reach its module through imports, nearest first, up to a number of seconds. Each result is written
-at once, so that a campaign that was stopped goes on where it was.
+mutant are those that execute its line, as far as ``--measure`` has found them, then those that reach its module through
+imports, nearest first, up to a number of seconds. Each result is written at once, so that a campaign that was stopped
+goes on where it was.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.mutants.concern import Concern, module_of
+from tests.mutants.covered import Covered
 from tests.mutants.operators import Mutant, mutants, mutated
 from tests.mutants.runs import Collected, Fresh, How, Outcome, load_libraries, with_collected
 
@@ -35,6 +37,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 CACHE = ROOT / ".cache" / "mutants"
 COMPILED = CACHE / "gpbnb" / "compiled"
+COVERED = CACHE / "covered.json"
 RESULTS = HERE / "results.csv"
 FIELDS = (
     *("module", "operator", "occurrence", "line", "before", "after"),
@@ -45,6 +48,8 @@ OUTCOMES = ("caught", "timeout", "caught by a stored picture", "equivalent", "su
 NOT_CAUGHT = OUTCOMES[2:3] + OUTCOMES[4:]
 MOST_FILES = 12
 """Test files that judge a mutant, the nearest."""
+MOST_TESTS = 600
+"""Tests that execute its line, the nearest."""
 
 
 def git(*arguments: str) -> str:
@@ -124,11 +129,14 @@ class Judges:
     def __init__(self, tree: Path, budget: float, collected: Collected, fresh: Fresh) -> None:
         self.tree, self.budget, self.collected, self.fresh = tree, budget, collected, fresh
         self.concern = Concern(tree)
+        self.covered = Covered(COVERED) if COVERED.is_file() else None
         self.file = CACHE / "tests.json"
         #: What is known of tests: durations, which are too slow or fail without a fault, and which are not.
         self.known: dict[str, Any] = {"seconds": {}, "unfit": {}, "sound": {}}
         if self.file.is_file():
             self.known |= json.loads(self.file.read_text(encoding="utf-8"))
+        if self.covered is not None:
+            self.known["seconds"] = self.covered.seconds | self.known["seconds"]
         self._compiled = [
             name for name, path in self.concern.modules.items() if _COMPILES.search(path.read_text(encoding="utf-8"))
         ]
@@ -145,6 +153,18 @@ class Judges:
         command = [sys.executable, "-B", "-c", code, *files]
         done = subprocess.run(command, cwd=self.tree, env=environment, check=True, capture_output=True, text=True)
         return dict(json.loads(done.stdout))
+
+    def tests(self, name: str, line: int) -> tuple[list[str], list[str]]:
+        """Tests that execute a line, and test files that reach its module; the nearest and quickest first."""
+        path = self.tree / name
+        files = [str(test.relative_to(self.tree)) for test in self.concern.judges(module_of(path, self.tree))]
+        rank = {file: number for number, file in enumerate(files)}
+        found = self.covered.tests(name, path.read_text(encoding="utf-8"), line) if self.covered else set()
+
+        def order(test: str) -> tuple[int, float]:
+            return rank.get(test.partition("::")[0], len(files)), self.known["seconds"].get(test, math.inf)
+
+        return sorted(found, key=order)[:MOST_TESTS], files[:MOST_FILES]
 
     def ways(self, name: str, line: int) -> tuple[str, How]:
         """How to run the tests on a fault in a line of a file, and a name for it.
@@ -165,7 +185,7 @@ class Judges:
         unfit = frozenset(self.known["unfit"].setdefault(way, []))
         files = [each for each in files if each not in unfit]
         if how.pictures:
-            files = [each for each in files if "pictured" in (self.tree / each).read_text(encoding="utf-8")]
+            files = [each for each in files if "pictured" in (self.tree / each.partition("::")[0]).read_text("utf-8")]
         how = how._replace(left_out=unfit)
         found = self.fresh.run(self.tree, files, how) if codes is None else self.collected.run(files, codes, how)
         if not how.pictures:
@@ -205,9 +225,8 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
         return {"outcome": "no change"}
     before, after = changed_line(source, other)
     row = {"before": before, "after": after}
-    files = [str(test.relative_to(judges.tree)) for test in judges.concern.judges(module_of(path, judges.tree))]
-    files = files[:MOST_FILES]
-    if not files:
+    tests, files = judges.tests(name, mutant.line)
+    if not tests and not files:
         return row | {"outcome": "no test"}
     way, how = judges.ways(name, mutant.line)
     begun = time.monotonic()
@@ -215,6 +234,9 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     codes: Codes = None
     if way == "valid":
         codes = judges.collected.changed(path, source, other)
+    if codes is not None:
+        files = [*tests, *files]
+        how = how._replace(budget=how.budget * (4 if tests else 1))
 
     def with_the_fault(how: How) -> Outcome:
         while True:
@@ -299,6 +321,9 @@ def main() -> None:
     parser.add_argument("--lines", type=int, default=75, help="one mutant for each so many lines, at least two a file")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--budget", type=float, default=12.0, help="seconds of processor time for each mutant")
+    parser.add_argument(
+        "--measure", action="store_true", help="find the tests that execute each line first; 20 minutes"
+    )
     parser.add_argument("--again", action="store_true", help="judge the survivors of the stored results again")
     parser.add_argument("--minutes", type=float, default=math.inf, help="stop after so many minutes; it resumes")
     parser.add_argument("--results", type=Path, default=RESULTS, help="table to continue; without it %(default)s")
@@ -330,6 +355,10 @@ def main() -> None:
     os.environ["GPBNB_QUIET"] = "1"
     tree = CACHE / f"tree-{os.getpid()}"
     copy_tree(tree)
+    concern = Concern(tree)
+    if chosen.measure:
+        tests = [str(test.relative_to(tree)) for test in concern.tests]
+        subprocess.run([sys.executable, "-m", "tests.mutants.covered", tree, COVERED, *tests], cwd=ROOT, check=True)
     load_libraries()
     fresh = Fresh()
 
@@ -355,8 +384,9 @@ def main() -> None:
             print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
 
     # Those that any of the faults needs; the others need not be imported.
-    concern = Concern(tree)
     needed = {test for name in names for test in concern.judges(module_of(tree / name, tree))[:MOST_FILES]}
+    if COVERED.is_file():
+        needed = set(concern.tests)
     with_collected(tree, [str(test.relative_to(tree)) for test in sorted(needed)], campaign)
     shutil.rmtree(tree)
     summary([row for row in read(chosen.results) if row["module"] in names])

@@ -261,10 +261,12 @@ class Collected:
             # Findings of the checks are kept by the sources in files, which do not have the fault.
             importlib.import_module("gpbnb.ledger.cache")._folder = lambda: None
             importlib.import_module("gpbnb.ledger.cache")._file.cache_clear()
-            chosen = [item for test in tests for item in self.items.get(test.partition("::")[0], ())]
-            chosen = [item for item in chosen if any(item.nodeid.startswith(test) for test in tests)]
+            chosen: dict[str, pytest.Item] = {}
+            for test in tests:
+                items = self.items.get(test.partition("::")[0], ())
+                chosen |= {item.nodeid: item for item in items if "::" not in test or item.nodeid == test}
             for recorder.slow in (False, True):
-                items = [item for item in chosen if recorder.wants(item)]
+                items = [item for item in chosen.values() if recorder.wants(item)]
                 for item, following in zip_longest(items, items[1:]):
                     if time.process_time() > how.budget or (how.stop and recorder.failed):
                         return
