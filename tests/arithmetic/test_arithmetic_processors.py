@@ -403,6 +403,11 @@ class TestFixed:
             assert fmt.largest >= largest
             assert FixedFormat(fmt.integer_bits - 1, fmt.fraction_bits + 1).largest < largest
 
+    def test_scaling_needs_a_sign_and_a_bit(self) -> None:
+        assert scaling([0.3], 2) == FixedFormat(0, 1)
+        with pytest.raises(ValueError, match="bits: got 1; needed at least 2"):
+            scaling([0.3], 1)
+
     def test_linear_algebra(self) -> None:
         q = FixedFormat(3, 12)
         a = q.array([["2", "0.5"], ["0.25", "1.5"]])
@@ -422,6 +427,14 @@ def test_misuse_is_explained() -> None:
             FloatFormat(2, 4, **arguments)
     with pytest.raises(ValueError, match="needed one of 'raise', 'saturate', 'wrap'"):
         FixedFormat(1, 2, overflow="clip")
+
+
+def test_the_largest_number_has_the_largest_exponent() -> None:
+    for largest in (8, 9, 15):
+        assert FloatFormat(2, 4, emin=-3, emax=3, largest=largest).largest == largest
+    for largest in (7, Fraction(17, 2), 16):
+        with pytest.raises(ValueError, match="needed a number of the format with the exponent emax"):
+            FloatFormat(2, 4, emin=-3, emax=3, largest=largest)
 
 
 def test_compiled_where_it_can_be() -> None:

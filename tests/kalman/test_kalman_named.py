@@ -1,0 +1,29 @@
+"""gpbnb.kalman.named: forms of the filter and roundings by name."""
+
+from __future__ import annotations
+
+import pytest
+
+from gpbnb.kalman.array_forms import ArrayForm
+from gpbnb.kalman.forms import Form
+from gpbnb.kalman.named import form_named
+
+NAMES = {
+    "innovation": Form.INNOVATION,
+    "Joseph": Form.JOSEPH,
+    "ud": Form.UD,
+    "symmetrized": ArrayForm.SYMMETRIZED,
+    "symmetrised": ArrayForm.SYMMETRIZED,
+    "compensated": ArrayForm.COMPENSATED,
+    "Potter": ArrayForm.POTTER,
+    "Carlson": ArrayForm.CARLSON,
+    "Cholesky": ArrayForm.CARLSON,
+    "square root": ArrayForm.CARLSON,
+    "square-root": ArrayForm.CARLSON,
+}
+
+
+@pytest.mark.parametrize(("name", "form"), NAMES.items())
+def test_a_form_has_its_usual_names(name, form):
+    assert form_named(name) is form
+    assert form_named(f" {name.upper()} ") is form
