@@ -8,6 +8,8 @@ import operator
 import pickle
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,8 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact
 from gpbnb.arithmetic.kernels.limited_backends import LimitedFloats, LimitedPairs
 
-BINARY = [operator.add, operator.sub, operator.mul, operator.truediv]
+TRUEDIV = operator.truediv
+BINARY = [operator.add, operator.sub, operator.mul, TRUEDIV]
 DETERMINISTIC = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
 
 
@@ -91,25 +94,24 @@ def numbers(fmt: FloatFormat) -> list[Fraction]:
 @pytest.mark.parametrize("tiny", TINY, ids=str)
 def test_every_pair_of_a_small_format(tiny: FloatFormat, mode: Rounding) -> None:
     fmt = replace(tiny, rounding=mode)
-    every = numbers(fmt)
+    every, result = numbers(fmt), cache(lambda value: expected(value, fmt))
     assert len(set(every)) == len(every)
     x = fmt.array(every)
     assert x.to_fractions().tolist() == every
     overflows = 0
     for operation in BINARY:
-        for a in every:
-            others = [b for b in every if b or operation is not operator.truediv]
-            results = [expected(operation(a, b), fmt) for b in others]
-            held = [b for b, result in zip(others, results, strict=True) if result is not None]
-            overflows += len(others) - len(held)
-            found = operation(fmt.array(a), fmt.array(held))
-            assert found.to_fractions().tolist() == [result for result in results if result is not None]
-            exactly = operation(fmt.array(a).on_exact_backend(), fmt.array(held).on_exact_backend())
-            assert np.array_equal(found.to_fractions(), exactly.to_fractions())
-            for b in (b for b, result in zip(others, results, strict=True) if result is None):
-                with pytest.raises(OverflowError):
-                    operation(fmt.array(a), fmt.array(b))
-                break
+        pairs = list(product(range(len(every)), [i for i, b in enumerate(every) if b or operation is not TRUEDIV]))
+        results = [result(operation(every[i], every[j])) for i, j in pairs]
+        held = [pair for pair, value in zip(pairs, results, strict=True) if value is not None]
+        i, j = np.array(held).T
+        found = operation(x[i], x[j]).to_fractions()
+        assert found.tolist() == [value for value in results if value is not None]
+        assert np.array_equal(found, operation(x[i].on_exact_backend(), x[j].on_exact_backend()).to_fractions())
+        beyond = sorted(set(pairs) - set(held))
+        overflows += len(beyond)
+        for i, j in beyond[:: -(-len(beyond) // len(every)) or 1]:
+            with pytest.raises(OverflowError):
+                operation(x[i], x[j])
     assert (overflows > 0) is (fmt.emin is not None)
 
 
@@ -117,14 +119,12 @@ def test_every_pair_of_a_small_format(tiny: FloatFormat, mode: Rounding) -> None
 @pytest.mark.parametrize("tiny", [TINY[0], TINY[3], TINY[6]], ids=str)
 def test_fused_multiply_add_of_every_triple(tiny: FloatFormat, mode: Rounding) -> None:
     fmt = replace(tiny, rounding=mode)
-    every = numbers(fmt)[:: 1 if fmt.base == 10 else 3]
-    x = fmt.array(every)
-    for a in every:
-        for c in every:
-            results = [expected(a * b + c, fmt) for b in every]
-            kept = np.array([result is not None for result in results])
-            found = fmt.array(a).multiply_add(x[kept], fmt.array(c))
-            assert found.to_fractions().tolist() == [result for result in results if result is not None]
+    every, result = numbers(fmt)[:: 1 if fmt.base == 10 else 3], cache(lambda value: expected(value, fmt))
+    x, triples = fmt.array(every), list(product(range(len(every)), repeat=3))
+    results = [result(every[a] * every[b] + every[c]) for a, b, c in triples]
+    a, b, c = np.array([each for each, value in zip(triples, results, strict=True) if value is not None]).T
+    found = x[a].multiply_add(x[b], x[c])
+    assert found.to_fractions().tolist() == [value for value in results if value is not None]
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)

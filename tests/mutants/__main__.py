@@ -236,7 +236,7 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
         codes = judges.collected.changed(path, source, other)
     if codes is not None:
         files = [*tests, *files]
-        how = how._replace(budget=how.budget * (4 if tests else 1))
+        how = how._replace(budget=how.budget * (2 if tests else 1))
 
     def with_the_fault(how: How) -> Outcome:
         while True:
