@@ -147,8 +147,8 @@ def test_an_interrupted_cell_goes_on(tmp_path):
 
 
 def test_a_sample_is_one_record_computed_alone(monkeypatch):
-    lines = rows(SMALL, compute(SMALL, steps=3000))
-    monkeypatch.setattr(threshold, "compute", lambda cell: compute(cell, steps=3000))
+    lines = rows(SMALL, compute(SMALL, steps=300))
+    monkeypatch.setattr(threshold, "compute", lambda cell: compute(cell, steps=300))
     found = {sample(SMALL, np.random.default_rng(seed))[0] for seed in range(20)}
     assert found == set(lines)
 
