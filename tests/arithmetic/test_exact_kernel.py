@@ -27,7 +27,7 @@ def signed(base: int, precision: int) -> list[int]:
 
 
 def telling(base: int, precision: int) -> list[int]:
-    """All numbers if they are few; of more those that reach carries, ties and the ends of the range, and some others."""
+    """All numbers if they are few; else those that reach carries, ties and the ends of the range, and some others."""
     every = significands(base, precision)
     if len(every) <= 30:
         return signed(base, precision)

@@ -20,8 +20,9 @@ pytestmark = pytest.mark.parametrize("nearest", [True, False], ids=["nearest", "
 class TestThreeDecimalDigits:
     """Base 10, three digits: each of 900 significands with 30 that reach carries, ties and the ends of the range.
 
-    They give nearly every sum and every case of a quotient. Both operands negative, zeros, and each pair in both orders are in test_exact_kernel.py: the code has no branch
-    that depends on the base or the precision together with these. Here the order alternates with the gap.
+    They give nearly every sum and every case of a quotient. Both operands negative, zeros, and each pair in both orders
+    are in test_exact_kernel.py: the code has no branch that depends on the base or the precision together with these.
+    Here the order alternates with the gap.
     """
 
     M = np.arange(100, 1000)
