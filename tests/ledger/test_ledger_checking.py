@@ -116,6 +116,7 @@ def test_reading_order_sorts_sections_by_number_and_keeps_the_rest():
         made(None, 6, "3", chapter="I"),
         made(None, 7, "reference", document="savage2016", chapter="-"),
         made(None, 8, "abstract", document="savage2016", chapter="-"),
+        made(None, 9, "2.appendix", document="hung1982", chapter="III"),
     ]
     order = [row.statement.item for row in in_reading_order(iter(some))]
-    assert order == [f"eq ({n})" for n in (2, 5, 4, 1, 6, 3, 7, 8)]
+    assert order == [f"eq ({n})" for n in (2, 5, 4, 1, 6, 9, 3, 7, 8)]

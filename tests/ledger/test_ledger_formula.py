@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import pytest
@@ -156,6 +157,27 @@ def test_what_does_not_exist_or_fit_has_no_value(form):
         names["c"] = None
     with pytest.raises(Undefined):
         Relation(form).value(names, exact)
+
+
+@pytest.mark.parametrize(
+    ("form", "value"),
+    [
+        ("abs(-x)", 2),
+        ("sqrt(x)", 2**0.5),
+        ("exp(x)", math.exp(2)),
+        ("log(x)", math.log(2)),
+        ("sin(x)", math.sin(2)),
+        ("cos(x)", math.cos(2)),
+        ("tan(x)", math.tan(2)),
+        ("max(x, 3)", 3),
+        ("min(x, 3)", 2),
+        ("diff(y**3, y)", 3 * sp.Symbol("y") ** 2),
+        ("group(x)", 2),
+    ],
+)
+def test_functions_have_their_usual_meaning(form, value):
+    found = Relation(form).value({"x": sp.Integer(2)})
+    assert found == value or math.isclose(found, value)
 
 
 def test_dots_have_no_value():

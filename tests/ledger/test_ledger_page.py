@@ -141,6 +141,13 @@ def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
     assert "<td>3</td>" in html
 
 
+def test_a_root_error_has_its_id_and_its_title():
+    assert {key: root.id for key, root in ledger.load_roots().items()} == {key: key for key in ledger.load_roots()}
+    root = ledger.load_roots()["residue-hard-to-obtain"]
+    assert root.title.startswith("The residue of an inverse is assumed")
+    assert root.explanation.startswith("The report doubts")
+
+
 def test_every_verdict_that_a_claim_can_have_has_an_outcome():
     outcomes = {}
     for verdict in (Verdict.VERIFIED, Verdict.UNVERIFIABLE, *DISAGREEMENTS):

@@ -150,6 +150,14 @@ def test_a_frame_that_moves_is_a_slip_only_while_the_drift_is_right(patch):
     assert run("IV.intermediate-frame").verdict is Verdict.WRONG
 
 
+def test_a_first_order_that_depends_on_the_order_of_the_turns_is_refused(patch):
+    exact = derivation.exact
+    last = derivation.SEQUENCES[-1]
+    patch.setattr(derivation, "exact", lambda angles, order: exact(angles, order) ** (2 if order == last else 1))
+    with pytest.raises(ArithmeticError, match="needed the same first order for all"):
+        equations.rotation_to_first_order("alpha")
+
+
 def test_errors_of_the_printed_deroll_are_up_to_twice_the_angle():
     as_printed, corrected = precessions.deroll_errors()
     assert as_printed == pytest.approx(2 * 17 * ARCSEC, rel=0.01)

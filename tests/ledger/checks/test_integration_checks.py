@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import replace as replaced
 
@@ -68,6 +69,10 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "0.01 and -0.51" in finding(rows, "sabstract.abstract-claim").recomputed
     assert "0.0102 °/√s" in finding(rows, "sanalysis.numerical-example").recomputed
     assert "9.6 times" in finding(rows, "sanalysis.complete-set").recomputed
+    # 2∫exp(-2τ)dτ from 5 to 6, and from 0 to 1
+    printed, right = math.exp(-10) - math.exp(-12), 1 - math.exp(-2)
+    assert f"to {printed:.2g} of" in finding(rows, "eq6-q-n").recomputed
+    assert f"where it is {right:.2g}" in finding(rows, "eq6-q-n").recomputed
 
 
 CORRECTED = {

@@ -197,6 +197,24 @@ def test_sizes_in_place_of_signs_are_verified():
             assert (abs(error) <= beta * run.sizes(right)).all()
 
 
+def test_the_right_side_is_judged_in_every_row():
+    printed = statement("hung1984.II.eq88")
+    for row in ("1", "n"):
+        other = printed.form.replace("*epsilon", f"*epsilon*cases((2, k == {row}), (1, k != {row}))")
+        assert CHECKS.run(replace(printed, form=other)).verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize(
+    ("symbol", "expected"),
+    [("==", "010"), ("≈", "010"), ("<=", "110"), (">=", "011"), ("<", "100"), (">", "001")],
+)
+def test_each_sign_compares(symbol, expected):
+    """The left side is less than, equal to, or greater than the right side."""
+    printed = Statement("hung1984.II.x", "hung1984", "II", "1", "x", "equation", "x", f"x {symbol} 2")
+    found = [holds(printed, [{"x": Fraction(x)}], sharp=False) for x in (1, 2, 3)]
+    assert found == [each == "1" for each in expected]
+
+
 # -- the true values ------------------------------------------------------------------------------
 
 

@@ -106,6 +106,10 @@ def test_findings_quote_the_computed_numbers(rows):
         ("s12.example-17-digits", "16; for the printed β 17"),
         ("s12.example-criterion", "13 digits for the first term and 20"),
         ("s13.remark-2", "10 decimal digits or 32 bits"),
+        # |-60ε|, where the last state is zero, and 0 - 4ε - 20ε - 36ε
+        ("eq121", r"the left side is $60\epsilon$ and the right side is $-60\epsilon$"),
+        # 7n+3m+6 less 6n+3m+5, and an addition
+        ("s12.unnumbered-x-3", "$n + 1$ for the closed loop and $1$ for the input"),
     ):
         assert number in finding(rows, f"hung1984.II.{place}").recomputed
     assert r"\cdot84$" in finding(rows, "hung1984.II.s12.example-second-coefficient").note

@@ -130,6 +130,9 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "1.13 times" in finding(rows, "hung1984.II.eq20").note
     assert "1.25 times" in finding(rows, "hung1982.III.eq20").note
     assert r"\|Ax\|=2" in finding(rows, "hung1984.II.eq22").note.replace("$", "")
+    signs = Counter(names["x"] > 0 for names in representation.all_numbers())
+    nearest = finding(rows, "hung1984.II.s2.claim-conventional").recomputed
+    assert f"{signs[True]} positive and {signs[False]} negative" in nearest
     assert "$u=0.7655$, $v=-0.433$" in finding(rows, "hung1984.II.s2.claim-u-v-same-sign").note
 
 
@@ -148,6 +151,8 @@ def test_a_bound_is_right_if_it_holds_and_is_attained():
     assert str(loose) == "holds in all 1 instances, but the bound is never attained"
     assert str(judged("x <= y", {"x": Fraction(2), "y": Fraction(1)})) == "holds in 0 of 1 instances"
     assert not judged("x <= y", {"x": Fraction(0), "y": Fraction(0)}).right
+    one, other = instances.Matrix([[1, 0]]), instances.Matrix([[1, 3]])
+    assert judged("x <= y", {"x": one, "y": other}).right  # in one entry
     assert judged("x >= 0", {"x": Fraction(0)}).right
 
 
