@@ -149,6 +149,17 @@ def test_a_process_whose_sources_were_changed_behind_its_back_keeps_nothing(fold
     assert not list(folder.glob("*.json"))
 
 
+def test_a_file_is_written_for_new_findings_only(tmp_path):
+    (row,) = ledger.examine(TWO[:1])
+    findings = cache.Findings(tmp_path / "findings.json")
+    findings.save()
+    assert not list(tmp_path.iterdir())
+    for each in (cache.Findings(None), findings):
+        each.put(row.statement, row.finding)
+        each.save()
+    assert [path.name for path in tmp_path.iterdir()] == ["findings.json"]
+
+
 def test_an_error_is_not_kept(folder, ran, topic):
     name = topic("broken", "@CHECKS.add('hung1984.II.eq8')\ndef fails():\n    raise RuntimeError('once')\n")
     checks = {"broken": __import__(name).CHECKS}

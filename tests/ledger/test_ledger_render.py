@@ -56,7 +56,8 @@ def test_json_says_the_same():
         "verdict": "misprint",
         "note": FINDINGS["misprint"].note,
     }
-    assert json.loads(to_json(())) == []
+    assert to_json(()) == "[]\n"
+    assert to_json(ROWS).endswith("\n]\n")
 
 
 def test_text_is_a_line_an_entry():

@@ -73,6 +73,9 @@ def test_findings_have_their_notes_and_numbers(rows):
     assert "25.3%" in found["hung1982.II.rss-total"].recomputed
     assert "0.755" in found["hung1982.II.rss-reduction"].recomputed
     assert "beta1, gamma1" in found["hung1982.II.classification-by-form"].recomputed
+    # April 1980, 18 February 1981, 24 June 1981
+    previous = found["hung1982.I.previous-contract"].recomputed
+    assert "10 months after the award and 4 months before the period" in previous
     assert "14 months and 8 days" in found["hung1982.I.report-period"].recomputed
     assert found["hung1984.I.two-tasks"].recomputed.count("corrected") == 1
 

@@ -59,6 +59,8 @@ def test_findings_have_their_notes_and_numbers(rows):
     faults.check_texts(rows)
     found = {row.statement.id.removeprefix("hung1982."): row.finding for row in rows}
     assert "0, 45, 90 degrees" in found["IV.deltas-zero"].recomputed
+    # 60√2
+    assert r"85 arcseconds apart with $\gamma_2=\gamma_3=60''$" in found["IV.axes-colinear"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
     assert "takes at least 2 changes of sign, before C, C" in found["IV.eq8"].recomputed
     assert r"\theta_3\cos2" in found["IV.eq9"].recomputed

@@ -114,6 +114,9 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "4 times the bound in the last box" in finding(rows, "hung1984.II.eq96").note
     assert "omit 6% of the size of $\\delta A$ and 22%" in finding(rows, "hung1984.II.eq91").recomputed
     assert "in 13 of 24 eliminations" in finding(rows, "hung1984.II.eq59").recomputed
+    # 12 + 5 to reduce and 18 to solve; 2(10 + 4) for (59) and (60), 3 for (89), 9, 27 and 1 for (90), (95) and (96)
+    computation = finding(rows, "hung1984.II.s11-3.computation").recomputed
+    assert "for $n=3$ the bound takes 68 multiplications and the inverse 35" in computation
     assert "48 of 48" in finding(rows, "hung1984.II.eq59").recomputed
 
 

@@ -270,6 +270,13 @@ def test_a_check_that_agrees_can_disagree(patch, key, change):
     assert judged(key).agrees is False
 
 
+def test_the_ratio_of_bound_to_error_is_a_median(patch):
+    """Of the bounds of two states and four covariances, most are zero."""
+    patch.setattr(contraction, "state_error_bound", always(np.full(2, 1e9)))
+    patch.setattr(contraction, "covariance_error_bound", always(np.zeros((2, 2))))
+    assert remarks.refined()[2] == 0
+
+
 @pytest.mark.parametrize("letter", ["x", "P", "K", "F", "u", "prior"])
 def test_exact_equations_depend_on_every_letter_of_the_run(patch, letter):
     """Where a letter of the reference run is off, the equations that contain it do not hold."""

@@ -125,6 +125,8 @@ def test_findings_quote_the_computed_numbers(rows):
     assert ".56568" in finding(rows, "hung1984.II.s3.example-8-eps").recomputed
     assert ".74073" in finding(rows, "hung1984.II.s4.example-13-eps-c").recomputed
     assert "1000 times" in finding(rows, "hung1984.II.eq31").recomputed
+    for place in ("vector-norm-properties-i-iv", "matrix-norm-properties-i-v"):
+        assert "the norm is zero only for zero" in finding(rows, f"hung1984.II.s7.{place}").recomputed
     assert "factor of 400" in finding(rows, "hung1984.II.s9-2.example-1").recomputed
     assert "2.5%" in finding(rows, "hung1984.II.eq18").note
     assert "1.13 times" in finding(rows, "hung1984.II.eq20").note
@@ -176,6 +178,10 @@ def test_matrices_are_multiplied_and_compared_entry_by_entry():
     a, b = instances.Matrix([[1, 2], [3, 4]]), instances.Matrix([[0, 1], [1, 0]])
     assert instances.link_holds(Link(a * b, "==", instances.Matrix([[2, 1], [4, 3]])))
     assert not instances.link_holds(Link(a, "<=", b))
+    for symbol in ("<=", "<", ">=", ">", "=="):
+        assert not instances.link_holds(Link(instances.Matrix([[0, 2]]), symbol, instances.Matrix([[1, 1]])))
+    assert not instances.link_holds(Link(instances.Matrix([[1, 2]]), ">", instances.Matrix([[1, 1]])))
+    assert not instances.link_holds(Link(instances.Matrix([[0, 1]]), "<", instances.Matrix([[1, 1]])))
     assert instances.link_holds(Link(2 * a - a, "==", a + 0 * b))
     assert not instances.link_holds(Link(a, "==", instances.Matrix([[1, 2]])))
 
