@@ -432,9 +432,9 @@ def test_misuse_is_explained() -> None:
 def test_the_largest_number_has_the_largest_exponent() -> None:
     for largest in (8, 9, 15):
         assert FloatFormat(2, 4, emin=-3, emax=3, largest=largest).largest == largest
-    for largest in (7, Fraction(17, 2), 16):
+    for emax, largest in ((3, 7), (3, Fraction(17, 2)), (3, 16), (5, 28), (5, 34), (5, 64)):
         with pytest.raises(ValueError, match="needed a number of the format with the exponent emax"):
-            FloatFormat(2, 4, emin=-3, emax=3, largest=largest)
+            FloatFormat(2, 4, emin=-3, emax=emax, largest=largest)
 
 
 def test_compiled_where_it_can_be() -> None:
