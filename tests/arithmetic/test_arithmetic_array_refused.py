@@ -99,6 +99,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("no number, ==", lambda: V == "a", ValueError, "got 'a'; needed a number such as"),
     ("bool operand", lambda: V * True, TypeError, "got the truth value True; needed"),
     ("broadcast", lambda: V + V[:2], ValueError, "add: got operands of shapes (3,) and (2,); needed shapes that broad"),
+    ("broadcast fused", lambda: V.multiply_add(V, V[:2]), ValueError, "multiply_add: got operands of shapes (3,) and"),
     ("broadcast ==", lambda: V[:2] == V, ValueError, "compare: got operands of shapes (2,) and (3,); needed shapes"),
     ("broadcast where", lambda: np.where([True, False], V, 0), ValueError, "where: got operands of shapes (2,) and (3"),
     ("interface", lambda: rows(3) @ rows(2), ValueError,
