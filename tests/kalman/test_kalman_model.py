@@ -78,6 +78,15 @@ def test_semidefiniteness_is_decided_exactly():
         LinearModel(**(GOOD | {"Q": [[1, 2], [2, below]]}))
 
 
+def test_only_roundings_are_advised_away():
+    """A negative variance that no rounding explains is an error of the model, and so is a zero in R."""
+    for letter, value, advised in (("Q", [[1, 0], [0, -1]], False), ("Q", [[1, 0], [0, "-1e-9"]], True),
+                                   ("R", [[1, 0], [0, "-1e-9"]], False)):  # fmt: skip
+        with pytest.raises(ValueError, match="needed a positive") as error:
+            LinearModel(**(GOOD | {"H": [[1, 0], [0, 1]], "R": [[1, 0], [0, 1]], letter: value}))
+        assert ("add a little to its diagonal" in str(error.value)) is advised
+
+
 def test_factors_of_covariances_multiply_to_them():
     rng = np.random.default_rng(5)
     A = np.array([[Fraction(int(k)) for k in row] for row in rng.integers(-5, 6, (4, 2))], dtype=object)

@@ -20,6 +20,7 @@ from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
+from gpbnb.kalman.requirement import listed
 from gpbnb.kalman.simulation import Simulation, fine_resolution
 from gpbnb.kalman.system import LinearSystem
 
@@ -347,6 +348,10 @@ def test_an_answer_lies_above_every_precision_that_misses():
     assert found.irregular  # bisection alone would have stopped at one of these
     assert found.precision == max(missed) + 1
     assert set(range(found.irregular[0], 54)) <= {digits for digits, _ in found.tried}
+
+
+def test_three_or_more_numbers_in_a_row_are_a_range():
+    assert listed([2, 5, 6, 7, 8, 11, 12]) == "2, 5–8, 11, 12"
 
 
 def test_the_precisions_of_processors_are_always_tried():

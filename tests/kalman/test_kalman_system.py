@@ -84,6 +84,15 @@ def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
     assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9)
 
 
+def test_only_errors_beyond_float64_are_said_not_to_be_finite():
+    missed = required_precision(SMALL, 80, 1e-40, z=U)
+    assert missed.fmt is None
+    assert missed.why == ""
+    beyond = required_precision(SMALL, 80, 1e-320, z=U * 2.0**30)
+    assert beyond.fmt is None
+    assert beyond.why.endswith("an output is not finite")
+
+
 def test_a_peak_gain_of_a_filter_in_companion_form_is_found():
     """Its entries are near 6: balls grow beyond all bounds at 256 bits, and their ends once compared as if narrow."""
     gain = peak_gain(BUTTERWORTH.A, BUTTERWORTH.B, BUTTERWORTH.C, BUTTERWORTH.D)
