@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from gpbnb.kalman import threshold
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.records import update_largest
-from gpbnb.kalman.lockstep import REFERENCE
+from gpbnb.kalman.lockstep import REFERENCE, error_rows
 from gpbnb.kalman.records import Records
 from gpbnb.kalman.threshold import CELLS, FORMS, STATES, Cell, SimpleYear, compute, lockstep, rows, sample
 from gpbnb.kalman.year_cases import MODELS, model
@@ -151,6 +152,18 @@ def test_a_sample_is_one_record_computed_alone(monkeypatch):
     monkeypatch.setattr(threshold, "compute", lambda cell: compute(cell, steps=300))
     found = {sample(SMALL, np.random.default_rng(seed))[0] for seed in range(20)}
     assert found == set(lines)
+
+
+def test_rows_have_the_larger_error_of_both_drifts_and_of_both_rates():
+    """Of two formats and two records; `end` has signs, and a filter that stopped has no numbers."""
+    largest = [[[1, 20], [10, 2], [3, 40], [30, 4]], [[math.nan, 1], [5, 1], [6, 1], [7, 1]]]
+    end = [[[-0.5, 0.25], [0.125, -8], [0.75, -6], [-7, 0.5]], [[math.nan, 0], [2, 0], [3, 0], [4, 0]]]
+    assert error_rows([("a", "24"), ("b", "53")], 7, {"largest": largest, "end": end}) == [
+        ("a", "24", "7", "10", "30", "0.5", "7"),
+        ("a", "24", "8", "20", "40", "8", "6"),
+        ("b", "53", "7", "inf", "7", "inf", "4"),
+        ("b", "53", "8", "1", "1", "0", "0"),
+    ]
 
 
 def test_the_cells_are_distinct_and_cover_the_threshold():
