@@ -8,11 +8,13 @@ import os
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import gpbnb
 from gpbnb.kalman import year
-from gpbnb.kalman.stored import YEAR
+from gpbnb.kalman.stored import YEAR, first_steps
+from gpbnb.rolling import stored as rolling
 from gpbnb.sweeps import DamagedFileError
 from gpbnb.sweeps.__main__ import SWEEPS
 
@@ -67,6 +69,18 @@ def test_a_year_cut_at_the_end_of_a_row_does_not_load(tmp_path):
     (tmp_path / "year.json").write_bytes((PACKAGE / "kalman" / "year.json").read_bytes())
     with pytest.raises(DamagedFileError, match="the file ends after"):
         year.load(tmp_path)
+
+
+def test_the_first_steps_include_the_last_of_them():
+    """Of the checkpoints, three a decade."""
+    case = next(case for case in YEAR.cells() if case.fmt is not None)
+    assert [row[5] for row in first_steps(case, steps=10)] == ["1", "2", "5", "10"]
+
+
+def test_a_sample_of_the_drift_rates_has_one_to_three_gyros(monkeypatch):
+    monkeypatch.setattr(rolling, "compute", lambda gyros: gyros)
+    rng = np.random.default_rng(1)
+    assert {rolling.sample(20, rng) for _ in range(30)} == {1, 2, 3}
 
 
 def test_a_year_is_verified_by_its_first_steps():

@@ -94,6 +94,14 @@ def test_finished_cells_are_not_computed_again(sweep, tmp_path):
     assert newer.finished(tmp_path / "some") == []
 
 
+def test_progress_begins_with_the_finished_cells(sweep, tmp_path, capsys):
+    sweep.run(tmp_path, cells=CELLS[:3], progress=False)
+    sweep.run(tmp_path)
+    shown = capsys.readouterr().err
+    assert "3/10 [" in shown.split("\r")[1]
+    assert "10/10 [" in shown
+
+
 def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(sweep, tmp_path, capsys):
     def command(one, *arguments):
         return run_command(one, "A test.", tmp_path / "saved", arguments)
