@@ -22,7 +22,7 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision, survey
 from gpbnb.kalman.report_bounds import coefficients
 from gpbnb.kalman.requirement import Requirement
-from gpbnb.wordlength import examples, figures, study, tables
+from gpbnb.wordlength import examples, figures, guarantees, study, tables
 
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)
@@ -265,6 +265,13 @@ def test_a_known_input_is_a_column_for_a_state_of_one():
         x, P = x + K * (z[k, 0] - x[0]), P - np.outer(K, P[0])
         assert found[k, :2] == pytest.approx(x, rel=1e-9, abs=1e-12)
     assert found[:, 2] == pytest.approx(1, abs=1e-12)
+
+
+def test_a_row_of_the_table_of_guarantees_is_as_stored():
+    """Of the filter that is cheapest to repeat; only the processor time may differ."""
+    case = next(case for case in guarantees.CASES if case.make().name == "Dyer and McReynolds")
+    (expected,) = [row for row in guarantees.load() if row.name == "Dyer and McReynolds"]
+    assert guarantees.compute(case)._replace(seconds=expected.seconds) == expected
 
 
 def test_inverse_knows_its_condition():

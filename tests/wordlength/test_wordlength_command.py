@@ -19,6 +19,7 @@ from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.system import LinearSystem
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements, read_model
+from gpbnb.wordlength.report import Answer, Report
 
 MODEL = """
 name = "tracker <1>"
@@ -233,6 +234,13 @@ def test_the_commands_are_listed(capsys):
     assert all(f"  {name} " in shown for name in top.COMMANDS)
     with pytest.raises(SystemExit, match="2"):
         top.main(["bake"])
+
+
+def test_the_curve_of_two_precisions_spans_the_figure():
+    """From 60 to 620 across; 10 times the tolerance is at the top, 30, and the tolerance at the bottom, 280."""
+    answer = Answer("innovation, emulation", "emulation", 21, "", ((20, 10.0), (21, 1.0), (22, None)))
+    report = Report("a", "filter", 21, "", 2, "nearest", 5, (1.0,), "", (answer,), (), (), "", {})
+    assert '<polyline points="60.0,30.0 620.0,280.0" ' in report.to_html()
 
 
 def test_the_command_takes_known_inputs(files, capsys):
