@@ -52,6 +52,11 @@ def test_drawn_budgets_have_the_root_sum_square(group):
     assert draws.errors.shape == (trials,)
 
 
+def test_an_error_at_the_limit_is_not_beyond_it():
+    draws = experiment.Draws(EXAMPLE.budget, np.array([2.0, -2.0, -3.0, 1.0]))
+    assert draws.beyond(2.0) == 1 / 4
+
+
 @pytest.mark.parametrize("cycles", [0.01, 0.5, 3.3, 12.0, 80.7])
 def test_means_of_turning_constants(cycles):
     # the midpoint rule multiplies the mean by x / sin x, x = pi c / samples

@@ -33,6 +33,16 @@ def test_the_derivations_are_those_of_the_chapter():
     assert sum(steps.lengths(DERIVATIONS).values()) == 39
 
 
+def test_91_and_92_are_named_as_what_they_are():
+    """The matrix and the right-hand side of the system whose exact solution was computed."""
+    found = {step.name.split(":")[0]: step.right for step in DERIVATIONS["two_systems"].steps}
+    L, A, dA, B, dB = (derivation.L, derivation.A, derivation.DELTA_A, derivation.B, derivation.DELTA_B)
+    assert found["(91) corrected"] == A + derivation.A_TILDE + L * dA
+    assert found["(92) corrected"] == B + derivation.B_TILDE + L * dB
+    assert found["term missing from (91)"] == (L - 1) * dA
+    assert found["the same as a change of the triangular matrix $L^{-1}A$"] == L**-1 * derivation.A_TILDE + dA
+
+
 # -- what the printed lines say, and what they leave out ------------------------------------------
 
 

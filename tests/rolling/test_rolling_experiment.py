@@ -221,6 +221,8 @@ def test_the_image_behind_filters_is_that_of_their_gain():
         assert np.max(abs(image)) == pytest.approx(gain * at_end, rel=0.02)
     whole = experiment.image_behind(theory.moving_average(1200.0), 6600.0, 600.0, n)
     assert np.max(abs(whole)) < 0.02 * 6600.0 / YEAR * 10 * n
+    for turn in (1, 2, 7):
+        assert len(experiment.image_behind(np.ones(3), 6600.0, 10.0 * turn, 50)) == turn
 
 
 # -- roll rate -----------------------------------------------------------------------------------------------------
