@@ -69,6 +69,9 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "0.01 and -0.51" in finding(rows, "sabstract.abstract-claim").recomputed
     assert "0.0102 °/√s" in finding(rows, "sanalysis.numerical-example").recomputed
     assert "9.6 times" in finding(rows, "sanalysis.complete-set").recomputed
+    # (2/ω)[T - (1/ω)(1 - exp(-ωT))], and without 1/ω, from the first cycle on
+    first, missing = (2 / 10 * (0.01 - w * (1 - math.exp(-0.1))) for w in (1 / 10, 1))
+    assert f"is {missing:.3g}, not {first:.3g}" in finding(rows, "eq25").note
     # 2∫exp(-2τ)dτ from 5 to 6, and from 0 to 1
     printed, right = math.exp(-10) - math.exp(-12), 1 - math.exp(-2)
     assert f"to {printed:.2g} of" in finding(rows, "eq6-q-n").recomputed
@@ -138,6 +141,7 @@ DEPENDS = [
     ("sanalysis.large-n", times(theory, "error_variance", 1.1)),
     ("sanalysis.unit-of-35", replace(theory, "random_walk", lambda sigma, omega, f: sigma * omega / f)),
     ("eq38", times(theory, "approximation_ratio", 1.001)),
+    ("eq38", replace(theory, "approximation_ratio", lambda mu: 1 + mu**2 / 120 * (1 + (mu > 0.05)))),
     ("sanalysis.small-mu", times(theory, "approximation_ratio", 1.001)),
     ("sanalysis.transient", breaks(derivation, "transient", 1)),
     ("sanalysis.transient", plus(theory, "error_variance_recursion", 0.1)),
@@ -157,6 +161,11 @@ def test_a_check_depends_on_the_computation(rows, patch, key, change):
 def test_the_verdict_of_a_misprint_depends_on_what_follows(patch):
     patch.setattr(result, "vanishes", lambda expression: False)
     assert checks.CHECKS.run(statement(MAIN + "eq34")).verdict is Verdict.WRONG
+
+
+def test_the_abstract_is_right_if_the_exponents_are_those_of_small_mu(patch):
+    patch.setattr(theory, "exponents", lambda mu: (0 * mu + 0.5, 0 * mu - 1))
+    assert checks.CHECKS.run(statement(MAIN + "sabstract.abstract-claim")).verdict is Verdict.VERIFIED
 
 
 def test_the_walk_is_that_of_the_derivation():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import replace
 from fractions import Fraction
+from statistics import median
 
 import faults
 import numpy as np
@@ -13,10 +14,18 @@ from faults import finding
 
 from gpbnb import ledger
 from gpbnb.inversion import example, procedure, theory
-from gpbnb.ledger.checks.inversion import CHECKS, environments, numerical_example, resultant
+from gpbnb.ledger.checks.inversion import (
+    CHECKS,
+    environments,
+    first_approach,
+    numerical_example,
+    resultant,
+    triangularization,
+)
 from gpbnb.ledger.checks.inversion.first_order import EPSILON, FirstOrder, matrix
 from gpbnb.ledger.checks.inversion.judging import holds
 from gpbnb.ledger.finding import Verdict
+from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
 
 INVENTORY = faults.INVENTORY
@@ -148,13 +157,16 @@ def test_the_example_computes_with_the_printed_matrix_and_numbers():
 # -- what disagrees can agree ---------------------------------------------------------------------
 
 
+COLUMNS = ("proposed", "actual")
+
+
 def as_computed(column):
     """The numbers of a column of Table 1 as one of the readings gives them."""
     return [f"{value:.3e}" for value in numerical_example.readings(column)[0].values]
 
 
 def test_a_number_that_a_reading_gives_is_verified():
-    numbers = {column: as_computed(column) for column in ("proposed", "actual")}
+    numbers = {column: as_computed(column) for column in COLUMNS}
     for column, found in numbers.items():
         for places, literal in zip(example.PLACES, found, strict=True):
             printed = statement(f"hung1984.II.s11-4.table-1-{column}-{places}-places")
@@ -190,6 +202,30 @@ def test_a_corrected_slip_is_verified(key, old, new):
     printed = statement(key)
     assert CHECKS.run(printed).agrees is False
     assert CHECKS.run(replace(printed, form=printed.form.replace(old, new))).verdict is Verdict.VERIFIED
+
+
+def test_readings_belong_to_the_columns_of_the_table():
+    """Errors are far below bounds."""
+    proposed, actual = (median(each.values[0] for each in numerical_example.readings(c)) for c in COLUMNS)
+    assert proposed > 10 * actual
+
+
+@pytest.mark.parametrize("key", both("s10.practicality-of-44"))
+def test_a_residue_that_is_hard_to_obtain_is_verified(monkeypatch, key):
+    assert CHECKS.run(statement(key)).verdict is Verdict.WRONG
+    monkeypatch.setattr(first_approach, "_residual_bound", lambda: ("it is hard", False))
+    assert CHECKS.run(statement(key)).verdict is Verdict.VERIFIED
+
+
+def test_without_rounding_no_error_is_compounded(monkeypatch):
+    given, right = ([[Fraction(x) for x in row] for row in rows] for rows in (example.MATRIX, [[1], [2], [3]]))
+    run = environments.Elimination(np.array(given), np.array(right), lambda x: x)
+    monkeypatch.setattr(triangularization, "runs", lambda n: [(run, None, None)])
+    triangularization._compounded.cache_clear()
+    try:
+        assert triangularization._compounded() == (1, 0, 1)
+    finally:
+        triangularization._compounded.cache_clear()
 
 
 def test_sizes_in_place_of_signs_are_verified():

@@ -86,6 +86,11 @@ def test_each_wrong_entry_names_its_root(rows):
     }
 
 
+def test_findings_quote_the_computed_results(rows):
+    transform = faults.finding(rows, registry.entry("s5.ramp-transform")).recomputed
+    assert transform == r"$-k/\omega^2+i\pi k\,\delta'(\omega)$"  # of kt
+
+
 CORRECTED = {
     "eq3": ("== s(t)*cos(omega_r*t + theta)", "== s(t)*cos(omega_r*t)*cos(omega_r*t + theta)"),
     "s3.cos-5-deg": ("5*degree", "1*degree"),

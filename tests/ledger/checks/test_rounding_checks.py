@@ -132,6 +132,9 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "1.13 times" in finding(rows, "hung1984.II.eq20").note
     assert "1.25 times" in finding(rows, "hung1982.III.eq20").note
     assert r"\|Ax\|=2" in finding(rows, "hung1984.II.eq22").note.replace("$", "")
+    # 95 + 10 = 105 is rounded to 110
+    assert f"at most {(5 / 105) / 0.05:.4f} β" in finding(rows, "hung1984.II.eq16").recomputed
+    assert "of $D$ is 5, 5, 4, 3, 2, and" in finding(rows, "hung1982.III.s9-2.unnumbered-c").recomputed
     signs = Counter(names["x"] > 0 for names in representation.all_numbers())
     nearest = finding(rows, "hung1984.II.s2.claim-conventional").recomputed
     assert f"{signs[True]} positive and {signs[False]} negative" in nearest
