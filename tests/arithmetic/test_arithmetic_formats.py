@@ -205,6 +205,7 @@ class TestSplit:
     def test_example_of_the_report(self) -> None:
         # (2): 765.4567 = .7654 * 10**3 + .567 * 10**-1
         assert FloatFormat(10, 4).split("765.4567") == (Fraction("0.7654"), Fraction("0.567"), 3)
+        assert FloatFormat(10, 4).split(0) == (0, 0, 0)
 
     @seeded
     @given(hard_to_round())

@@ -11,6 +11,7 @@ from functools import cache
 import numpy as np
 import oracles
 import pytest
+from flint import fmpq_mat
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -73,6 +74,7 @@ def test_matrix_products_as_printed():
     assert theory.matmul_entry_bounds(A, B, BETA).tolist() == expected
     norms = [9, 9, 8]  # of A, B and C
     assert [column_sum_norm(m) for m in (A, B, C)] == norms
+    assert column_sum_norm(np.zeros((2, 0))) == column_sum_norm(fmpq_mat(2, 0)) == 0
     assert theory.chain_bound([A, B], BETA) == 3 * BETA * 81
     assert theory.chain_bound([A, B, C], BETA) == 5 * BETA * 648
     assert theory.strict_chain_bound([A, B, C], BETA) == g(5) * 648
