@@ -60,6 +60,17 @@ def test_examples_and_sliders_keep_within_what_is_taken(calculator):
 
 
 @CALCULATORS
+def test_sliders_move_by_whole_numbers_hundredths_of_a_decade_or_thousandths_of_their_range(calculator):
+    shown = page.form(calculator)
+    for each in calculator.inputs:
+        if not each.choices:
+            ends = rf'id="calculator-{calculator.id}-{each.name}-slider" .*? min="(.*?)" max="(.*?)" step="(.*?)"'
+            low, high, step = map(float, re.search(ends, shown).groups())
+            expected = 0.01 if each.log else 1 if each.whole else (high - low) / 1000
+            assert step == pytest.approx(expected, rel=1e-5)
+
+
+@CALCULATORS
 def test_the_table_needs_no_script_and_is_of_the_chapters_functions(calculator):
     html = page.form(calculator)
     table = html[html.index('<table class="calculator-examples">') :]
