@@ -255,6 +255,7 @@ def test_deviations(ax):
     assert (look(found["from (35)"]), look(found["from (39)"])) == ((BLUE, "", "o"), (ORANGE, "", "s"))
     (band,) = ax.patches
     assert (band.get_y(), band.get_height()) == (-2, 4)
+    assert ax.get_xlim() == pytest.approx((0.3 / 1.5, 20 * 1.5))
     edge = 0.3 / 1.3
     assert near(names.pop("grey band: 95 % of all deviations"), GREY, (edge, 2))
     assert near(names.pop("dots: from (35)"), BLUE, (edge, -2))

@@ -225,6 +225,7 @@ def test_headline(ax):
     assert near(names.pop("17 printed"), ORANGE, (17, size))
     assert not names
     assert ax.get_ylabel() == "largest error in a year (mas, mas/yr)"
+    assert list(ax.get_xticks()) == [4, 6, 8, 10, 12, 14, 16, 18, 20, 22]
     return ax.figure
 
 
