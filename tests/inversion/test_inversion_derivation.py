@@ -33,6 +33,14 @@ def test_the_derivations_are_those_of_the_chapter():
     assert sum(steps.lengths(DERIVATIONS).values()) == 39
 
 
+def test_norms_of_the_error_are_named_as_what_they_are():
+    a, rho, d, x = sp.symbols("a rho d x", positive=True)
+    found = {step.name.split(":")[0]: step.right for step in DERIVATIONS["first_approach_norms"].steps}
+    assert sp.simplify(found["(44)"] - (rho + a * d)) == 0
+    assert sp.simplify(found["(43) to every order"] - (a * rho + a**2 * d) / (1 - a * d)) == 0
+    assert sp.simplify(found["from the computed inverse alone"] - x * rho / (1 - rho)) == 0
+
+
 def test_91_and_92_are_named_as_what_they_are():
     """The matrix and the right-hand side of the system whose exact solution was computed."""
     found = {step.name.split(":")[0]: step.right for step in DERIVATIONS["two_systems"].steps}

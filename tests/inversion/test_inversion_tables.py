@@ -88,6 +88,8 @@ def test_violations():
 def test_summary():
     table = tables.summary(Frozen({}, ROWS), ("ball",))
     assert table.body == (("ball", "3", "1", "0.5", "2", r"$1.500\times10^{9}$"),)
+    assert table.header[:3] == ("bound", "gives no bound", "error above the bound")
+    assert table.header[3:] == tuple(f"bound / error, {name}" for name in ("smallest", "median", "largest"))
 
 
 def test_prices():

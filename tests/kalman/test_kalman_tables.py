@@ -39,6 +39,8 @@ def test_the_misprints():
         "second beta",
         "second digits",
     ]
+    assert rows["first coefficient"][:2] == [r"$2.6490\times10^{8}$", r"$2.5860\times10^{8}$"]
+    assert rows["second coefficient"][:2] == [r"$1.2949\times10^{16}$", r"$4.0775\times10^{14}$"]
     assert "84" in rows["first coefficient"][2]
     assert r"\cdot84$" in rows["second coefficient"][2]
     assert rows["first beta"] == [r"$.3775\times10^{-8}$", r"$3.867\times10^{-9}$", "one over the printed coefficient"]
