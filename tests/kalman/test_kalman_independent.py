@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import ensembles
+from gpbnb.kalman import ensembles, independent
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.independent import first_steps, stored_shares
 from gpbnb.kalman.probability import interval
@@ -33,3 +35,10 @@ def test_first_steps_count_each_model_once():
     ]
     assert found.exceeded == sum(ratio > 1 for ratio in ratios)
     assert (found.low, found.high) == interval(found.exceeded, 6)
+
+
+def test_a_filter_that_stops_exceeds_no_bound(monkeypatch):
+    stopped = SimpleNamespace(take=lambda z: None, stopped=1)
+    monkeypatch.setattr(independent, "Run", lambda *_: stopped)
+    (found,) = first_steps(FloatFormat(2, 24), 2, ("far scales",))
+    assert (found.models, found.exceeded) == (2, 0)

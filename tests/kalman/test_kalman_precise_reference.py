@@ -64,6 +64,15 @@ def test_inputs_and_offsets_are_known_to_it():
     assert distance(reference_states(model, Z), exactly(model, Z)[0]) < 1e-30
 
 
+def test_an_estimate_that_is_zero_at_first_has_a_reference():
+    model = sensor("1e-30")
+    still = LinearModel(model.Phi[0], model.H[0], model.Q[0], model.R[0], [0, 0], model.P0)
+    z = np.concatenate([np.zeros((1, 2)), Z])
+    found = reference_states(still, z)
+    assert not found[0].any()
+    assert distance(found, exactly(still, z)[0]) < 1e-30
+
+
 def test_only_such_models_need_it(monkeypatch):
     def never(model, z):
         raise AssertionError("the reference was computed again")

@@ -416,6 +416,7 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     assert by_nan == required_precision(two, 12, 1e-4, z=np.ma.MaskedArray(z, silent))
     assert by_nan != required_precision(two, 12, 1e-4, z=z)
     replaced, filled = without_missing(two, with_nan)
+    assert np.array_equal(filled, np.where(silent, 0, z))
     found = reference(replaced, filled, [3, 4, 8])
     assert not found.K[1][:, 0].any()
     assert not found.K[2].any()

@@ -12,8 +12,9 @@ from scipy import signal
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.guarantee import linear
-from gpbnb.kalman.guarantee.bound import limits
+from gpbnb.kalman.guarantee.bound import from_schedule, limits
 from gpbnb.kalman.guarantee.linear import peak_gain
+from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.system import LinearSystem
 
@@ -82,6 +83,14 @@ def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
     second = required_precision(other, 80, 1e-3 * 2.0**-10, z=U * 2.0**30, basis=basis)
     assert first.fmt == second.fmt is not None
     assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9)
+
+
+def test_probable_errors_are_three_standard_deviations():
+    """Of x+ = x/2 + u: the peak gain is 2, and rounding the input of at most 1 adds at most 2u to that."""
+    system, fmt = LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 12)
+    found = from_schedule(system.as_filter().schedule(fmt), limits(2, 1, state=[2, 2], innovation=1, measurement=1), 1)
+    ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(2, 1, measurement=1)).tried)
+    assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-12) / 1e-3, rel=1e-3)
 
 
 def test_only_errors_beyond_float64_are_said_not_to_be_finite():

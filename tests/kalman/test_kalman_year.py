@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -254,6 +256,12 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
     run_cases([SINGLE], parts, STEPS, progress=False)
     monkeypatch.setattr(year_runs, "fingerprint", lambda case, steps: "other")
     assert ResumableRun(SINGLE, parts, STEPS).run.steps == 0
+
+
+def test_progress_counts_the_steps_of_a_run(tmp_path):
+    shown = []
+    ResumableRun(SINGLE, tmp_path, STEPS).advance(3, SimpleNamespace(update=shown.append))
+    assert shown == [BLOCK, BLOCK, 100]
 
 
 def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
