@@ -262,6 +262,11 @@ REFUSED = [
     (experiment.drift_rates, ([-5.0], 1, rng()), "got a roll period of -5.0 s; needed more than 0, or None"),
     (experiment.drift_rates, ([None], 1, rng(), 1.0, 10.0), "got 10 s with a sample every 10 s; needed at least 2"),
     (experiment.drift_rates, ([None], 1, rng(), 1.0, 10.0, 0.0), "got 10.0 s with a sample every 0.0 s; needed two"),
+    (
+        experiment.drift_rates,
+        ([None], 1, rng(), 1.0, 10.0, math.inf),
+        "got 10.0 s with a sample every inf s; needed",
+    ),
     (experiment.drift_rates, ([None], 1, rng(), 1.0, math.nan), "got nan s with a sample every 10.0 s; needed two"),
     (experiment.drift_rates, ([math.inf], 1, rng()), "got a roll period of inf s; needed more than 0, or None"),
     (experiment.drift_rates, ([None], 1, rng(), 1.0, 1e4, 1e1, (math.nan, 0.0)), "got drifts .*; needed finite"),

@@ -166,6 +166,10 @@ def test_memory_does_not_grow_with_the_length():
     assert short < 2**20
 
 
+def test_the_longest_record_is_taken():
+    assert next(flicker(0.0, LONGEST, 2, rng(), 5)).tolist() == [[0, 0]] * 5
+
+
 @pytest.mark.parametrize(
     ("function", "arguments", "message"),
     [

@@ -76,6 +76,7 @@ def test_needed():
     steps = [100, 1000, 4000]
     body = tables.needed([600.0], [10], 6600.0, steps, 1e-4).body
     assert [cells[2] for cells in body] == ["recursion", "direct"]
+    assert tables.needed([600.0], [10], 6600.0, [100, 1000]).title == "Digits for 1 mas"
     for cells in body:
         observed = experiment.digits_needed_observed(cells[2], 10, 6600.0, 600.0, steps, 1e-4)
         assert int(cells[3]) == observed <= int(cells[4]) <= observed + 4
