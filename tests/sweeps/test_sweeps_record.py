@@ -40,7 +40,7 @@ def test_a_record_without_a_checksum_is_refused(tmp_path):
         read_record(tmp_path / "a.json", "cure")
 
 
-@pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "1e999", "0x1", "1e", ".", "--1", "infinity"])
+@pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "1e999", "-1e999", "0x1", "1e", ".", "--1", "infinity"])
 def test_what_is_no_plain_number(text):
     with pytest.raises(ValueError, match="needed"):
         plain_number(text)
