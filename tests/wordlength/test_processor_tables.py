@@ -6,6 +6,7 @@ import math
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
@@ -52,6 +53,9 @@ def test_fixed_point_bounds_stand_beside_what_was_observed() -> None:
     for _, observed, bound in table.body:
         assert 0 < float(observed) <= float(bound)
     assert float(table.body[1][2]) > 1.9 * float(table.body[0][2])
+    # The last of 11 bits behind the sign; the bound of one rounding is half of it. The cell has two figures.
+    unit = 2.0 ** (fixed_point.integer_bits(given, z) - 11)
+    assert float(table.body[0][2]) == pytest.approx(fixed_point.bound_per_unit(given)[0] * unit / 2, rel=0.05)
 
 
 def test_figures_draw_every_finite_point() -> None:

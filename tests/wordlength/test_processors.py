@@ -116,3 +116,11 @@ def test_variants_differ_in_one_property_each() -> None:
 def test_the_name_of_a_processor_is_text():
     with pytest.raises(TypeError, match="got name 5 of type int; needed text"):
         processors.Processor(5, BINARY32)
+
+
+def test_increments_are_of_a_process_with_the_stated_bandwidth() -> None:
+    """Half the period times the sum of two samples, each of 1 °/s, whose correlation is exp(-2π·50/1024)."""
+    found = processors.increments(2, 100_000)
+    assert found.shape == (2, 100_000)
+    expected = 2 * (1 + math.exp(-2 * math.pi * 50 / 1024)) / (2 * 1024) ** 2
+    assert found.var(axis=1) == pytest.approx(expected, rel=4 * math.sqrt(2 / 100_000))  # four standard errors

@@ -323,6 +323,8 @@ def test_cells():
     spans = tables.binary_ranges(
         [study.BinaryRange("gain", -20, 3), study.BinaryRange("all", -2000, 2000), study.BinaryRange("x", -14, 15)]
     )
+    assert spans.header == ("numbers", "smallest", "largest", "normal in")
+    assert spans.body[0][:3] == ("gain", "$2^{-20}$", "$2^{3}$")
     assert [row[-1] for row in spans.body] == [
         "binary32, binary64, bfloat16, TF32",
         "none",
