@@ -63,6 +63,13 @@ def test_findings_have_their_notes_and_numbers(rows):
     assert r"85 arcseconds apart with $\gamma_2=\gamma_3=60''$" in found["IV.axes-colinear"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
     assert "takes at least 2 changes of sign, before C, C" in found["IV.eq8"].recomputed
+    # (5, 3) + (-2, 4); √(9² + 5²); 5 + 4; the declination of Rigel
+    assert "is (3, 7) arcseconds" in found["IV.thetas-drift"].recomputed
+    assert "turns by 10.3 arcseconds" in found["IV.intermediate-frame"].recomputed
+    assert "by 9 arcseconds relative to the intermediate frame and by 5" in found["IV.phi-frame"].recomputed
+    assert "roll axis are 60 arcseconds apart" in found["IV.alphas-boresight"].recomputed
+    rigel = "8.2 degrees with the Earth's axis, which is the declination of the star"
+    assert rigel in found["I.approximately-parallel"].recomputed
     assert r"\theta_3\cos2" in found["IV.eq9"].recomputed
     assert "gamma1 0.64" in found["IV.use-of-model"].recomputed
 

@@ -108,6 +108,8 @@ def test_findings_quote_the_computed_numbers(rows):
         ("s13.remark-2", "10 decimal digits or 32 bits"),
         # |-60ε|, where the last state is zero, and 0 - 4ε - 20ε - 36ε
         ("eq121", r"the left side is $60\epsilon$ and the right side is $-60\epsilon$"),
+        # 1 - 1/(1 + 1e-5), which is lost in four digits
+        ("s12.claim-asterisk", "in four digits gives 0; equation (111) gives 1e-05"),
         # 7n+3m+6 less 6n+3m+5, and an addition
         ("s12.unnumbered-x-3", "$n + 1$ for the closed loop and $1$ for the input"),
     ):
@@ -275,6 +277,9 @@ def test_the_ratio_of_bound_to_error_is_a_median(patch):
     patch.setattr(contraction, "state_error_bound", always(np.full(2, 1e9)))
     patch.setattr(contraction, "covariance_error_bound", always(np.zeros((2, 2))))
     assert remarks.refined()[2] == 0
+    remarks.refined.cache_clear()
+    patch.setattr(contraction, "covariance_error_bound", always(np.ones((2, 2))))
+    assert remarks.refined()[2] > 100  # one, over errors in the fourth and eighth digits
 
 
 @pytest.mark.parametrize("letter", ["x", "P", "K", "F", "u", "prior"])

@@ -87,7 +87,16 @@ def test_each_wrong_entry_names_its_root(rows):
 
 
 def test_findings_quote_the_computed_results(rows):
-    transform = faults.finding(rows, registry.entry("s5.ramp-transform")).recomputed
+    def quoted(place):
+        return faults.finding(rows, registry.entry(place)).recomputed
+
+    sources = quoted("s2.five-error-sources")
+    assert sources.startswith(f"phase of 1°: {6600 * math.sin(math.radians(1)):.3g}; ")
+    assert f"frequency, ten digits: {6600 * 5e-12 * theory.YEAR:.3g}; " in sources
+    assert sources.count(": ") == 5
+    for place, error, digits in (("s4.sample-1-4-years", 5e-8, 2), ("s4.sample-2-40-000-years", 5e-12, 0)):
+        assert quoted(place) == f"{2 * math.pi / error / theory.YEAR:.{digits}f} years"
+    transform = quoted("s5.ramp-transform")
     assert transform == r"$-k/\omega^2+i\pi k\,\delta'(\omega)$"  # of kt
 
 
