@@ -105,6 +105,7 @@ BAD: list[tuple[str, Callable[[], Any], type[Exception], str]] = [
     ("interface", lambda: rows(3) @ rows(2), ValueError,
      "matmul: got shapes (3, 3) and (2, 2), so 3 columns against 2 rows; needed equal numbers; transpose or reshap"),
     ("stacks", lambda: D4.array(np.ones((2, 1, 1))) @ D4.array(np.ones((3, 1, 1))), ValueError, "matmul: got operands"),
+    ("scalar matmul, pairwise", lambda: linalg.matmul(V, V[0], "pairwise"), ValueError, "matmul: got shapes (3,)"),
     ("scalar matmul", lambda: V @ 2, ValueError, "matmul: got shapes (3,) and (); needed at least one axis each; use"),
     ("dot of stacks", lambda: np.dot(D4.array([ONE]), D4.array(ONE)), ValueError, "needed at most two axes each; use"),
     ("division", lambda: 1 / V, ZeroDivisionError, "got a division by zero at [2] of the divisor; needed a divisor ot"),

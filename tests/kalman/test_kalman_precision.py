@@ -19,6 +19,7 @@ from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.named import form_named
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import listed
 from gpbnb.kalman.simulation import Simulation, fine_resolution
@@ -321,6 +322,13 @@ def test_an_answer_says_why_fewer_digits_were_refused():
 
 
 ALMOST_KNOWN = LinearModel([[1]], [["0.59"]], [[0]], [["1e-18"]], [0], [[10**4]], "a sensor far better than the prior")
+
+
+@pytest.mark.parametrize("form", ["innovation", "symmetrized", "compensated"])
+def test_one_variance_of_zero_is_not_definite(form):
+    """The gain of a precise sensor is rounded to 1, which leaves its state no variance; the other keeps its own."""
+    model = LinearModel(np.eye(2), [[1, 0]], np.zeros((2, 2)), [["1e-18"]], [0, 0], [[10**4, 0], [0, 1]])
+    assert emulate(model, np.ones((3, 1)), FloatFormat(2, 11), form_named(form)).indefinite == 1
 
 
 def test_an_answer_that_higher_precisions_miss_is_refused():
