@@ -84,6 +84,7 @@ def test_rolls_that_are_no_whole_number_of_samples(capsys):
     result = experiment.year(Case().with_angle("gamma2", SIZE), 77.5 * 100, 1000.0)
     assert capsys.readouterr().err == ""  # no progress unless it is asked for
     assert result.block == 31
+    assert len(result.first) == 6 * 31
     assert np.hypot(*result.error.drift) <= third_order(result.case)
     assert result.error.line == pytest.approx(SIZE, rel=1e-3)
 

@@ -7,6 +7,7 @@ import math
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from drawn import GREY, named
 from matplotlib.patches import Circle, Rectangle
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -55,6 +56,12 @@ def test_accuracy(ax):
         assert line(ax, name).get_ydata().tolist() == np.clip(result.ulp, 1e-2, 2.0**53).tolist()
     assert [text.get_text() for text in ax.texts] == ["printed", "stable", "no digit correct"]
     check_labels(ax, "rad", "units in the last place")
+
+
+def test_the_line_without_digits_is_named_at_the_end_of_the_longer_curve(ax):
+    results = {"printed": experiment.accuracy("walk", [1e-9, 1.0], True), "stable": experiment.accuracy("walk", [10.0])}
+    figures.accuracy(results, ax)
+    assert named(ax)["no digit correct"] == (GREY, (10, 2**53))
 
 
 def test_approximations(ax):

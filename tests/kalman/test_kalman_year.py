@@ -268,6 +268,8 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
     here = tmp_path / "here"
     given = ["--directory", str(tmp_path / "saved"), "--steps", "100", "--cases", "3", "--output", str(here)]
     assert year.main(given) == 0
+    origin = read(here / "year.csv", year.COLUMNS, "").provenance
+    assert (origin["command"], origin["seed"]) == ("python -m gpbnb.kalman.year", "1984")
     runs = year.load(here)
     assert [run.case for run in runs] == list(CASES[:3])
     assert all(run.steps.tolist() == list(year_cases.checkpoint_steps(100)) for run in runs)
