@@ -124,3 +124,18 @@ def test_increments_are_of_a_process_with_the_stated_bandwidth() -> None:
     assert found.shape == (2, 100_000)
     expected = 2 * (1 + math.exp(-2 * math.pi * 50 / 1024)) / (2 * 1024) ** 2
     assert found.var(axis=1) == pytest.approx(expected, rel=4 * math.sqrt(2 / 100_000))  # four standard errors
+
+
+def test_variants_are_what_their_names_say() -> None:
+    found = {each.name: each for each in processors.variants(11)}
+    assert found["and pairwise sums instead"].order == "pairwise"
+    assert [name for name, each in found.items() if each.fused] == ["and fused multiply-add"]
+    assert [name for name, each in found.items() if each.compensated] == ["and a compensated update instead"]
+    assert [name for name, each in found.items() if each.sums == BINARY32] == ["and binary32 sums instead"]
+    assert "and binary32 sums instead" not in {each.name for each in processors.variants(24)}
+
+
+def test_the_first_turn_is_that_of_the_stated_rates() -> None:
+    """0, 0.1 and 0.3 rad/s over 10 ms: 1048.576 and 3145.728 units of 2**-20 rad, rounded, and halved."""
+    y, z = 1049 / 2**21, 3146 / 2**21
+    assert examples.turns(1).tolist() == [[[0, 0, -y, -z], [0, 0, z, -y], [y, -z, 0, 0], [z, y, 0, 0]]]
