@@ -74,7 +74,8 @@ class Cell:
 
 
 def _cells() -> tuple[Cell, ...]:
-    usual = next(iter(SETTINGS))
+    usual, flown = next(iter(SETTINGS)), "steps and roll as flown"
+    others = ("no occultation", "no annual aberration", "a tenth of the readout noise")
     absolute, deviation = STATES
     cells = [
         Cell(usual, deviation, 2, "nearest", "hung", (25, 26, 27)),
@@ -83,6 +84,15 @@ def _cells() -> tuple[Cell, ...]:
         Cell("known roll phase", deviation, 2, "nearest", "hung", (26,), 0, 10),
         Cell(usual, deviation, 2, "nearest", "hung", (27,), RECORDS, SHOWN - RECORDS),
         Cell(usual, absolute, 2, "nearest", "hung", (31,)),
+        Cell(usual, absolute, 2, "nearest", "hung", (32,), RECORDS, SHOWN - RECORDS),
+        *(Cell(setting, deviation, 2, "nearest", "hung", (26,), 0, 10) for setting in others),
+        Cell(usual, deviation, 2, "nearest", "innovation", (26,), 0, 10),
+        Cell(usual, deviation, 2, "chop", "hung", (30,), 0, 10),
+        Cell(usual, deviation, 10, "nearest", "innovation", (8, 9), 0, 10),
+        Cell(usual, absolute, 10, "nearest", "innovation", (10, 11), 0, 10),
+        Cell(flown, deviation, 2, "nearest", "hung", (26,), 0, 5),
+        Cell(usual, deviation, 2, "nearest", "hung", (25, 26), RECORDS, 70),
+        Cell(usual, absolute, 2, "nearest", "hung", (31, 33), RECORDS, 70),
     ]
     return tuple(cells)
 
