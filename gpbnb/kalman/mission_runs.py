@@ -91,6 +91,7 @@ def _cells() -> tuple[Cell, ...]:
         Cell(usual, deviation, 10, "nearest", "innovation", (8, 9), 0, 10),
         Cell(usual, absolute, 10, "nearest", "innovation", (10, 11), 0, 10),
         Cell(flown, deviation, 2, "nearest", "hung", (26,), 0, 5),
+        Cell(flown, deviation, 2, "nearest", "hung", (27, 28, 29), 0, 10),
         Cell(usual, deviation, 2, "nearest", "hung", (25, 26), RECORDS, 70),
         Cell(usual, absolute, 2, "nearest", "hung", (31, 33), RECORDS, 70),
     ]

@@ -83,20 +83,19 @@ def _cells() -> tuple[Cell, ...]:
         Cell(absolute, 2, "chop", "hung", (34, 35), 0, 30),
         Cell(deviation, 2, "chop", "hung", (29,), 0, 30),
         Cell(deviation, 10, "nearest", "innovation", (8,), 30, 270),
-        Cell(absolute, 10, "nearest", "innovation", (10,), 30, 270),
-        Cell(deviation, 10, "nearest", "innovation", (7, 9), 30, 70),
-        Cell(absolute, 10, "nearest", "innovation", (9, 11), 30, 70),
-        Cell(deviation, 2, "chop", "hung", (29, 30), 30, 70),
-        Cell(absolute, 2, "chop", "hung", (34, 35, 36), 30, 70),
         Cell(absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
         Cell(deviation, 2, "nearest", "hung", (22, 23, 28, 29, 30)),
+        Cell(deviation, 2, "chop", "hung", (29, 30), 30, 70),
+        Cell(absolute, 2, "chop", "hung", (34, 35, 36), 30, 70),
+        Cell(absolute, 10, "nearest", "innovation", (9, 10, 11), 30, 70),
+        Cell(deviation, 10, "nearest", "innovation", (7, 9), 30, 70),
         Cell(absolute, 10, "nearest", "innovation", (8,)),
         Cell(deviation, 10, "nearest", "innovation", (10, 11)),
     ]
     return tuple(cells)
 
 
-#: All cells, the most valuable first; those far from the threshold stand last and have not been computed.
+#: All cells, the most valuable first.
 CELLS = _cells()
 
 
