@@ -275,6 +275,7 @@ def test_the_random_walk_takes_over_where_it_says(mu, rectangle):
     variance = theory.rectangle_error_variance if rectangle else theory.error_variance
     for share in (0.001, 0.05):
         n = theory.settling_cycles(mu, share, rectangle)
+        assert rectangle or n == theory.settling_cycles(mu, share)
         away = abs(float(variance(n, mu)) / (n * float(theory.walk_factor(mu))) - 1)
         assert away <= share * (1 + 1e-9)
         if n > 1:

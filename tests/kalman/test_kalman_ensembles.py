@@ -205,6 +205,10 @@ def test_another_error_is_not_hidden(error):
     assert executor.sent == 1
 
 
+def test_one_attempt_and_batches_of_one_are_enough():
+    assert ensembles.sweep((), batch=1, attempts=1) == ()
+
+
 @pytest.mark.parametrize("changed", [{"batch": 0}, {"attempts": 0}])
 def test_what_a_sweep_refuses(changed):
     with pytest.raises(ValueError, match="needed both at least 1"):

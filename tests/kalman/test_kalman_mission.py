@@ -54,6 +54,16 @@ def test_the_earth_hides_the_star_for_a_third_of_each_orbit():
     assert Mission(occultation=False).matrices(0, 2).any(axis=(1, 2)).all()
 
 
+def test_the_scale_factor_and_the_roll_phase_multiply_the_rolled_signal():
+    """For a signal (N, E) of up to 26 arcsec: Nc + Es and Ec - Ns, where c and s have errors of 2**-13."""
+    mission = Mission(occultation=False)
+    H, (north, east) = mission.matrices(300, 2)[:, 0], mission.known_signal(300 * BLOCK + 1 + np.arange(BLOCK)).T
+    c, s = H[:, 0], H[:, 1]
+    assert np.ptp(c) == np.ptp(s) == 2
+    assert H[:, 6] == pytest.approx(north * c + east * s, abs=52 * 2.0**-13)
+    assert H[:, 7] == pytest.approx((east * c - north * s) * mission.roll_phase, abs=52 * 2.0**-13)
+
+
 @pytest.mark.parametrize("base", [2, 10])
 def test_matrices_are_held_exactly_by_every_format_of_the_sweep(base):
     H = Mission().matrices(300, base)
