@@ -6,6 +6,7 @@ import ast
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -92,3 +93,13 @@ def test_each_folder_is_used_where_those_before_it_cannot_be(tmp_path, installed
 def test_a_checkout_keeps_its_cache_to_itself(tmp_path, installed):
     (installed / "pyproject.toml").touch()
     assert folder_in({"HOME": str(tmp_path)}, installed) == str(installed / ".cache" / "gpbnb" / "x")
+
+
+@pytest.mark.skipif(caching.fcntl is None, reason="no locks on this system")
+def test_a_lock_is_waited_for_as_long_as_is_said(tmp_path):
+    held, found = caching.lock(tmp_path / "x", 1.0), []
+    waiting = threading.Thread(target=lambda: found.append(caching.lock(tmp_path / "x", 0.0)), daemon=True)
+    waiting.start()
+    waiting.join(5.0)
+    caching.unlock(tmp_path / "x", held)
+    assert found == [None]

@@ -264,16 +264,15 @@ def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np
 
 
 SEED = 1984
-_NEAREST, _CHOP = Rounding.NEAREST, Rounding.CHOP
 
 #: The formats of the sweep over all readings and families, and of the sweep over random matrices.
-VARIANT_FORMATS = (FloatFormat(10, 4), FloatFormat(10, 9), FloatFormat(2, 24), FloatFormat(10, 4, _CHOP))
+VARIANT_FORMATS = (FloatFormat(10, 4), FloatFormat(10, 9), FloatFormat(2, 24), FloatFormat(10, 4, Rounding.CHOP))
 RANDOM_FORMATS = (
     FloatFormat(2, 11),
     FloatFormat(2, 24),
-    FloatFormat(2, 24, _CHOP),
+    FloatFormat(2, 24, Rounding.CHOP),
     FloatFormat(10, 8),
-    FloatFormat(16, 6, _CHOP),
+    FloatFormat(16, 6, Rounding.CHOP),
 )
 
 #: Number of random inversions for each size and format.

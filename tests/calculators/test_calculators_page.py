@@ -119,6 +119,12 @@ def test_formulas_are_typeset_without_names_of_the_script(calculator):
     assert words == []
 
 
+def test_as_many_roundings_as_units_have_no_bound():
+    given = {"b": "2", "t": "2", "chop": False}  # the unit roundoff is a quarter
+    assert forms._unit_reference({**given, "n": "3"})["gamma"] == 3
+    assert math.isnan(forms._unit_reference({**given, "n": "4"})["gamma"])
+
+
 def test_nothing_is_fetched():
     text = page.Runtime()._repr_html_() + "".join(page.form(each) for each in forms.CALCULATORS)
     assert re.findall(r"https?:(?!//www\.w3\.org/2000/svg)|import\(|@import|url\(|fetch\(", text) == []

@@ -95,6 +95,8 @@ def test_random_walk(ax, swept):
     assert line(ax, "simulation").get_ydata().tolist() == np.sqrt(swept.walk).tolist()
     exact = line(ax, "(35)")
     assert exact.get_ydata() == pytest.approx(np.sqrt(theory.walk_factor(exact.get_xdata())))
+    ends = swept.mu.min() / 1.5, swept.mu.max() * 1.5
+    assert exact.get_xdata()[[0, -1]] == pytest.approx(ends)
     printed = line(ax, "(39)")
     assert printed.get_ydata() == pytest.approx(np.sqrt(printed.get_xdata() / 6))
     low, high = ax.get_ylim()

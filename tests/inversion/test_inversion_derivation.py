@@ -29,6 +29,10 @@ def test_each_step(step):
     steps.check(step)
 
 
+def test_matrices_do_not_commute():
+    assert derivation.H_HAT * derivation.X_HAT != derivation.X_HAT * derivation.H_HAT
+
+
 def test_the_derivations_are_those_of_the_chapter():
     assert sum(steps.lengths(DERIVATIONS).values()) == 39
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import precise_reference
+from gpbnb.kalman import filter_run, precise_reference
 from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run, reference, reference_states
 from gpbnb.kalman.forms import Form
@@ -23,6 +23,14 @@ def sensor(R, **inputs):
     Phi, H, P0 = [[1, "0.1"], [0, 1]], [["0.3", "0.7"], ["0.6", "1.4"]], [[1, "0.4"], ["0.4", 2]]
     R2 = [[R, 0], [0, R]]
     return LinearModel(Phi, H, [["1e-3", 0], [0, "1e-3"]], R2, [0, 1], P0, "two precise sensors", **inputs)
+
+
+def test_one_step_with_a_precise_sensor_is_enough_for_more_digits():
+    P = np.zeros((2, 1, 1, 2))
+    P[..., 0] = 1
+    for variances, precise in ((["1", "1e-30"], True), (["1e-30", "1"], True), (["1", "1"], False)):
+        model = LinearModel([[1]], [[1]], [[0]], [[[each]] for each in variances], [0], [[1]])
+        assert filter_run._loses_digits(model, np.arange(2), P) is precise
 
 
 def exactly(model, z):

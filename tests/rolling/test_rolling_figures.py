@@ -36,6 +36,8 @@ def test_density_and_residual(ax):
     measured, line = figures.density(found, theory.LEVEL, slope, ax)
     assert np.array_equal(xy(measured), (found.frequency, found.density))
     assert np.array_equal(xy(line)[1], theory.LEVEL / found.frequency)
+    bars = [np.ptp(each[:, 1]) / 2 for each in measured[2][0].get_segments()]
+    assert bars == pytest.approx(2 * found.error * found.density)
     assert f"slope {slope.value:.3f}" in measured.get_label()
     ax.clear()
     measured, one = figures.residual(found, theory.LEVEL, 10.0, ax)

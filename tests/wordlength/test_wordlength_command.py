@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
 
@@ -241,6 +242,8 @@ def test_the_curve_of_two_precisions_spans_the_figure():
     answer = Answer("innovation, emulation", "emulation", 21, "", ((20, 10.0), (21, 1.0), (22, None)))
     report = Report("a", "filter", 21, "", 2, "nearest", 5, (1.0,), "", (answer,), (), (), "", {})
     assert '<polyline points="60.0,30.0 620.0,280.0" ' in report.to_html()
+    alone = replace(report, answers=(replace(answer, tried=answer.tried[:1]),))
+    assert "Too few precisions" in alone.to_html()
 
 
 def test_the_command_takes_known_inputs(files, capsys):
