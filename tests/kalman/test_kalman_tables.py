@@ -190,6 +190,12 @@ def share(precision, within, records, **changes):
     return found._replace(**changes)
 
 
+def test_shares():
+    """Nine errors of 0.1 and one of 2: the 90 % quantile lies a tenth of the way from the ninth to the last."""
+    row = ["absolute", "hung", "32 bits", "9 of 10", "0.606 to 0.995", "0.1", "0.29", "2", "0.5"]
+    assert cells(tables.shares([share(32, 9, 10)])) == [row]
+
+
 def test_needed_precisions():
     found = [share(32, 9, 10), share(33, 300, 300), share(27, 5, 5, states="deviation")]
     chopped = share(36, 1, 30)._replace(fmt=FloatFormat(2, 36, Rounding.CHOP))

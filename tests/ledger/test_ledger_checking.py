@@ -26,6 +26,11 @@ def test_topics_check_entries_of_the_inventory_only():
     assert set(owners(INVENTORY)) == {key for checks in TOPICS.values() for key in checks} != set()
 
 
+def test_each_topic_has_the_checks_of_its_own_module():
+    for name, checks in TOPICS.items():
+        assert checks is importlib.import_module(f"gpbnb.ledger.checks.{name}").CHECKS
+
+
 def test_one_row_an_entry_in_order(complete):
     found = rows(topics=topics(complete))
     assert tuple(row.statement for row in found) == INVENTORY
