@@ -113,6 +113,7 @@ def test_drift_errors(ax):
 def test_bandwidths(ax):
     study = material.filter_study()
     pole, average, line, lag, noise, _ = figures.bandwidths(study, theory.FLOWN_DENSITY, ax)
+    assert ax.get_ylim()[0] == pytest.approx(0.3 * np.sqrt(study.error.min()))
     assert xy(line)[1] == pytest.approx(np.hypot(xy(lag)[1], xy(noise)[1]), rel=1e-13)
     assert np.array_equal(xy(pole), (study.bandwidth[:3], np.sqrt(study.error[:3])))
     assert np.array_equal(xy(average), (study.bandwidth[3:], np.sqrt(study.error[3:])))
