@@ -92,7 +92,7 @@ bench: .venv/made-for ## timings against peers, side by side
 	$(PY) -m benchmarks.year
 
 # yattag, which cosmic-ray uses, has no wheel.
-mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/budget/theory.py" or SINCE=HEAD~3 picks files
+mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/budget/theory.py" or SINCE=HEAD~3 picks files, OPTIONS=--measure finds the tests of each line first
 	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r tests/mutants/environment.txt
 	$(PY) -m tests.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(OPTIONS)
 
