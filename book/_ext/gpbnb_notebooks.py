@@ -59,7 +59,7 @@ def copies(app: Sphinx) -> Path:
 def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
     """Read the executed copy of a notebook in place of the notebook.
 
-    In a new book the pages of the package come first. They show no outputs, and are read while notebooks run.
+    Sphinx reads the pages of a new book by name. Those of the API come first, show no outputs, and need not wait.
     """
     if not docname.startswith("book/api"):
         lay_copies(app)

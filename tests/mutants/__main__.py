@@ -169,8 +169,8 @@ class Judges:
     def ways(self, name: str, line: int) -> tuple[str, How]:
         """How to run the tests on a fault in a line of a file, and a name for it.
 
-        A fault that no compiled function contains leaves all of them valid. Otherwise they are compiled again, and
-        there is more time.
+        If no compiled function contains the fault, those compiled before can be used. Otherwise they are compiled
+        again, and the tests get more time.
         """
         seconds = self.known["seconds"]
         module = module_of(self.tree / name, self.tree)
@@ -249,7 +249,7 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
                     found = judges.run(files, way, how)
                 finally:
                     path.write_text(source, encoding="utf-8")
-                    # To the tests imported already, a newer file is another source, and they compile again.
+                    # A newer time of the file would make the tests that are imported already compile it again.
                     os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
                 if how.stamps is None:  # what was compiled from a fault is of no further use
                     for file in set(COMPILED.glob("*")) - compiled:
@@ -383,10 +383,10 @@ def main() -> None:
             where = f"{name}:{mutant.line} {mutant.operator}"
             print(f"{number + 1}/{len(plan)} {row['outcome']} {where} {row.get('seconds', '')}", flush=True)
 
-    # Those that any of the faults needs; the others need not be imported.
-    needed = {test for name in names for test in concern.judges(module_of(tree / name, tree))[:MOST_FILES]}
-    if COVERED.is_file():
-        needed = set(concern.tests)
+    # Without a measurement, tests that none of the faults needs are not imported.
+    needed = set(concern.tests)
+    if not COVERED.is_file():
+        needed = {test for name in names for test in concern.judges(module_of(tree / name, tree))[:MOST_FILES]}
     with_collected(tree, [str(test.relative_to(tree)) for test in sorted(needed)], campaign)
     shutil.rmtree(tree)
     summary([row for row in read(chosen.results) if row["module"] in names])

@@ -200,7 +200,7 @@ def _import_and_run(root: Path, tests: Sequence[str], recorder: _Recorder) -> No
 class Fresh:
     """A process without the package, which forks the runs of :func:`run`.
 
-    Forked from a process that has imported the package, they would import it twice, and numba refuses its types then.
+    A run that is forked from a process with the package would import it a second time, which numba does not support.
     """
 
     def __init__(self) -> None:
