@@ -27,6 +27,8 @@ export HYPOTHESIS_STORAGE_DIRECTORY := $(HERE)/.cache/hypothesis
 export RUFF_CACHE_DIR := $(HERE)/.cache/ruff
 export MYPY_CACHE_DIR := $(HERE)/.cache/mypy
 export PYTHONNOUSERSITE := 1
+# Without bytecode, which images of containers turn off, each process compiles up to 2,700 modules again.
+unexport PYTHONDONTWRITEBYTECODE
 unexport NUMBA_CACHE_DIR GPBNB_CACHE_DIR PYTHONPATH PYTHONHOME MPLBACKEND JUPYTER_PATH JUPYTER_CONFIG_PATH
 
 # IPython and pytest want theirs to be there.
