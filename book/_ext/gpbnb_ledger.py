@@ -9,16 +9,22 @@ from sphinx.environment import BuildEnvironment
 from sphinx.util.docutils import SphinxDirective
 
 import gpbnb
-from gpbnb import ledger
-from gpbnb.ledger.finding import Verdict
 
-ERRORS = (Verdict.WRONG, Verdict.INCONSISTENT, Verdict.NOT_REPRODUCED)
+ERRORS = ("wrong", "inconsistent", "not reproduced")
 """What a chapter lists; misprints and faults of the scan are in the complete ledger."""
 
 
 @cache
-def all_rows() -> tuple[ledger.Row, ...]:
-    return ledger.rows()
+def ledger():
+    """The package of the ledger, which takes seconds to import: meanwhile the notebooks run already."""
+    from gpbnb import ledger
+
+    return ledger
+
+
+@cache
+def all_rows():
+    return ledger().rows()
 
 
 class Ledger(SphinxDirective):
@@ -40,37 +46,37 @@ class Ledger(SphinxDirective):
             self.env.note_dependency(str(path))
         what, *detail = (" ".join(argument.split()) for argument in self.arguments)
         if what == "counts":
-            parsed = self.parse_text_to_nodes(ledger.count_table(all_rows(), detail[0]).markdown())
+            parsed = self.parse_text_to_nodes(ledger().count_table(all_rows(), detail[0]).markdown())
             for table in (found for node in parsed for found in node.findall(nodes.table)):
                 table["classes"].append("counts")
             return parsed
         return [nodes.raw("", self.html(what, *detail), format="html")]
 
     def html(self, what: str, detail: str = "") -> str:
-        rows = all_rows()
+        rows, verdict = all_rows(), ledger().finding.Verdict
         match what:
             case "page":
-                page = next(page for page in ledger.PAGES if page.name == detail)
-                return ledger.ledger_page(rows, page).html
+                page = next(page for page in ledger().PAGES if page.name == detail)
+                return ledger().ledger_page(rows, page).html
             case "errors":
-                return ledger.error_table(ledger.select_topic(rows, detail, *ERRORS)).html
+                return ledger().error_table(ledger().select_topic(rows, detail, *map(verdict, ERRORS))).html
             case "printed":
                 title, _, names = detail.rpartition(": ")
                 chosen_rows = [row for row in rows if row.statement.id in names.split()]
                 if len(chosen_rows) != len(names.split()):
                     raise self.error(f"unknown statement in {names!r}")
-                return ledger.printed_table(chosen_rows, title).html
+                return ledger().printed_table(chosen_rows, title).html
             case "verdict":
-                chosen = Verdict(detail)
-                return ledger.note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html
+                chosen = verdict(detail)
+                return ledger().note_table(row for row in rows if row.finding and row.finding.verdict is chosen).html
             case "undone":
-                chosen = Verdict(detail)
+                chosen = verdict(detail)
                 items = (row for row in rows if row.statement.kind == "open")
-                return ledger.note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
+                return ledger().note_table((r for r in items if r.finding and r.finding.verdict is chosen), True).html
             case "roots":
-                return ledger.root_table(rows).html
+                return ledger().root_table(rows).html
             case "claims":
-                return ledger.claim_table(rows).html
+                return ledger().claim_table(rows).html
         raise self.error(f"no part of the ledger is called {what!r}")
 
 
@@ -78,7 +84,7 @@ def count(name, rawtext, text, lineno, inliner, options=None, content=None):
     """Write a count: of ``statements``, of ``roots``, of a document, of a verdict, or of both as ``hung1984 wrong``."""
     rows = all_rows()
     if text == "roots":
-        found = len(ledger.by_root(rows))
+        found = len(ledger().by_root(rows))
     else:
         words = text.replace("not reproduced", "not-reproduced").split()
         kept = [
@@ -91,8 +97,8 @@ def count(name, rawtext, text, lineno, inliner, options=None, content=None):
 def add_labels(app: Sphinx, env: BuildEnvironment) -> None:
     """Give each statement a label: the rows are HTML, in which Sphinx finds none."""
     standard = env.get_domain("std")
-    for statement in ledger.load_statements():
-        page = next(page for page in ledger.PAGES if page.holds(statement))
+    for statement in ledger().load_statements():
+        page = next(page for page in ledger().PAGES if page.holds(statement))
         name = f"book/{page.name}"
         if name not in env.found_docs:
             continue

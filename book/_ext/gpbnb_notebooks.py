@@ -70,6 +70,13 @@ def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
         source[0] = copy.read_text(encoding="utf-8")
 
 
+def number_read_trees(app: Sphinx, env: BuildEnvironment) -> list[str]:
+    """Number figures in the pages as they were read: Sphinx would load each of them again."""
+    read, load = env._write_doc_doctree_cache, env.get_doctree
+    env.get_doctree = lambda name: read[name] if name in read else load(name)
+    return []
+
+
 def keep_numbers(app: Sphinx, env: BuildEnvironment, docnames: list[str]) -> None:
     """Keep the numbers of figures when no page is to be read: Sphinx would load all pages to count them again."""
     app.gpbnb_numbers = copy.deepcopy(env.toc_fignumbers)
@@ -81,6 +88,7 @@ def keep_numbers(app: Sphinx, env: BuildEnvironment, docnames: list[str]) -> Non
 
 def renumbered(app: Sphinx, env: BuildEnvironment) -> list[str]:
     """Write all pages again if a figure has another number: Sphinx would not write those that refer to it."""
+    del env.get_doctree
     return sorted(env.found_docs) if app.gpbnb_numbers not in ({}, env.toc_fignumbers) else []
 
 
@@ -121,15 +129,18 @@ def remove_old_pages(app: Sphinx, error: Exception | None) -> None:
 
 
 def setup(app: Sphinx) -> dict:
-    gc.set_threshold(200_000, 20, 100)  # the trees of all pages are large, and hardly any of their nodes become garbage
     sources = sorted(Path(__file__).parent.glob("*.py"))
     state = hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
     app.add_config_value("gpbnb_extensions", state, "env")  # a change of them changes any page
     app.add_config_value("gpbnb_outputs", "", "")
     app.connect("builder-inited", execute)
+    # The trees of all pages are large, and hardly any of their nodes become garbage.
+    app.connect("builder-inited", lambda app: gc.disable())
+    app.connect("build-finished", lambda app, error: gc.enable())
     app.connect("source-read", use_copy)
     app.connect("env-get-outdated", outdated)
     app.connect("env-before-read-docs", keep_numbers, priority=900)
+    app.connect("env-get-updated", number_read_trees, priority=100)
     app.connect("env-get-updated", renumbered, priority=900)
     app.connect("env-updated", keep_contents)
     app.connect("env-updated", write_in_parallel)
