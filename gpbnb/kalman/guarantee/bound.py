@@ -356,10 +356,11 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
 def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
     """Bound each operation's own linear function, more tightly than the peaks of the states do.
 
-    The coefficients of the filter must never change. The exact filter is then the program without roundings.
+    The coefficients of the filter must never change, and its first estimate must be zero. The exact filter is then the
+    program without roundings, and every number of it follows from the measurements alone.
     """
     program, first = given.program, given.program.n + given.program.m
-    if given.steps != 1 or given.HPhi.any():
+    if given.steps != 1 or given.HPhi.any() or given.x0.any():
         return np.full(len(program.operations), math.inf)
     rows = np.empty((first + len(program.operations), first, 2))
     sizes = np.empty(rows.shape[:2])
