@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from fractions import Fraction as F
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,14 @@ import pytest
 from exact_terms import fractions, same
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee import bound, gains
 from gpbnb.kalman.guarantee.bound import from_schedule, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits
 from gpbnb.kalman.guarantee.linear import LinearFilter, state_space
 from gpbnb.kalman.guarantee.program import Builder, Program, steps_in_python
+from gpbnb.kalman.model import LinearModel
 
 FMT = FloatFormat(2, 24)
 
@@ -236,3 +240,54 @@ def test_a_first_estimate_is_not_forgotten() -> None:
         largest = max(largest, abs(computed[0] - true[0]))
     assert 2 < largest <= F(found.bound[0]) < 10 * largest
     assert found.for_ever
+
+
+# -- a gain that repeats ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("larger", "trial"), [(0.0, 3.0), (0.5, 3.0), (1.5, 4.5)])
+def test_a_trial_distance_holds_at_the_beginning(larger: float, trial: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The exact covariance begins within 3 of the computed one; a smaller distance may shrink, but is never reached."""
+    tried = []
+
+    class Run:
+        steps, C, bounds, P = 3, np.full((3, 1, 1), 10.0), (None, "dK"), np.array([[10.0]])
+
+        def __init__(self, *_: Any) -> None:
+            self.bound = contraction(2.0, 3.0)
+
+        def take(self, z: Any) -> None:
+            tried.append(self.bound.zeta)
+            if len(tried) == 2:
+                self.bound = contraction(2.0, 0.25)
+
+        def exactly(self, x: Any) -> Any:
+            return fractions(x)
+
+    class Bound(SimpleNamespace):
+        def _replace(self, zeta: float) -> Bound:
+            return Bound(L=self.L, zeta=zeta)
+
+    def contraction(L: float, zeta: float) -> Bound:
+        return Bound(L=np.array([[L]]), zeta=zeta)
+
+    monkeypatch.setattr(gains, "BoundedRun", Run)
+    stored: Any = SimpleNamespace(m=1)
+    run: Any = Run()
+    gains._closes(stored, run, 0, 2, larger, 100)
+    assert tried == [3.0, trial]
+
+
+def test_the_error_of_the_exact_gain_reaches_the_schedule(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Until the gain settles, that of the run; from then on, that of the period which was tried."""
+    model = LinearModel(Phi=[["1/2"]], H=[["1"]], Q=[["1"]], R=[["1"]], x0=["0"], P0=[["1"]])
+    given = gains.schedule(model, FMT, Form.INNOVATION)
+    run = BoundedRun(model.rounded(FMT), None, Form.INNOVATION, range(1, given.steps + 1))
+    run.take(np.zeros((given.steps, 1)))
+    assert given.settled
+    assert (run.bounds[1] > 0).all()
+    assert (given.dK >= run.bounds[1]).all()
+    assert given.dK[-1] > run.bounds[1][-1]
+    late = gains.schedule(model, FMT, Form.INNOVATION, most=5)
+    assert not late.settled
+    assert np.array_equal(late.dK, run.bounds[1][: late.steps])

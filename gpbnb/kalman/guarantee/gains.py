@@ -329,7 +329,7 @@ def _closes(stored: LinearModel, run: BoundedRun, first: int, period: int, large
     inverse = weights.inv()
     last = _symmetric_of(run, run.steps - 1 - period) if run.steps > period else P_begin
     wrap = _distance(inverse, P_begin - last)
-    trial = max(larger * begin.zeta, larger * wrap, 1e-28)
+    trial = max(max(larger, 1.0) * begin.zeta, larger * wrap, 1e-28)  # the exact covariance begins within begin.zeta
     longer.bound = begin._replace(zeta=trial)
     longer.take(np.zeros((period, stored.m)))
     end = longer.bound
