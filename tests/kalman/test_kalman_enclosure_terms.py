@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flint import arb, arb_mat
+from exact_terms import fractions
+from flint import arb, arb_mat, ctx
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.forms import Form
@@ -319,3 +320,98 @@ def test_limits_from_measurements_allow_for_each_rounding(which: str, monkeypatc
     exactly = tiny * (F(value["K"]) * 2 + F(value["gain"]) * V) + F(value["dK"]) * V
     exactly += (tiny * F(value["loop"]) + F(value["spread"])) * X
     same(seen[-1][0, 0], exactly)
+
+
+# -- balls that contain what a set adds --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def bits():
+    before, ctx.prec = ctx.prec, enclosure._BITS
+    yield
+    ctx.prec = before
+
+
+def test_balls_have_the_radii_of_the_set_and_of_errors(bits: None) -> None:
+    spread = np.array([[0.25, 0.0]])
+    found = enclosure._enclosed(np.array([[F(3), F(1, 3)]], dtype=object), 0.5, spread)
+    same(found[0, 0].exactly.rad(), 0.25, 1e-8)
+    assert found[0, 1].exactly.rad() < 1e-40
+    found[0, 1].error = 0.125
+    balls, errors = enclosure._restarted(found)
+    assert errors.tolist() == [[0.0, 0.125]]
+    assert [each.error for each in balls[0]] == [0, 0]
+    assert all(each.unit == 0.5 for each in balls[0])
+    same(balls[0, 0].exactly.rad(), 0.25, 1e-8)
+    same(balls[0, 1].exactly.rad(), 0.125, 1e-8)
+    assert balls[0, 1].exactly.contains(arb(1) / 3)
+
+
+def test_limits_of_balls_are_rounded_upwards(bits: None) -> None:
+    third = arb(1) / 3
+    found = enclosure._abs(arb_mat([[third, -third, arb(1, 0.5)]]))
+    assert F(float(third)) < F(1, 3)
+    assert all(F(1, 3) < F(each) < F(1, 3) * (1 + F(1, 2**49)) for each in found[0, :2])
+    assert 1.5 < found[0, 2] < 1.5 + 1e-8
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(10, 6), FloatFormat(2, 24)])
+def test_the_unit_of_an_enclosure_is_rounded_upwards(fmt: FloatFormat, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    monkeypatch.setattr(enclosure, "_settled", lambda *_: 64)
+    monkeypatch.setattr(enclosure, "_enclose", lambda *arguments: seen.append((arguments[2], ctx.prec)))
+    assert enclosure.enclose(SimpleNamespace(), SimpleNamespace(steps=1), fmt, Form.JOSEPH) is None  # type: ignore[arg-type]
+    assert fmt.unit_roundoff * (1 + F(1, 2**51)) < F(seen[0][0]) < fmt.unit_roundoff * (1 + F(1, 2**49))
+    assert seen[0][1] == enclosure._BITS != ctx.prec
+
+
+def test_products_of_closed_loops_have_their_roundings(bits: None) -> None:
+    """Two phases of one cycle, with 60 bits in each entry, so that every product is rounded; all entries positive."""
+    tiny = F(1, 2**60)
+    loops = [
+        np.array([[F(1, 2) + tiny, F(1, 8)], [F(1, 16), F(3, 8) + tiny]]),
+        np.array([[F(3, 8), F(1, 4) + tiny], [F(1, 8) + tiny, F(1, 2)]]),
+    ]
+    none = np.zeros((2, 2))
+    as_balls = lambda A: arb_mat([[arb(int(x * 2**60)) / 2**60 for x in row] for row in A])  # noqa: E731
+    phases = [enclosure._Phase((), none, as_balls(A), none, none, none, none) for A in loops]
+    found = enclosure._powers(phases)
+    assert found is not None
+    for j, (products, residuals) in enumerate(found):
+        assert np.array_equal(products[0], np.eye(2))
+        assert len(products) == len(residuals) + 1
+        inexact = 0
+        for lag, (M, after, off) in enumerate(zip(products, products[1:], residuals, strict=False)):
+            made = fractions(M) @ loops[(j - 1 - lag) % 2] - fractions(after)
+            assert (abs(made) <= fractions(off)).all()
+            assert (fractions(off) <= abs(made) * (1 + F(1, 2**40)) + F(1, 2**120)).all()
+            inexact += int((made != 0).any())
+        assert inexact == len(residuals)
+        assert products[-1].max() < enclosure._SMALL
+
+
+@pytest.mark.parametrize(("error", "radius"), [(F(1, 2), F(0)), (F(1, 2**10), F(1, 8))])
+def test_the_gain_s_error_in_joseph_s_form(error: F, radius: F, monkeypatch: pytest.MonkeyPatch, bits: None) -> None:
+    """By S times the square of a large error, and by the asymmetry of V times a small one."""
+    monkeypatch.setattr(enclosure, "_SUMS", 4.0)
+    restarted = enclosure._restarted
+
+    def with_error(values: Any) -> Any:
+        balls, errors = restarted(values)
+        calls.append(1)
+        return balls, errors if len(calls) == 1 else errors * 0 + float(error)
+
+    found = []
+    for added in (F(0), error):
+        calls: list[int] = []
+        monkeypatch.setattr(enclosure, "_restarted", with_error)
+        error = added
+        at = enclosure._disturbed(Form.JOSEPH, phase(), given(0.0), np.array([[float(radius)]]), 0.0)
+        found.append(F(at.covariance[0, 0]))
+    V = PHI * P * PHI + Q
+    wide = PHI * radius * PHI  # V may be off by this much
+    S, r = H * V * H + R, H * wide * H
+    turned = 2 * r / (S - r)  # the radius of S/S
+    askew = H * wide + (H * wide + H * V * turned + H * wide * turned)
+    exactly = 4 * (error * (S + r) * error + error * askew)
+    same(found[1] - found[0], exactly, 1e-6)
