@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 from exact_terms import fractions, same
 
-from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.kalman import bounded_run, bounded_steps
 from gpbnb.kalman.bounded_run import BoundedRun
+from gpbnb.kalman.factors import covariance_of_factors
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import bound, gains
+from gpbnb.kalman.guarantee import bound, gains, horizon
 from gpbnb.kalman.guarantee.bound import from_schedule, limits
-from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits
-from gpbnb.kalman.guarantee.linear import LinearFilter, state_space
+from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits, units
+from gpbnb.kalman.guarantee.linear import LinearFilter, _peak_gain, state_space
 from gpbnb.kalman.guarantee.program import Builder, Program, steps_in_python
 from gpbnb.kalman.model import LinearModel
 
@@ -291,3 +293,174 @@ def test_the_error_of_the_exact_gain_reaches_the_schedule(monkeypatch: pytest.Mo
     late = gains.schedule(model, FMT, Form.INNOVATION, most=5)
     assert not late.settled
     assert np.array_equal(late.dK, run.bounds[1][: late.steps])
+
+
+# -- blocks of steps --------------------------------------------------------------------------------------------------
+
+
+def test_a_column_that_is_zero_in_the_first_block_joins_the_slack_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two states: the second column has a limit of zero at first, so that it gets no segment of its own."""
+    G = np.array([[[1.0, -3.0], [2.0, 0.5]], [[0.25, -5.0], [-1.0, 7.0]]])
+    both = np.zeros((2, 2, 2))
+    given = disturbances(2, F=both, spread=both, G=G, slack=np.array([[0.5, 0.25], [1.0, 2.0]]))
+    first, later = given._replace(limits=np.array([[2.0, 0.0]] * 2)), given._replace(limits=np.array([[2.0, 3.0]] * 2))
+    seen, none = [], np.zeros(2)
+
+    def forward(*arguments: Any) -> Any:
+        seen.append(arguments)
+        return next(bounds), np.arange(16.0).reshape(2, 2, 4) + 100 * len(seen)
+
+    bounds = iter([np.array([[1.0, 6.0], [4.0, 2.0]]), np.array([[3.0, 7.0], [2.0, np.nan]])])
+    monkeypatch.setattr(horizon, "forward", forward)
+    one = horizon._Carried(limits(2, 1, 1, 1), none, none, none, np.zeros((2, 4)))
+    part = np.array([ROUNDING, GAIN])
+    horizon._follow(one, first, part, 0, 2, 8)
+    assert one.worst.tolist() == [4, 6]
+    assert one.last.tolist() == [4, 2]
+    assert one.parts.tolist() == [[108, 109, 110, 111], [104, 105, 106, 107]]
+    horizon._follow(one, later, part, 2, 2, 8)
+    assert one.worst.tolist() == [4, np.inf]
+    assert one.parts.tolist() == [[108, 109, 110, 111], [212, 213, 214, 215]]
+    same(seen[0][4], fractions(given.slack))
+    same(seen[1][4], fractions(given.slack) + 3 * abs(fractions(G[:, :, 1])) * (1 + F(1, 2**40)), 1e-15)
+    for arguments, before in zip(seen, ([0, 0], [4, 2]), strict=True):
+        assert np.array_equal(arguments[2], G[:, :, :1])
+        assert np.array_equal(arguments[3], [[2.0]] * 2)
+        assert arguments[8].tolist() == before
+        # The largest of all disturbances of a state in the first block: 2 + 1/2 and 0.5 + 1, then 4 + 1/4 and 2 + 2.
+        assert arguments[9].tolist() == [2.5, 4.25]
+    assert [arguments[6] for arguments in seen] == [0, 2]
+
+
+def test_blocks_give_their_disturbances_all_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error of the exact gain, the assumed error, and no caps; coefficients are known exactly."""
+    model = LinearModel(Phi=[["1/2"]], H=[[["1"]], [["2"]]], Q=[["1"]], R=[["1"]], x0=["0"], P0=[["1"]])
+    seen, true = [], horizon.disturbances
+
+    def disturbances_seen(*arguments: Any) -> Any:
+        seen.append([each.copy() if isinstance(each, np.ndarray) else each for each in arguments])
+        return true(*arguments)
+
+    monkeypatch.setattr(horizon, "disturbances", disturbances_seen)
+    list(horizon.bounds_in_blocks(model, FMT, [limits(1, 1, 10, 5)], [[0.5]], 6, block=4))
+    run = BoundedRun(model.rounded(FMT), None, Form.INNOVATION, range(1, 7))
+    run.take(np.zeros((6, 1)))
+    done = 0
+    for *_, coefficients, offsets, table, Phi, HPhi, exact_gain, dK, within, assumed, caps in seen:
+        count = len(coefficients)
+        assert np.array_equal(dK, run.bounds[1][done : done + count])
+        assert (dK > 0).all()
+        assert np.array_equal(exact_gain, run.G[done : done + count].reshape(count, 1, 1, 2))
+        assert not offsets.any()
+        assert table == units(FMT)
+        assert (Phi[..., 0] == 0.5).all()
+        assert list(HPhi[:, 0, 0, 0]) == [0.5 + 0.5 * (k % 2) for k in range(done, done + count)]
+        assert (within.state, within.innovation, assumed) == ([10], [5], [0.5])
+        assert np.isinf(caps).all()
+        done += count
+    assert done == 6
+
+
+# -- the worst-case peak gain -----------------------------------------------------------------------------------------
+
+
+def test_the_rest_of_a_peak_gain() -> None:
+    """Two states that never meet: the gain from one to the other is zero, and its upper end is the rest alone."""
+    A, B, C = [["1/2", "0"], ["0", "1/4"]], [["3", "0"], ["0", "1"]], [["1", "0"], ["0", "5"]]
+    found, negligible = _peak_gain(A, B, C, None, 256)
+    assert found is not None
+    # The norm of A is 1/2 from the first power on, and 3 the largest entry of B.
+    left, within = F(2), F(3)
+    steps, first, row = 0, 5 * left * within, lambda steps: max(F(1, 2**steps), F(5, 4**steps))
+    while not row(steps) * left * within < first / 2**100:
+        steps += 64
+    tail = row(steps) * left * within
+    up = 1 + F(1, 2**50)
+    same(found.high[0, 1], tail * up, 1e-15)
+    same(found.high[0, 0], 6 * up, 1e-15)
+    same(found.high[1, 1], F(20, 3) * up, 1e-15)
+    assert F(found.high[0, 0]) >= 6 >= F(found.low[0, 0])
+    assert found.low[0, 1] == 0
+    assert negligible == float(first) / 2**100
+
+
+def test_a_peak_gain_counts_the_growth_before_a_power_contracts() -> None:
+    """The norm of A is 8 and that of A² is 17/4: only the fourth power contracts, and B grows to 8 before that."""
+    A = [[F(1, 2), F(15, 2)], [F(0), F(1, 4)]]
+    B, C, D = [[F(0)], [F(1)]], [[F(0), F(0)], [F(1), F(0)]], [[F(7, 8)], [F(-1, 4)]]
+    power, N = np.array(A), 1
+    while not max(abs(power).sum(axis=1)) < 1:
+        power, N = power @ power, 2 * N
+    assert N > 2
+    moving, total = np.array(B), np.zeros((2, 1), dtype=object)
+    for _ in range(N):
+        total, moving = total + abs(moving), np.array(A) @ moving
+    left, within = 1 / (1 - max(abs(power).sum(axis=1))), total.max()
+    found, negligible = _peak_gain(A, B, C, D, 256)
+    assert found is not None
+    same(negligible, left * within / 2**100, 1e-15)
+    row, steps = np.array(C[1]), 0
+    while not abs(row).sum() * left * within < left * within / 2**100:
+        row, steps = row @ np.array(A), steps + 1
+    # The output that sees nothing has its direct term alone, and nothing is left of its own row.
+    assert F(7, 8) < F(found.high[0, 0]) < F(7, 8) * (1 + F(1, 2**48))
+    response, exactly = np.array(B), F(1, 4)
+    for _ in range(400):
+        exactly, response = exactly + abs(response[0, 0]), np.array(A) @ response
+    assert exactly <= F(found.high[1, 0]) < exactly * (1 + F(1, 2**48))
+    assert F(found.low[1, 0]) <= exactly
+
+
+# -- runs with the contraction bound ----------------------------------------------------------------------------------
+
+
+def correlated() -> LinearModel:
+    return LinearModel(
+        Phi=[["0.9", "0.1"], ["-0.2", "0.8"]], H=[["1", "0.5"]], Q=[["1", "0.1"], ["0.1", "2"]], R=[["2"]],
+        x0=["1", "-1"], P0=[["3", "1"], ["1", "3"]],
+    )  # fmt: skip
+
+
+def test_factors_of_the_first_covariance_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The UD form begins with rounded factors: the bound takes in the distance of their product."""
+    seen, fmt = [], FloatFormat(2, 9, Rounding.CHOP)
+    monkeypatch.setattr(bounded_run, "contraction_start", lambda *given: seen.append(given))
+    run = BoundedRun(correlated(), fmt, Form.UD, [1])
+    off = abs(covariance_of_factors(run.exactly(run.P)) - correlated().rounded(fmt).P0)
+    assert off.max() > 0
+    for found, exactly in zip(seen[0][2].ravel(), off.ravel(), strict=True):
+        assert exactly <= F(found) <= exactly * (1 + F(1, 2**49))
+    BoundedRun(correlated(), fmt, Form.INNOVATION, [1])
+    assert not seen[0][1].any()
+    assert not seen[1][2].any()
+
+
+@pytest.mark.parametrize("form", [Form.INNOVATION, Form.UD])
+def test_each_step_has_the_errors_of_its_evaluation(form: Form, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the repeated step, in units of double-double; the bound and the gain's bound contain them."""
+    errors, steps, used = [], [], []
+    for name, seen in (("evaluation_errors", errors), ("contraction_step", steps), ("gain_error_bound", used)):
+        function = getattr(bounded_steps, name)
+
+        def noted(*given: Any, function: Any = function, seen: list[Any] = seen) -> Any:
+            found = function(*given)
+            seen.append((given, found))
+            return found
+
+        monkeypatch.setattr(bounded_steps, name, noted)
+    run = BoundedRun(correlated(), FMT, form, [1, 2, 3])
+    first = covariance_of_factors(run.exactly(run.P)) * (1 + F(1, 2**51)) if form is Form.UD else run.exactly(run.P)
+    run.take(np.array([[1.0], [-2.0], [3.0]]))
+    assert all(F(errors[0][0][5][i, i]) >= first[i, i] for i in range(2))
+    assert len(errors) == len(steps) == len(used) == 3
+    for (given, (dq, dT, dK, dy)), (taken, _), (asked, _) in zip(errors, steps, used, strict=True):
+        assert given[9] == 2.0**-100
+        size = given[5]
+        # Cancellation inside a product of factors goes by the standard deviations.
+        root = np.sqrt(size[0, 0] * size[1, 1])
+        assert (np.abs(size[0, 1]) > root * (1 - 1e-15)) == (form is Form.UD)
+        assert np.abs(size[0, 1]) < root * (1 + 1e-15)
+        for found, exactly in zip(taken[10:], (dq, dT, dK, dy), strict=True):
+            assert np.array_equal(found, exactly)
+            assert (found > 0).all()
+        assert asked[3] is dK
