@@ -125,3 +125,15 @@ def test_the_probabilistic_count_with_few_digits():
     spread = math.sqrt(2 * math.log(2 / failure)) / (1 - 1 / 8)
     expected = math.exp(spread * math.sqrt(5) / 8 + 5 / 64 / (1 - 1 / 8)) - 1
     assert gamma_probabilistic(n, u, failure) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_relative_bound_is_one_of_the_least_norm_that_the_true_inverse_may_have():
+    x = FMT.array([["0.375", "-0.25"], ["0.125", "0.75"]])
+    norm = column_sum_norm(fractions(x))
+    for bound in (F(1, 8), F(1, 3)):
+        given = float(bound)
+        exact = F(given) / (norm - F(given))
+        assert exact <= F(bounds._relative(given, x)) <= exact * (1 + F(1, 2**50))
+    with pytest.raises(ValueError, match="exceeds the norm"):
+        bounds._relative(1.0, x)
+    assert norm == 1

@@ -119,6 +119,8 @@ def test_the_gain_is_known_as_long_as_the_roundings_allow(kernel, zeta, lost):
     assert exact < 1
     assert (exact * (1 + 4 * SHARE) * (1 + SHARE) >= 1) is lost
     assert (found.eta == np.inf) is lost
+    assert (found.zeta == np.inf) is lost
+    assert np.isinf(found.gain).all() == lost
 
 
 def test_evaluation_errors(kernel):
@@ -202,3 +204,79 @@ def test_a_companion_takes_its_roundings_in(monkeypatch):
     assert F(found) > 1 + F(1, 2**53)  # 1 + 2**-53 rounds to 1
     monkeypatch.setattr(contraction, "_U", 1 / 64)
     same(contraction.companion_bound([-3.0], [0.25]), F(13, 4) * (1 + F(4, 64)))
+
+
+def test_evaluation_errors_of_two_states_and_measurements(kernel):
+    """As for one; an asymmetric covariance counts with the larger of two entries, and sizes of S with all pivots."""
+    unit = F(1, 4096)
+    Phi = [[F(3, 2), F(-1, 4)], [F(1, 8), F(1, 2)]]
+    H = [[F(3, 4), F(1, 2)], [F(-1, 4), F(2)]]
+    K = [[F(1, 2), F(-1, 8)], [F(1, 4), F(3, 8)]]
+    Q, R, P = ([[F(a), F(b)], [F(c), F(d)]] for a, b, c, d in ((2, -1, -1, 3), (1, 0, 0, 4), (5, 1, -2, 6)))
+    S = [[F(8), F(0)], [F(0), F(-4)]]
+    x, z = [F(-3, 5), F(7, 8)], [F(4, 9), F(-2)]
+    floats = [np.array(each, dtype=object).astype(float) for each in (Phi, H, Q, R, x, P, z, K, S)]
+    found = plain(kernel.evaluation_errors)(*floats, float(unit))
+    aPhi, aH, aK, aQ, aR, ax, az = (abs(np.array(each, dtype=object)) for each in (Phi, H, K, Q, R, x, z))
+    many = (16 * (2 + 2) + 64) * unit * (1 + SHARE)
+    predicted = aPhi @ np.array([[F(5), F(2)], [F(2), F(6)]]) @ aPhi.T + aQ
+    PH = predicted @ aH.T
+    sizes = aH @ PH + aR
+    pivots = np.array([[np.sqrt(float(sizes[i, i] * sizes[j, j])) for j in range(2)] for i in range(2)])
+    # |Y| |S| is the identity: the largest row sum of the allowance is one share.
+    aS = np.array([[F(1, 8), F(0)], [F(0), F(1, 4)]]) + 2 * SHARE * np.array([[F(1, 8), F(1, 4)]] * 2)
+    dK = many * (PH + 2 * PH @ aS @ pivots) @ aS
+    left = np.eye(2, dtype=int) + aK @ aH
+    dT = many * (left @ predicted @ left.T + aK @ aR @ aK.T) + 2 * dK @ PH.T @ left.T + 2 * left @ PH @ dK.T
+    seen = az + aH @ aPhi @ ax
+    dq = many * (aPhi @ ax + aK @ seen) + dK @ seen
+    for value, exact in zip(found, (dq, dT, dK, many * seen), strict=True):
+        assert value == pytest.approx(np.asarray(exact, dtype=float), rel=1e-12)
+    turned = [*floats[:5], floats[5].T, *floats[6:]]
+    for value, other in zip(found, plain(kernel.evaluation_errors)(*turned, float(unit)), strict=True):
+        assert np.array_equal(value, other)
+
+
+def test_distances_of_inverses_from_exact_ones(kernel, monkeypatch):
+    """1/49 times 49 is not 1 in float64; without other allowances, this is left."""
+    monkeypatch.setattr(kernel, "_many", lambda n, m: 0.0)
+    assert (1 / 49) * 49 == 1 - 2.0**-53
+    assert kernel._inverse(one(49))[1] == 2.0**-53
+    Y, error = kernel._inverse_general(one(49))
+    assert error == 2 * 2.0**-53 * (1 / 49)
+    assert abs(F(Y[0, 0]) - F(1, 49)) <= F(error[0, 0])
+
+
+def test_the_largest_row_counts_in_an_inverse(kernel):
+    S = np.array([[0.0, 2.0], [4.0, 0.5]])
+    Y, error = kernel._inverse_general(S)
+    assert np.array_equal(Y, [[-0.0625, 0.25], [0.5, 0.0]])
+    # |Y| |S| is 1 and 0.25, 0 and 1: here the first row sum is the largest.
+    assert error == pytest.approx(2 * 1.25 * float(SHARE) * np.abs(Y).sum(axis=0) * np.ones((2, 2)), rel=1e-13)
+
+
+def test_an_inverse_of_three_rows(kernel, monkeypatch):
+    """Two eliminations below and above each pivot; 67 times the inverse is integer."""
+    monkeypatch.setattr(kernel, "_many", lambda n, m: 2.0**-46)
+    S = np.array([[4.0, 2.0, 1.0], [2.0, 5.0, 3.0], [1.0, 3.0, 6.0]])
+    exact = [[F(21, 67), F(-9, 67), F(1, 67)], [F(-9, 67), F(23, 67), F(-10, 67)], [F(1, 67), F(-10, 67), F(16, 67)]]
+    Y, error = kernel._inverse_general(S)
+    for i in range(3):
+        for j in range(3):
+            assert sum(exact[i][k] * F(S[k, j]) for k in range(3)) == (i == j)
+            assert abs(F(Y[i, j]) - exact[i][j]) <= F(error[i, j]) < 1e-12
+
+
+def test_only_a_positive_matrix_counts_as_one(kernel):
+    """The eigenvalues of B are 3.5 and 0.5, its diagonal is 2."""
+    B = np.array([[2.0, 1.5], [1.5, 2.0]])
+    assert [kernel._is_positive(mu, B) for mu in (3.4, 3.5, 3.6)] == [False, False, True]
+    assert not kernel._is_positive(2.0, B)
+    root = np.array([[1.0, 1.0], [0.0, 1.0]])
+    golden = (1 + np.sqrt(5)) / 2
+    assert golden <= plain(kernel._norm2)(root) < golden * (1 + 1e-3)
+
+
+def test_weights_are_a_factor(kernel):
+    L = np.array([[2.0, 0.0, 0.0], [3.0, 4.0, 0.0], [-1.0, 2.0, 5.0]])
+    assert np.array_equal(plain(kernel._weights)(L @ L.T), L)
