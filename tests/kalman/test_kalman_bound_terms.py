@@ -416,9 +416,13 @@ def test_a_peak_gain_counts_the_growth_before_a_power_contracts() -> None:
 
 def correlated() -> LinearModel:
     return LinearModel(
-        Phi=[["0.9", "0.1"], ["-0.2", "0.8"]], H=[["1", "0.5"]], Q=[["1", "0.1"], ["0.1", "2"]], R=[["2"]],
-        x0=["1", "-1"], P0=[["3", "1"], ["1", "3"]],
-    )  # fmt: skip
+        Phi=[["0.9", "0.1"], ["-0.2", "0.8"]],
+        H=[["1", "0.5"], ["0.3", "-1"]],
+        Q=[["1", "0.1"], ["0.1", "2"]],
+        R=[["2", "0.5"], ["0.5", "1"]],
+        x0=["1", "-1"],
+        P0=[["3", "1"], ["1", "3"]],
+    )
 
 
 def test_factors_of_the_first_covariance_may_be_off(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -450,10 +454,14 @@ def test_each_step_has_the_errors_of_its_evaluation(form: Form, monkeypatch: pyt
         monkeypatch.setattr(bounded_steps, name, noted)
     run = BoundedRun(correlated(), FMT, form, [1, 2, 3])
     first = covariance_of_factors(run.exactly(run.P)) * (1 + F(1, 2**51)) if form is Form.UD else run.exactly(run.P)
-    run.take(np.array([[1.0], [-2.0], [3.0]]))
+    z = np.array([[1.0, 0.5], [-2.0, 4.0], [3.0, -0.25]])
+    run.take(z)
+    model = correlated().rounded(FMT)
+    before = [fractions(model.x0), *run.exactly(run.X)[:2, :, 0]]
     assert all(F(errors[0][0][5][i, i]) >= first[i, i] for i in range(2))
     assert len(errors) == len(steps) == len(used) == 3
-    for (given, (dq, dT, dK, dy)), (taken, _), (asked, _) in zip(errors, steps, used, strict=True):
+    for k, ((given, (dq, dT, dK, dy)), (taken, _), (asked, _)) in enumerate(zip(errors, steps, used, strict=True)):
+        same(taken[7], fractions(z[k]) - model.H[0] @ model.Phi[0] @ before[k], 1e-15)
         assert given[9] == 2.0**-100
         size = given[5]
         # Cancellation inside a product of factors goes by the standard deviations.

@@ -29,3 +29,13 @@ def test_bound_and_errors_step_by_step() -> None:
     assert np.array_equal(adversary.get_ydata(), np.abs(chosen[:, 0]))
     assert np.array_equal(noise.get_ydata(), np.abs(random[:, 0]))
     assert "m" in ax.get_ylabel()
+
+
+def test_every_line_of_the_figure_can_be_seen() -> None:
+    found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
+    errors = np.full((5, 2), 1e-6)
+    _, (ax,) = figure()
+    draw_errors(ax, found, errors, 2 * errors, 0, "position, m")
+    bound, chosen, random = (line.get_linewidth() for line in ax.get_lines())
+    assert bound >= chosen == 1
+    assert random == 0.6

@@ -90,3 +90,18 @@ def test_a_saved_run_continues_with_the_same_bounds(tmp_path: Path, monkeypatch:
     for (_, (again,)), (_, (once,)) in zip(rest, whole[2:], strict=True):
         assert (again.worst == once.worst).all()
         assert (again.last == once.last).all()
+
+
+def test_the_command_follows_binary64_unless_told_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    none = horizon.Bounds(np.ones(10), np.ones(10), np.ones((10, 4)))
+    asked = []
+
+    def bounds(precision: int, steps: int, saved: Path) -> list[object]:
+        asked.append((precision, steps, saved.name))
+        return [(steps, [none, none])]
+
+    monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
+    for arguments in (["--steps", "3"], ["24", "--steps", "3"]):
+        assert horizon.main([*arguments, "--output", str(tmp_path)]) == 0
+    assert asked == [(53, 3, "state_53.pickle"), (24, 3, "state_24.pickle")]
+    assert [row.precision for row in horizon.load(tmp_path / horizon.FILE.name)] == [24, 24]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import threshold
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.records import update_largest
+from gpbnb.kalman.kernels.records import pairs_as_floats, update_largest
 from gpbnb.kalman.lockstep import REFERENCE, error_rows
 from gpbnb.kalman.records import Records
 from gpbnb.kalman.threshold import CELLS, FORMS, STATES, Cell, SimpleYear, compute, lockstep, rows, sample
@@ -182,3 +183,15 @@ def test_the_cells_are_distinct_and_cover_the_threshold():
     assert all(cell.count >= 100 for cell in near)
     assert all(cell.count >= 30 for cell in CELLS)
     assert dataclasses.replace(SMALL, first=5).key[-1] == "5"
+
+
+def test_pairs_of_any_exponent_become_the_nearest_floats_or_nearly() -> None:
+    """Powers up to 10**22 are exact: within them, one rounding; beyond them, another for the power."""
+    exponents = [-40, -24, -23, -22, -21, -1, 0, 1, 21, 22, 23, 24, 40]
+    pairs = np.array([[123456789, e] for e in exponents]).reshape(-1, 1, 1, 2)
+    out = np.empty((len(exponents), 1, 1))
+    pairs_as_floats.py_func(pairs, out)
+    for found, e in zip(out.ravel(), exponents, strict=True):
+        exactly = 123456789 * Fraction(10) ** e
+        roundings = 1 if abs(e) <= 22 else 3
+        assert abs(Fraction(float(found)) / exactly - 1) <= Fraction(roundings, 2**53), e

@@ -182,3 +182,16 @@ def test_every_cache_has_this_key():
     for path in caching.PACKAGE.rglob("*.py"):
         if path.name != "compiling.py":
             assert "cache=True" not in path.read_text(encoding="utf-8"), f"{path.name}: use `compiled` for a cache"
+
+
+def test_what_another_process_compiled_meanwhile_is_loaded(tmp_path, monkeypatch):
+    """The other process saves its result while this one waits for the lock."""
+    files, other = (compiling._Files(tmp_path, "function", ("a version",)) for _ in range(2))
+    released = []
+    monkeypatch.setattr(compiling, "lock", lambda path, wait: other.save("types", "compiled"))
+    monkeypatch.setattr(compiling, "unlock", lambda path, file: released.append(path))
+    monkeypatch.setattr(compiling, "_tell", lambda folder: pytest.fail("it would be compiled twice"))
+    assert files.load("types") == "compiled"
+    assert released == list(tmp_path.glob("*.compiled"))
+    assert files.load("types") == "compiled"
+    assert len(released) == 1

@@ -1,0 +1,39 @@
+"""The survey of guarantees: what a sample recomputes, and a published filter."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.guarantee import survey
+from gpbnb.kalman.guarantee.published import dynamax_tracking
+
+
+def test_a_sample_recomputes_no_row_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = tuple(SimpleNamespace(seed=seed) for seed in range(9))
+    computed: list[int] = []
+
+    def compute(seed: int) -> object:
+        computed.append(seed)
+        return rows[seed] if seed != 4 else None
+
+    monkeypatch.setattr(survey, "load", lambda: rows)
+    monkeypatch.setattr(survey, "compute", compute)
+    for count in (9, 20):
+        computed.clear()
+        assert survey.sample(count, 0) == [(rows[4], None)]
+        assert sorted(computed) == list(range(9))
+    computed.clear()
+    survey.sample(3, 1)
+    assert len(set(computed)) == 3
+
+
+def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
+    """Its notebook has Q = 0.001 I and an initial covariance of 0.1 I."""
+    model, unit = dynamax_tracking(), np.eye(4, dtype=int)
+    assert (model.Q[0] == exact(unit) / 1000).all()
+    assert (exact(unit) / 10 == model.P0).all()
+    assert (model.R[0] == exact(np.eye(2, dtype=int))).all()
