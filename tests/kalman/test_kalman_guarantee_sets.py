@@ -173,5 +173,18 @@ def test_steps_after_the_gain_has_settled(sets, loop: float) -> None:
         expected_parts[3] = residual + between
         largest = max(largest, expected_parts.sum())
         same(parts[lag, 0], expected_parts, 1e-14)
-        same(bounds[lag, 0], expected_parts.sum() * (1 + (6 + 1 + 64) * 4 * float(UNIT)), 1e-14)
+        # Six steps, one residual and two columns a step, one segment.
+        same(bounds[lag, 0], expected_parts.sum() * (1 + (6 + 1 + 2 + 1 + 64) * 4 * float(UNIT)), 1e-14)
     assert bool(carried) is (loop > 0.5)
+
+
+def test_steps_in_a_period_allow_for_each_addition() -> None:
+    """As of a certificate: 1 in the last step, and half units of 1 from each column, lost if added to it one by one."""
+    steps, columns, half = 50, 64, 2.0**-53
+    slack, part = np.zeros((steps, 1)), np.full(columns, envelope.ROUNDING)
+    slack[-1] = 1.0
+    ones, none = np.ones((steps, 1, 1)), np.zeros((steps, 1, 1))
+    given = ones, none, np.ones((steps, 1, columns)), np.full((steps, columns), half), slack, part
+    before = reach.nothing(1, part, 1)
+    bounds, _ = plain(reach.onward)(*given, 0, steps, before, np.ones(1), np.ones(1))
+    assert F(float(bounds[-1, 0])) >= 1 + steps * columns * F(half)

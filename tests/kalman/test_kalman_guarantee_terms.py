@@ -366,7 +366,7 @@ def certificate(starts, k, first, steady, most):
             c, lags = c @ loops[at], lag + 1
         if not steady and lags == k:
             begun, c = abs(c), c * 0
-        allowance = 1 + (lags + 64) * 4 * UNIT
+        allowance = 1 + (lags + 2 + 3 + 64) * 4 * UNIT  # two states and three columns
         out.append(([s * allowance for s in sums], residual * allowance, abs(c), begun))
     return out, lags
 
@@ -387,6 +387,24 @@ def test_certificate(monkeypatch, k: int, first: int, steady: bool, most: int) -
         same(found.start[i], begun, 1e-15)
     assert found.lags == lags
     assert (found.start.any(), found.tail.any()) == ((True, False) if not steady and most > k else (False, True))
+
+
+def half_units(steps: int, columns: int) -> tuple[np.ndarray, ...]:
+    """One state that keeps what it has: 1 in the last step, and half a unit of 1 from each column of every step."""
+    loops, none = np.ones((steps, 1, 1)), np.zeros((steps, 1, 1))
+    slack = np.zeros((steps, 1))
+    slack[-1] = 1.0
+    return loops, none, np.ones((steps, 1, columns)), np.full((steps, columns), 2.0**-53), slack
+
+
+def test_a_certificate_allows_for_each_addition() -> None:
+    """Added one by one to 1, half units are lost to rounding; the allowance must exceed all of them."""
+    assert 1.0 + 2.0**-53 == 1.0
+    steps, columns = 50, 64
+    given = (*half_units(steps, columns), np.full(columns, envelope.ROUNDING))
+    found = plain(envelope.certify)(*given, np.eye(1), steps, steps, False, steps, np.ones(1), 0.0)
+    assert found.lags == steps
+    assert F(float(found.sums.sum())) >= 1 + steps * columns * F(1, 2**53)
 
 
 def test_a_certificate_ends_once_its_rows_are_small() -> None:

@@ -378,7 +378,7 @@ def certify(
     period = rows - first
     sums, residual, tail, lags = np.zeros((t, 4)), np.zeros((t, n)), np.zeros((t, n)), 0
     begun = np.zeros((t, n))
-    following, rate = np.empty(n), np.empty(n)
+    following, rate, each = np.empty(n), np.empty(n), np.empty(4)
     for i in range(t):
         c = starts[i].copy()
         for lag in range(most):
@@ -390,9 +390,10 @@ def certify(
             elif at >= rows:
                 at = first + (at - first) % period
             size = 0.0
+            each[:] = 0.0  # a sum of its own, so that no term takes part in more than n + g + lags additions
             for j in range(n):
                 size += abs(c[j]) * scale[j]
-                sums[i, ROUNDING] += abs(c[j]) * slack[at, j]
+                each[ROUNDING] += abs(c[j]) * slack[at, j]
             if size < small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
                 break
             for g in range(g_count):
@@ -401,7 +402,9 @@ def certify(
                     for j in range(n):
                         s += c[j] * G[at, j, g]
                     if s != 0.0:
-                        sums[i, part[g]] += abs(s) * limits[at, g]
+                        each[part[g]] += abs(s) * limits[at, g]
+            for p in range(4):
+                sums[i, p] += each[p]
             following[:] = 0.0
             rate[:] = 0.0
             for j in range(n):
@@ -417,10 +420,10 @@ def certify(
                 begun[i] = np.abs(c)
                 c[:] = 0.0
         for r in range(n):
-            residual[i, r] *= 1 + (lags + 64) * 4 * _U
+            residual[i, r] *= 1 + (lags + n + g_count + 64) * 4 * _U
             tail[i, r] = abs(c[r])
         for p in range(4):
-            sums[i, p] *= 1 + (lags + 64) * 4 * _U
+            sums[i, p] *= 1 + (lags + n + g_count + 64) * 4 * _U
     return Certificate(sums, residual, tail, begun, lags)
 
 

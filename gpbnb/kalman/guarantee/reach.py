@@ -241,7 +241,7 @@ def onward(
     take_in(reach.segments, everything, whole, size)
     for p in range(3):
         _join(whole[0], reach.ellipsoids[p], size)
-    sums, value = np.zeros(4), np.zeros(4)
+    sums, value, each = np.zeros(4), np.zeros(4), np.zeros(4)
     c, c_next, anchor, difference = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for phase in range(1, min(period, lags) + 1):
         for i in range(n):
@@ -252,19 +252,23 @@ def onward(
             for lag in range(1, lags + 1):
                 at = first + (phase - lag) % period
                 c_next[:] = 0.0
+                each[:] = 0.0  # sums of their own, so that no term takes part in more additions than are allowed for
                 for j in range(n):
-                    sums[ROUNDING] += abs(c[j]) * slack[at, j]
+                    each[ROUNDING] += abs(c[j]) * slack[at, j]
                     if c[j] != 0.0:
                         for r in range(n):
                             c_next[r] += c[j] * F[at, j, r]
-                            residual += abs(c[j]) * spread[at, j, r] * b[r]
+                            each[START] += abs(c[j]) * spread[at, j, r] * b[r]
                 for g in range(g_count):
                     if limits[at, g] != 0.0:
                         s = 0.0
                         for j in range(n):
                             s += c[j] * G[at, j, g]
                         if s != 0.0:
-                            sums[part[g]] += abs(s) * limits[at, g]
+                            each[part[g]] += abs(s) * limits[at, g]
+                residual += each[START]
+                for p in range(3):
+                    sums[p] += each[p]
                 c[:] = c_next
                 if (lag - phase) % period == 0:
                     for j in range(n):
@@ -280,7 +284,8 @@ def onward(
                     for p in range(3):
                         parts[lag - 1, i, p] = sums[p] + value[p]
                         total += parts[lag - 1, i, p]
-                    bounds[lag - 1, i] = total * (1 + (lags + reach.segments.size + 64) * 4 * _U)
+                    count = lags + n * n + g_count + reach.segments.size
+                    bounds[lag - 1, i] = total * (1 + (count + 64) * 4 * _U)
                     largest = max(largest, total)
     return bounds, parts
 
