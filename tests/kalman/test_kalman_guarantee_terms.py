@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from exact_terms import UNIT, UP, fractions, plain, same
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman.guarantee import envelope
+from gpbnb.kalman.guarantee import enclosure, envelope, reach
 from gpbnb.kalman.guarantee.envelope import Limits, units
 from gpbnb.kalman.guarantee.program import ADD, MULTIPLY, Builder, Program, innovation_program
 
@@ -38,6 +39,55 @@ def test_units_are_rounded_outwards(base: int, rounding: Rounding) -> None:
         assert abs(F(high) + F(low) - true) <= true / 2**105
         inexact += F(power) != true
     assert (inexact > most) is (base == 10)
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+@pytest.mark.parametrize("subnormal", [True, False])
+def test_units_of_a_limited_range(rounding: Rounding, subnormal: bool) -> None:
+    """No error of any number on a fine grid is larger, and some come near: least numbers, flushed ones, the largest."""
+    fmt, fine = FloatFormat(2, 3, rounding, emin=-2, emax=2, subnormal=subnormal), 512
+    table, share = units(fmt), 2 if rounding in (Rounding.NEAREST, Rounding.EVEN) else 1
+    assert not table.sums_exact
+    assert table.exact.tolist() == [[1.0, 0.0]]
+    least = F(1, 16) / share if subnormal else F(1, 4)
+    most: dict[int, F] = {}
+    for k in range(-7 * fine, 7 * fine + 1):
+        value = F(k, fine)
+        at = int(np.searchsorted(table.powers, float(abs(value))))
+        most[at] = max(most.get(at, F(0)), abs(fmt.round(value) - value))
+    for at, error in most.items():
+        power = F(float(table.powers[at]))
+        if power < 7:
+            assert F(float(table.errors[at])) == max(power / 8 / share, least)
+        assert error <= F(float(table.errors[at]))
+        if power / 8 / share > least:
+            assert error >= F(float(table.errors[at])) * F(3, 4)
+    assert max(error for at, error in most.items() if table.powers[at] <= 0.25) >= least * F(3, 4)
+    assert table.powers[-1] == 7
+    assert table.errors[-1] == 1 / share
+    assert plain(envelope._largest_error)(table, np.nextafter(7.0, 8)) == np.inf
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+def test_units_of_fixed_point(rounding: Rounding) -> None:
+    fmt = FixedFormat(3, 4, rounding)
+    table, share = units(fmt), 2 if rounding in (Rounding.NEAREST, Rounding.EVEN) else 1
+    assert table.sums_exact
+    assert table.powers.tolist() == [8 - 1 / 16]
+    assert table.errors.tolist() == [1 / 16 / share]
+    most = max(abs(fmt.round(F(k, 512)) - F(k, 512)) for k in range(-500, 500))
+    assert F(1, 16) / share - F(1, 256) <= most <= F(1, 16) / share
+
+
+def test_allowances_of_modules_exceed_roundings_of_float64() -> None:
+    """A factor for sums of 2**12 terms, and one for the longest sums of an enclosure and its products."""
+    u = F(1, 2**53)
+    for module in (envelope, reach):
+        assert F(module._U) == u
+        assert (1 + u) ** (2**12 + 8) < F(module._UP) < 1 + F(1, 2**39)
+    assert (1 + u) ** 4 < F(enclosure._UP) < 1 + F(1, 2**49)
+    lags = math.ceil(math.log(enclosure._SMALL) / math.log(enclosure._SLOWEST)) + 8
+    assert 1 + 4 * lags * u < F(enclosure._SUMS) < 1 + F(1, 10**9)
 
 
 def test_the_error_of_a_result_is_that_of_the_next_power() -> None:
