@@ -18,7 +18,18 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman.guarantee import enclosure, envelope, reach
 from gpbnb.kalman.guarantee.envelope import Limits, units
-from gpbnb.kalman.guarantee.program import ADD, MULTIPLY, Builder, Program, innovation_program
+from gpbnb.kalman.guarantee.program import (
+    ADD,
+    MULTIPLY,
+    Builder,
+    Program,
+    biquad_program,
+    controller_program,
+    innovation_program,
+    loop_program,
+    sequential_program,
+    state_space_program,
+)
 
 # -- units ------------------------------------------------------------------------------------------------------------
 
@@ -379,6 +390,40 @@ def test_disturbances_where_everything_cancels(monkeypatch, case: Any, within: A
         same(getattr(found, name)[0], exactly[name])
     assert (exactly["loop"] == 0).all()
     assert (exactly["gain"] == 0).all()
+
+
+def output_that_is_used_again() -> Program:
+    """A result that is a term of a sum, too: its rounding error has an effect of its own."""
+    build = Builder(2, 1)
+    (x, y), (z,) = build.states, build.inputs
+    a = build.add(build.multiply(0, x), build.multiply(1, z))
+    return build.finish([a, build.subtract(a, build.multiply(2, y))], 3)
+
+
+def sum_that_is_used_twice() -> Program:
+    build = Builder(2, 1)
+    (x, y), (z,) = build.states, build.inputs
+    a = build.add(build.multiply(0, x), build.multiply(1, z))
+    return build.finish([build.subtract(a, build.multiply(2, y)), build.add(build.multiply(3, y), a)], 4)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        sum_that_is_used_twice(),
+        small_program(), difference_program(), innovation_of_two(), differences_of_measurements(),
+        output_that_is_used_again(), loop_program(2, 2), innovation_program(3, 2), sequential_program(3, 2),
+        state_space_program(2, 1), biquad_program(), controller_program(),
+    ],
+)  # fmt: skip
+def test_operations_of_a_group_have_the_effect_of_its_root(program: Program) -> None:
+    """Up to the sign; coefficients that have no factor in common, so that no two products agree by chance."""
+    coefficients = [F(2 * k + 3, 64 + k) for k in range(program.coefficients)]
+    effects = [effect(program, coefficients, o) for o in range(len(program.operations))]
+    for o, group in enumerate(program.groups.tolist()):
+        root = effects[program.roots[group]]
+        assert (effects[o] == root).all() or (effects[o] == -root).all()
+    assert len(program.roots) < len(program.operations)
 
 
 # -- sums over all earlier steps --------------------------------------------------------------------------------------
