@@ -25,6 +25,8 @@ from gpbnb.kalman.guarantee.program import (
     Program,
     biquad_program,
     controller_program,
+    effects,
+    functionals,
     innovation_program,
     loop_program,
     sequential_program,
@@ -119,6 +121,50 @@ def test_products_with_powers_of_the_base_are_exact() -> None:
         (1e-3, 0.0, False), (1e-3, -low, False), (20.0, 0.0, False), (1e305, 0.0, False),
     ):  # fmt: skip
         assert is_power(table, high, rest) is expected
+
+
+# -- double-double ----------------------------------------------------------------------------------------------------
+
+PAIRS = [
+    (1 / 3, 1 / 7),
+    (-1e10 / 3, 1e-9 / 7),
+    (2.0**60 / 3, -(2.0**60) / 3 * (1 + 2.0**-50)),
+    (0.1, 0.1),
+    (1e-3 / 7, 1e5),
+]
+
+
+@pytest.fixture
+def exactly(monkeypatch):
+    for name in ("_two_sum", "_two_product"):
+        monkeypatch.setattr(envelope, name, plain(getattr(envelope, name)))
+
+
+@pytest.mark.parametrize(("a", "b"), [*PAIRS, *((b, a) for a, b in PAIRS)])
+def test_sums_and_products_have_no_error(a: float, b: float) -> None:
+    s, e = plain(envelope._two_sum)(a, b)
+    assert s == a + b
+    assert F(s) + F(e) == F(a) + F(b)
+    p, e = plain(envelope._two_product)(a, b, a * b)
+    assert p == a * b
+    assert F(p) + F(e) == F(a) * F(b)
+    assert e != 0
+
+
+@pytest.mark.parametrize(("a", "b"), PAIRS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_differences_and_products_of_pairs(exactly, a: float, b: float, sign: int) -> None:
+    """Low parts of a third of the last digit, so that each enters; errors are far below the allowance of 2**-86."""
+    left, right, third = ((x, sign * x * 2.0**-53 / y) for x, y in ((a, 3), (b, 7), (a * b, -5)))
+    of = lambda pair: F(pair[0]) + F(pair[1])  # noqa: E731
+    high, low = found = plain(envelope._minus)(left, right)
+    assert abs(of(found) - (of(left) - of(right))) <= (abs(of(left)) + abs(of(right))) / 2**100
+    assert high + low == high
+    for start in (third, (-third[0], third[1]), (0.0, 0.0)):
+        high, low = found = plain(envelope._plus_product)(start, left, right)
+        exact = of(start) + of(left) * of(right)
+        assert abs(of(found) - exact) <= (abs(of(start)) + abs(of(left) * of(right))) / 2**100
+        assert high + low == high
 
 
 # -- disturbances of a step -------------------------------------------------------------------------------------------
@@ -419,11 +465,32 @@ def sum_that_is_used_twice() -> Program:
 def test_operations_of_a_group_have_the_effect_of_its_root(program: Program) -> None:
     """Up to the sign; coefficients that have no factor in common, so that no two products agree by chance."""
     coefficients = [F(2 * k + 3, 64 + k) for k in range(program.coefficients)]
-    effects = [effect(program, coefficients, o) for o in range(len(program.operations))]
+    each = [effect(program, coefficients, o) for o in range(len(program.operations))]
     for o, group in enumerate(program.groups.tolist()):
-        root = effects[program.roots[group]]
-        assert (effects[o] == root).all() or (effects[o] == -root).all()
+        root = each[program.roots[group]]
+        assert (each[o] == root).all() or (each[o] == -root).all()
     assert len(program.roots) < len(program.operations)
+
+
+@pytest.mark.parametrize("program", [small_program(), sum_that_is_used_twice(), innovation_program(3, 2)])
+def test_functions_and_effects_of_a_program(program: Program) -> None:
+    """Coefficients of 106 bits; what all signs made positive would give is the size of each function."""
+    coefficients = [F(2 * k + 3, 64 + k) * (-1) ** k for k in range(program.coefficients)]
+    pairs = as_pairs(np.array(coefficients))
+    stored = [F(high) + F(low) for high, low in pairs.tolist()]
+    first, values = program.n + program.m, program.n + program.m + len(program.operations)
+    rows, sizes = np.empty((values, first, 2)), np.empty((values, first))
+    functionals(program.operations, pairs, first, rows, sizes)
+    exact_rows, exact_sizes = linear(program, stored), linear(program, stored, positive=True)
+    assert (abs(fractions(rows).sum(axis=2) - exact_rows) <= exact_sizes / 2**90).all()
+    same(sizes, exact_sizes, 1e-14)
+    G, reached = np.empty((values, program.n)), np.empty((values, program.n))
+    plain(effects)(program.operations, program.outputs, pairs[:, 0].copy(), first, G, reached)
+    for o in range(len(program.operations)):
+        whole = effect(program, stored, o, positive=True)
+        same(reached[first + o], whole, 1e-14)
+        error = abs(fractions(G[first + o]) - effect(program, stored, o))
+        assert (error <= (3 * len(program.operations) + 3) * whole / 2**53).all()
 
 
 # -- sums over all earlier steps --------------------------------------------------------------------------------------
@@ -484,6 +551,16 @@ def test_certificate(monkeypatch, k: int, first: int, steady: bool, most: int) -
     assert (found.start.any(), found.tail.any()) == ((True, False) if not steady and most > k else (False, True))
 
 
+def test_a_certificate_has_the_lags_of_its_longest_row() -> None:
+    """The second state forgets everything at once, and its row ends first."""
+    loop, none = np.array([[[0.5, 0.0], [0.0, 0.0]]]), np.zeros((1, 2, 2))
+    given = (loop, none, np.ones((1, 2, 1)), np.ones((1, 1)), np.zeros((1, 2)), np.zeros(1, np.int64))
+    for starts in (np.eye(2), np.eye(2)[::-1]):
+        found = plain(envelope.certify)(*given, starts, 1, 0, True, 50, np.ones(2), 0.01)
+        assert found.lags == 7
+        assert sorted(found.tail[:, 0]) == [0, 2.0**-7]
+
+
 def half_units(steps: int, columns: int) -> tuple[np.ndarray, ...]:
     """One state that keeps what it has: 1 in the last step, and half a unit of 1 from each column of every step."""
     loops, none = np.ones((steps, 1, 1)), np.zeros((steps, 1, 1))
@@ -534,3 +611,50 @@ def test_peaks(monkeypatch) -> None:
         most_v.append((fractions(Z)[0] + seen) * UP)
     same(peak_x, most_x)
     same(peak_v, [max(most_v)], 1e-15)
+
+
+STEPS = [(1, False, 1), (2, False, 2), (3, False, 1), (4, False, 2), (1, True, 2), (2, True, 1)]
+"""Of the peaks below: the step, whether the past is infinite, and the row of the step after it."""
+
+
+@pytest.mark.parametrize("largest", range(6))
+def test_the_peak_of_each_step_counts(monkeypatch, largest: int) -> None:
+    """Certificates of 1 but for one step, whose terms are all seen."""
+    monkeypatch.setattr(envelope, "_UP", float(UP))
+    HPhi = np.array([[[0.5, -2.0]], [[1.0, 0.25]], [[-0.75, 1.5]]])
+    X, Z, x0 = np.array([2.0, 3.0]), np.array([0.125]), np.array([0.25, 0.5])
+    rng, asked = np.random.default_rng(5), []
+    sums, residual, tail, start = (rng.integers(8, 64, (3, size)) / 4 for size in (4, 2, 2, 2))
+    one, none = np.full((3, 4), 0.25), np.zeros((3, 2))
+
+    def certify(*given: Any) -> Any:
+        asked.append((given[7], given[9], given[6].copy()))
+        there = len(asked) == largest + 1
+        return envelope.Certificate(*((sums, residual, tail, start) if there else (one, none, none, none)), 1)
+
+    monkeypatch.setattr(envelope, "certify", certify)
+    peak_x, peak_v = plain(envelope.peaks)(*PERIODIC, HPhi, X, np.zeros(1), Z, x0, 1, 4, True, 3, np.ones(2), 0.0)
+    for (k, steady, starts), (step, settled, following) in zip(asked, STEPS, strict=True):
+        assert (k, steady) == (step, settled)
+        assert np.array_equal(starts, np.vstack([np.eye(2), HPhi[following]]))
+    totals = [
+        sum(fractions(sums[i])) + (fractions(residual[i]) + fractions(tail[i])) @ fractions(X)
+        + fractions(start[i]) @ fractions(x0)
+        for i in range(3)
+    ]  # fmt: skip
+    same(peak_x, [totals[0] * UP, totals[1] * UP], 1e-15)
+    same(peak_v, [(totals[2] + F(1, 8)) * UP], 1e-14)
+
+
+def test_peaks_make_up_for_the_low_parts_of_rows(monkeypatch) -> None:
+    """Where all other terms vanish, 2**-50 of the row is left; and the first estimate is a peak."""
+    monkeypatch.setattr(envelope, "_UP", float(UP))
+    none = np.zeros((3, 4))
+    found = envelope.Certificate(none, none[:, :2], none[:, :2], none[:, :2], 1)
+    monkeypatch.setattr(envelope, "certify", lambda *_: found)
+    HPhi, X = np.array([[[0.5, -2.0]]] * 3), np.array([2.0, 3.0])
+    for x0 in (np.zeros(2), np.array([0.25, 0.5])):
+        given = HPhi, X, np.zeros(1), np.zeros(1), x0, 1, 4, True, 3, np.ones(2), 0.0
+        peak_x, peak_v = plain(envelope.peaks)(*PERIODIC, *given)
+        assert np.array_equal(peak_x, x0)
+        same(peak_v, [F(9, 8) * UP if x0.any() else 7 * F(1, 2**50) * UP], 1e-15)
