@@ -76,6 +76,21 @@ def test_a_column_counts_whatever_its_sign(monkeypatch: pytest.MonkeyPatch) -> N
     assert list(seen[0][5]) == [ROUNDING, LOOP]
 
 
+def test_rows_allow_for_the_sums_of_all_states(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is carried on is a sum over all states, 64 here; without any of it, the allowance is left."""
+    n = 64
+    sums, none = np.zeros((n, 4)), np.zeros((n, n))
+    sums[:, ROUNDING] = 1.0
+    schedule = state_space(np.eye(n, dtype=int) / F(2), np.ones((n, 1), dtype=int)).schedule(FMT)
+    monkeypatch.setattr(bound, "certify", lambda *_: Certificate(sums, none, none, none, 9))
+    monkeypatch.setattr(bound, "_radius", lambda _: 0.5)
+    monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(2, dtype=np.int64))
+    given = disturbances(1, slack=np.zeros((1, n)))
+    history, _, _ = bound._sums(schedule, given, np.full(n, 2.0), 50, True, 10, 1e6)
+    assert (1 + F(1, 2**53)) ** (n + 7) < F(history[0, 0]) < 1 + F(2 * n, 2**53)
+    assert (history == history[0, 0]).all()
+
+
 def test_the_first_steps_count_among_the_earlier_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     """Bounds of 9 at first and of 10 after that, above the 8 assumed: what is carried on is a share of the largest."""
     sums, residual, tail = [F(3), F(1, 2), F(1, 4), F(0)], F(1, 8), F(1, 16)
@@ -96,6 +111,28 @@ def test_the_first_steps_count_among_the_earlier_ones(monkeypatch: pytest.Monkey
     assert exactly < raised
     assert list(history[:2, 0]) == [9.0, 10.0]
     assert abs(F(float(history[2, 0])) / exactly - 1) < F(1, 2**51)
+
+
+def test_what_one_state_needs_takes_nothing_from_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first state's error was 9 at first, a quarter of which is carried on, though none is larger than 3.25 later.
+
+    The second state's error is 7.25 later, then 20 in some step: the bound is raised twice, but for this state only.
+    """
+    sums, share, none = np.zeros((2, 4)), np.array([[0.25, 0.0]] * 2), np.zeros((2, 2))
+    sums[:, GAIN] = 1.0, 5.0
+    given = one_state(2, first=1, program=state_space(np.eye(2, dtype=int), np.ones((2, 1), dtype=int)).program)
+    found, parts, known = disturbances(2, slack=np.zeros((2, 2))), np.zeros((1, 2, 4)), []
+    monkeypatch.setattr(bound, "certify", lambda *_: Certificate(sums, share, none, none, 9))
+    monkeypatch.setattr(bound, "forward", lambda *_: (np.array([[9.0, 1.0]]), parts))
+    monkeypatch.setattr(
+        bound, "onward", lambda *given: (known.append(given[10].copy()), (np.array([[2.0, 20.0]]), parts))[1]
+    )
+    monkeypatch.setattr(bound, "_radius", lambda _: 0.5)
+    monkeypatch.setattr(bound, "_parts_of", lambda _: np.zeros(2, dtype=np.int64))
+    history, _, _ = bound._sums(given, found, np.zeros(2), 50, True, 10, 1e6)
+    assert history[:2].tolist() == [[9, 1], [2, 20]]
+    same(history[2], [F(13, 4), F(29, 4)], 1e-14)
+    assert known[-1].tolist() == [9, 20 * (1 + 2.0**-30)]
 
 
 def test_a_filter_that_is_not_stable_repeats_its_period_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,6 +197,27 @@ def test_limits_from_measurements_begin_with_the_first_estimate(monkeypatch: pyt
     assert seen[-1][11] == 0  # without a first estimate, the past of the first steps is a part of the infinite one
 
 
+def test_limits_from_measurements_allow_for_longer_products(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two states, so that a product of a row with a column has two terms; one term after the other is seen."""
+    schedule = state_space([["1/2", "0"], ["0", "1/4"]], [["1"], ["1"]]).schedule(FMT)
+    nothing, seen = np.zeros((1, 2, 2)), []
+    monkeypatch.setattr(
+        bound, "peaks", lambda *given: (seen.append((given[4].copy(), given[5])), (np.array([5.0, 6.0]), np.ones(1)))[1]
+    )
+    tiny, up = F(2 * 2 + 30, 2**53), 1 + F(1, 2**30)
+    one = np.array([[[0.5], [3.0]]])
+    for changed, exactly in (
+        ({"K": one}, [tiny / 2 * 2, tiny * 3 * 2]),
+        ({"K": 0 * one, "gain": one}, [tiny / 2 * 2, tiny * 3 * 2]),  # the innovation's limit is the measurement's
+        ({"K": 0 * one, "loop": nothing + 0.25}, [tiny / 4 * 11 * up] * 2),
+    ):
+        found = disturbances(1, **({"loop": nothing, "gain": 0 * one, "spread": nothing} | changed))
+        monkeypatch.setattr(bound, "unit_disturbances", lambda _, found=found: found)
+        bound._from_measurements(schedule, Limits(np.full(2, np.inf), np.full(1, np.inf), np.array([2.0])), 9, True, 5)
+        same(seen[-1][0], [exactly], 1e-14)
+        assert list(seen[-1][1]) == [ROUNDING, LOOP, LOOP, GAIN]
+
+
 def caps_case() -> tuple[Program, gains.Schedule, Any, Limits]:
     """Two states; the functions of the operations differ in every entry."""
     build = Builder(2, 1)
@@ -201,7 +259,7 @@ def test_caps_of_operations(monkeypatch: pytest.MonkeyPatch) -> None:
     assert np.array_equal(limit, [[7.0]])
     assert (k, first, steady, most) == (1, 0, True, 50)
     K, spread = fractions(found.K[0, :, 0]), fractions(found.spread[0])
-    same(slack, [F(1, 2**48) * abs(K) * Z + spread @ X], 1e-15)
+    same(slack, [F(2 * 2 + 30, 2**53) * abs(K) * Z + spread @ X], 1e-15)
     for o in range(6):
         exactly = sum(fractions(sums[o])) + (fractions(residual[o]) + fractions(tail[o])) @ X + abs(of_input[o]) * Z
         sizes = sum(abs(s) * x for s, x in zip(of_state[o], X, strict=True)) + abs(of_input[o]) * Z

@@ -230,7 +230,7 @@ def expected(program, fmt, C, offsets, Phi, HPhi, K, dK, limits, b, caps, unit, 
         inputs = [abs(of_input[v, i]) + tiny * sizes[v, n + i] for i in range(m)]
         moved = [
             abs(of_state[v, j] + sum(of_input[v, i] * HPhi[i, j] for i in range(m)))
-            + F(1, 2**50) * (sizes[v, j] + sum(abs(of_input[v, i] * HPhi[i, j]) for i in range(m)))
+            + (m + 8) * unit * (sizes[v, j] + sum(abs(of_input[v, i] * HPhi[i, j]) for i in range(m)))
             for j in range(n)
         ]
         seen = sum(s * x for s, x in zip(nonzero, X, strict=True)) + sum(s * z for s, z in zip(inputs, Z, strict=True))

@@ -297,7 +297,7 @@ def _sums(
             each = np.array(certificate.sums)
             each[:, START] += carried
             row_parts.append(each)
-            rows.append(each.sum(axis=1) * (1 + 2.0**-48))
+            rows.append(each.sum(axis=1) * (1 + (n + 31) * 2.0**-53))  # n + 7 roundings
         new = np.max(rows, axis=0)
         if not (new <= largest).all():
             largest = np.maximum(largest, new * (1 + 2.0**-40))
@@ -324,12 +324,13 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     part = np.array([ROUNDING] * m + [LOOP] * n + [GAIN] * m)
     X, V = np.zeros(n), np.array(within.measurement)
     x0 = np.abs(given.x0.astype(np.float64)) * (1 + 2.0**-50)
+    tiny = (2 * n + 30) * 2.0**-53  # of the products of a row with these columns, and of their low parts
     HPhi = np.ascontiguousarray(given.HPhi[..., 0])
     early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
     for _ in range(60):
         limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
-        slack = 2.0**-48 * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
-        slack += (2.0**-48 * np.abs(found.loop) + found.spread) @ X
+        slack = tiny * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
+        slack += (tiny * np.abs(found.loop) + found.spread) @ X
         arrays = (found.F, found.spread, G, limit, slack, part)
         scale = (np.abs(G) * limit[:, None, :]).sum(axis=2).max(axis=0) + 1e-300
         peak_x, peak_v = peaks(
@@ -368,7 +369,8 @@ def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
     of_state, of_input = rows[first:, : program.n, 0], np.abs(rows[first:, program.n :, 0])
     found = _disturbances(given, within, np.zeros(program.n))
     limit = np.array(within.measurement)[None, :]
-    slack = 2.0**-48 * np.abs(found.K) @ within.measurement + found.spread @ within.state
+    tiny = (2 * program.n + 30) * 2.0**-53
+    slack = tiny * np.abs(found.K) @ within.measurement + found.spread @ within.state
     size = np.abs(found.K[0]) @ within.measurement + 1e-300
     peak = certify(
         found.F,

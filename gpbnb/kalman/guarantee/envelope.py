@@ -214,11 +214,11 @@ def disturbances(
             # The largest possible size of the result, by state and measurement, or by state and innovation.
             seen, known, carried = 0.0, 0.0, 0.0
             for j in range(n):
-                r, tiny = rows[v, j, 0], 2.0**-50 * sizes[v, j]
+                r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
                 by_innovation = r
                 for i in range(m):
                     by_innovation += rows[v, n + i, 0] * HPhi[k, i, j, 0]
-                    tiny += 2.0**-50 * abs(rows[v, n + i, 0] * HPhi[k, i, j, 0])
+                    tiny += (m + 8) * _U * abs(rows[v, n + i, 0] * HPhi[k, i, j, 0])
                 if r != 0.0:
                     seen += (abs(r) + 2.0**-90 * sizes[v, j]) * X[j]
                 if by_innovation != 0.0 or tiny != 0.0:
