@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from exact_terms import fractions, same
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import bounded_run, bounded_steps
 from gpbnb.kalman.bounded_run import BoundedRun
@@ -160,6 +161,14 @@ def test_the_bound_is_assumed_for_the_sizes_of_numbers(monkeypatch: pytest.Monke
     found = from_schedule(one_state(), limits(1, 1, state=1, innovation=1))
     assert 1 + F(found.bound[0]) / 2 <= F(found.bound[0]) < 2 * (1 + F(1, 2**29))
     assert found.for_ever
+
+
+@pytest.mark.parametrize(("measurement", "bounded"), [(1.5, True), (3.0, False)])
+def test_an_exact_sum_may_leave_the_range(measurement: float, bounded: bool) -> None:
+    """Fixed point up to 4: products stay within 3 and sums are exact, but a sum may reach 6."""
+    given = state_space([["1/2"]], [["1"]]).schedule(FixedFormat(2, 8))
+    found = from_schedule(given, limits(1, 1, measurement=measurement))
+    assert np.isfinite(found.bound).all() == bounded == found.for_ever
 
 
 # -- limits from measurements -----------------------------------------------------------------------------------------
@@ -400,7 +409,7 @@ def test_blocks_give_their_disturbances_all_that_is_known(monkeypatch: pytest.Mo
         return true(*arguments)
 
     monkeypatch.setattr(horizon, "disturbances", disturbances_seen)
-    list(horizon.bounds_in_blocks(model, FMT, [limits(1, 1, 10, 5)], [[0.5]], 6, block=4))
+    list(horizon.bounds_in_blocks(model, FMT, [limits(1, 1, 10, 5)], [[0.5]], 6, block=3))
     run = BoundedRun(model.rounded(FMT), None, Form.INNOVATION, range(1, 7))
     run.take(np.zeros((6, 1)))
     done = 0
