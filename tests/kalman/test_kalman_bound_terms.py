@@ -214,11 +214,11 @@ def test_limits_from_measurements_allow_for_longer_products(monkeypatch: pytest.
         bound, "peaks", lambda *given: (seen.append((given[4].copy(), given[5])), (np.array([5.0, 6.0]), np.ones(1)))[1]
     )
     tiny, up = F(2 * 2 + 30, 2**53), 1 + F(1, 2**30)
-    one = np.array([[[0.5], [3.0]]])
+    one = np.array([[[-0.5], [3.0]]])
     for changed, exactly in (
         ({"K": one}, [tiny / 2 * 2, tiny * 3 * 2]),
         ({"K": 0 * one, "gain": one}, [tiny / 2 * 2, tiny * 3 * 2]),  # the innovation's limit is the measurement's
-        ({"K": 0 * one, "loop": nothing + 0.25}, [tiny / 4 * 11 * up] * 2),
+        ({"K": 0 * one, "loop": nothing - 0.25}, [tiny / 4 * 11 * up] * 2),
     ):
         found = disturbances(1, **({"loop": nothing, "gain": 0 * one, "spread": nothing} | changed))
         monkeypatch.setattr(bound, "unit_disturbances", lambda _, found=found: found)
@@ -234,7 +234,7 @@ def caps_case() -> tuple[Program, gains.Schedule, Any, Limits]:
     (z,) = build.inputs
     a = build.add(build.multiply(0, x), build.multiply(1, z))
     program = build.finish([build.subtract(a, build.multiply(2, y)), build.multiply(3, a)], 4)
-    filter_ = LinearFilter(program, np.array([F(1, 2), F(3, 4), F(-3, 8), F(5, 4)], dtype=object))
+    filter_ = LinearFilter(program, np.array([F(1, 2), F(-3, 4), F(-3, 8), F(5, 4)], dtype=object))
     two = np.zeros((1, 2, 2))
     found = disturbances(
         1, F=two + 0.25, K=np.array([[[-0.5], [2.0]]]), spread=np.array([[[2.0**-45, 2.0**-46], [0, 2.0**-44]]])
@@ -245,7 +245,7 @@ def caps_case() -> tuple[Program, gains.Schedule, Any, Limits]:
 def test_caps_of_operations(monkeypatch: pytest.MonkeyPatch) -> None:
     program, given, found, within = caps_case()
     # Each operation is a function of the states before the step and of the measurement.
-    a, b, c = F(1, 2), F(3, 4), F(-3, 8)
+    a, b, c = F(1, 2), F(-3, 4), F(-3, 8)
     of_state = [[a, 0], [0, 0], [a, 0], [0, c], [a, -c], [a * F(5, 4), 0]]
     of_input = [0, b, b, 0, b, b * F(5, 4)]
     assert len(program.operations) == len(of_state)

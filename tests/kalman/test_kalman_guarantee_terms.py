@@ -302,7 +302,7 @@ def small_program() -> Program:
 
 GENERIC = (  # the first measurement has a limit of its own, the second that of the state and the innovation
     small_program(),
-    [F(3, 4), F(-5, 8), F(7, 16), F(3, 8), F(5, 4), F(0), F(2), F(-9, 8)],
+    [F(3, 4), F(-5, 8), F(7, 16), F(3, 8), F(-5, 4), F(0), F(2), F(-9, 8)],
     [F(0), F(1, 64), F(1, 32), F(1, 32), F(0), F(0), F(1, 128), F(1, 16)],
     [[F(1, 2), F(-1, 4)], [F(1, 8), F(3, 4)]],
     [[F(5, 8), F(-3, 8)], [F(1, 4), F(1, 2)]],
@@ -349,6 +349,15 @@ INNOVATION = (  # 1 - KH of the program is 2**-70, and K and Φ are those of the
     [[F(3)]],
     [[F(3, 2)]],
     [[2 - 2 * TINY]],
+    [[F(0)]],
+)
+MIRRORED = (  # the same with other signs of Φ, H and K
+    innovation_program(1, 1),
+    [F(-3), F(-1, 2), -(2 - 2 * TINY)],
+    [F(0), F(0), LITTLE],
+    [[F(-3)]],
+    [[F(3, 2)]],
+    [[-(2 - 2 * TINY)]],
     [[F(0)]],
 )
 DIFFERENCE = (
@@ -419,6 +428,10 @@ def test_disturbances(monkeypatch, fmt: FloatFormat, cap: float) -> None:
     [
         (INNOVATION, ([1.0], [2.0**-60], [2.0**-75]), 0.0),
         (INNOVATION, ([1.0], [4.0], [2.0**-75]), 0.0),
+        (MIRRORED, ([1.0], [2.0**-60], [2.0**-75]), 0.0),
+        (MIRRORED, ([1.0], [2.0**-60], [8.0]), 0.0),
+        ((*MIRRORED[:2], [F(0)] * 3, *MIRRORED[3:]), ([2.0**-90], [1.0], [2.0**-75]), 0.0),
+        (MIRRORED, ([2.0**-30], [2.0**-75], [2.0**-75]), 1.0),
         ((*INNOVATION[:2], [F(0)] * 3, *INNOVATION[3:]), ([1.0], [4.0], [2.0**-75]), 0.0),
         (INNOVATION, ([1.0], [2.0**-60], [8.0]), 0.0),
         (DIFFERENCE, ([1.0], [2.0**-75], [2.0**-75]), 0.0),
@@ -436,6 +449,23 @@ def test_disturbances_where_everything_cancels(monkeypatch, case: Any, within: A
         same(getattr(found, name)[0], exactly[name])
     assert (exactly["loop"] == 0).all()
     assert (exactly["gain"] == 0).all()
+
+
+@pytest.mark.parametrize("case", [INNOVATION, MIRRORED, TWO])
+def test_sizes_by_innovations_allow_for_their_sums(monkeypatch, case: Any) -> None:
+    """By the innovations, nothing is left of the state, but for roundings of float64; the measurements are large."""
+    m, unit = len(case[4]), F(1, 2**53)
+    within = ([1.0], [2.0**-70] * m, [8.0] * m)
+    found, exactly = found_disturbances(
+        monkeypatch,
+        FloatFormat(2, 300),
+        (*case, within, [F(0)]),
+        [np.inf] * len(case[0].operations),
+        unit,
+        1 + F(1, 2**40),
+    )
+    same(found.slack[0], exactly["slack"], 1e-13)
+    same(found.limits[0], exactly["limits"])
 
 
 def output_that_is_used_again() -> Program:
