@@ -137,3 +137,14 @@ def test_a_relative_bound_is_one_of_the_least_norm_that_the_true_inverse_may_hav
     with pytest.raises(ValueError, match="exceeds the norm"):
         bounds._relative(1.0, x)
     assert norm == 1
+
+
+def test_wilkinson_takes_sizes_of_negative_factors():
+    """Without pivoting, the largest entry of the lower factor is -12 here."""
+    a = FMT.array([["0.25", "1.5"], ["-3", "0.5"]])
+    factors, x = linalg.lu(a, pivot=False), linalg.inv(a, pivot=False)
+    lower, upper, X = (fractions(each) for each in (factors.lower, factors.upper, x))
+    assert lower.min() == -12
+    norm = column_sum_norm(X)
+    g = F(6, 2**16) / (1 - F(6, 2**16)) * 2 * 12 * 2 * abs(upper).max() * norm
+    close_above(bounds.wilkinson(factors, x), norm * g / (1 - g), 2)

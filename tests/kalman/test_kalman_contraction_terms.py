@@ -280,3 +280,53 @@ def test_only_a_positive_matrix_counts_as_one(kernel):
 def test_weights_are_a_factor(kernel):
     L = np.array([[2.0, 0.0, 0.0], [3.0, 4.0, 0.0], [-1.0, 2.0, 5.0]])
     assert np.array_equal(plain(kernel._weights)(L @ L.T), L)
+
+
+PLUS, FIRST, SECOND, MINUS = np.diag([1.0, 1.0]), np.diag([-1.0, 1.0]), np.diag([1.0, -1.0]), np.diag([-1.0, -1.0])
+
+
+@pytest.mark.parametrize(
+    ("D0", "D1", "E", "sign"),
+    [
+        (FIRST, PLUS, PLUS, 1),
+        (PLUS, SECOND, PLUS, 1),
+        (PLUS, PLUS, FIRST, 1),
+        (SECOND, FIRST, MINUS, 1),
+        (MINUS, SECOND, SECOND, -1),
+        (PLUS, PLUS, PLUS, -1),
+    ],
+)
+def test_no_bound_depends_on_the_sign_of_a_state_or_measurement(kernel, D0, D1, E, sign):
+    """States before and after the step with other signs, other signs of measurements, and of all residuals."""
+    L = np.array([[0.5, 0.0], [0.25, 0.75]])
+    Phi, H = np.array([[1.5, -0.25], [0.125, 0.5]]), np.array([[0.75, 0.5], [-0.25, 2.0]])
+    Q, R = np.array([[1.0, 0.5], [0.5, 2.0]]), np.array([[2.0, -0.75], [-0.75, 1.0]])
+    K, S = np.array([[0.5, -0.125], [0.25, 0.375]]), np.array([[80.0, 12.0], [12.0, -40.0]])
+    nu, q, T = np.array([3.0, -2.0]), np.array([-0.5, 0.125]), np.array([[-0.25, 0.125], [0.125, 0.5]])
+    errors = np.array([0.01, 0.02]), np.full((2, 2), 0.03), np.full((2, 2), 0.004), np.array([0.05, 0.06])
+    x, P, z = np.array([0.5, -3.0]), np.array([[2.0, -0.5], [-0.5, 1.0]]), np.array([4.0, -1.0])
+    used = K + np.array([[0.25, -0.5], [-0.125, 0.0625]])
+    found = []
+    for before, after, seen, s in ((PLUS, PLUS, PLUS, 1), (D0, D1, E, sign)):
+        model = after @ Phi @ before, seen @ H @ after, after @ Q @ after, seen @ R @ seen
+        gain, known = after @ K @ seen, seen @ S @ seen
+        start = Contraction(before @ L @ before, float(ETA), 0.02, 1.0, np.zeros(2))
+        residuals = s * seen @ nu, s * after @ q, s * after @ T @ after
+        bound = plain(kernel.contraction_step)(start, *model, gain, known, *residuals, *errors)
+        evaluated = plain(kernel.evaluation_errors)(
+            *model, s * before @ x, before @ P @ before, s * seen @ z, gain, known, 2.0**-12
+        )
+        of_gain = plain(kernel.gain_error_bound)(bound, gain, after @ used @ seen, errors[2])
+        begun = plain(kernel.contraction_start)(before @ P @ before, *errors[:2])
+        found.append([bound.eta, bound.zeta, bound.alpha, bound.gain, *evaluated, of_gain, begun.eta, begun.zeta])
+    for one_way, other in zip(*found, strict=True):
+        assert np.isfinite(one_way).all()
+        assert other == pytest.approx(one_way, rel=1e-11)
+
+
+def test_error_of_a_gain_of_either_sign(kernel, monkeypatch):
+    monkeypatch.setattr(kernels, "_U", 1 / 32)
+    bound = Contraction(one(L), float(ETA), float(ZETA), 1.0, array(F(1, 7)))
+    for true, used in ((F(1), F(-4, 3)), (F(-1), F(4, 3)), (F(-4, 3), F(-1))):
+        found = plain(kernel.gain_error_bound)(bound, one(true), one(used), one(DK))
+        same(found, (abs(used - true) + DK + F(1, 32) * (abs(used) + abs(true)) + L * F(1, 7)) * (1 + SHARE))
