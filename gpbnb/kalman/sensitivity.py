@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 from gpbnb.arithmetic.formats import Rounding
@@ -27,8 +28,9 @@ class Moved(NamedTuple):
 def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
     """Return the precision at which the median error would equal the tolerance, for one kind of formats.
 
-    The estimate starts from the format whose median is nearest to the tolerance on a logarithmic scale, and assumes
-    that each further digit divides the error by the base.
+    Between a format whose median exceeds the tolerance and the next, the logarithm of the error is interpolated.
+    If all medians lie on one side of the tolerance, the estimate starts from the nearest on a logarithmic scale, and
+    assumes that each further digit divides the error by the base.
 
     Raises
     ------
@@ -36,12 +38,17 @@ def median_precision(found: Sequence[Share], tolerance: float = 1.0) -> float:
     """
     if not found:
         raise ValueError("got no formats; needed at least one")
+    distances = _distances(found, tolerance)
+    for (t, high), (next_t, low) in reversed([*pairwise(distances)]):
+        if high > 0 >= low:
+            return t + (next_t - t) * high / (high - low)
+    t, away = min(distances, key=lambda each: abs(each[1]))
+    return t + away
 
-    def away(each: Share) -> float:
-        return math.log(each.quantile(0.5) / tolerance, each.fmt.base)
 
-    nearest = min(found, key=lambda each: abs(away(each)))
-    return nearest.fmt.precision + away(nearest)
+def _distances(found: Sequence[Share], tolerance: float = 1.0) -> list[tuple[int, float]]:
+    """List precisions, and by how many digits each median exceeds the tolerance."""
+    return sorted((each.fmt.precision, math.log(each.quantile(0.5) / tolerance, each.fmt.base)) for each in found)
 
 
 def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
@@ -73,13 +80,19 @@ def sensitivity(found: Sequence[Share]) -> tuple[Moved, ...]:
 
 
 def _moved(choice: str, before: str, after: str, usual: Sequence[Share], other: Sequence[Share]) -> Moved:
-    """Compare two kinds of formats, if possible in the formats that both have."""
+    """Compare two kinds of formats: both where they meet the tolerance, else in the formats that both have."""
     common = {each.fmt.precision for each in usual} & {each.fmt.precision for each in other}
-    if common:
+    if common and not (_on_both_sides(usual) and _on_both_sides(other)):
         usual = [each for each in usual if each.fmt.precision in common]
         other = [each for each in other if each.fmt.precision in common]
     bits = median_precision(other) - median_precision(usual)
     return Moved(choice, before, after, bits, min(each.records for each in (*usual, *other)))
+
+
+def _on_both_sides(found: Sequence[Share]) -> bool:
+    """Whether medians lie on both sides of the tolerance."""
+    sides = [away > 0 for _, away in _distances(found)]
+    return any(sides) and not all(sides)
 
 
 def single_record(runs: Sequence[year.Year], precision: int = 24) -> tuple[Moved, ...]:

@@ -19,12 +19,24 @@ def share(precision, error, setting="simple", states="deviation", form="hung", r
 
 def test_the_nearest_format_says_where_the_median_meets_the_tolerance():
     assert median_precision([share(24, 4.0)]) == 26
-    assert median_precision([share(24, 64.0), share(27, 0.5), share(30, 0.01)]) == 26
+    assert median_precision([share(27, 0.5), share(30, 0.01)]) == 26
     assert median_precision([share(24, 4.0)], tolerance=0.25) == 28
     decimal = share(24, 0.01)._replace(fmt=FloatFormat(10, 9))
     assert median_precision([decimal]) == pytest.approx(7)
     with pytest.raises(ValueError, match="got no formats"):
         median_precision([])
+
+
+def test_between_two_formats_the_logarithm_of_the_median_is_interpolated():
+    assert median_precision([share(24, 64.0), share(27, 0.125), share(30, 0.01)]) == 26
+    assert median_precision([share(30, 0.25), share(26, 0.5), share(27, 4.0), share(28, 0.25)]) == 27.5
+    assert median_precision([share(24, 2.0), share(25, 1.0)]) == 25
+
+
+def test_two_kinds_that_meet_the_tolerance_are_compared_where_they_do():
+    usual = [share(24, 4.0), share(25, 0.25), share(29, 0.001)]
+    chopped = [share(29, 2.0, rounding=Rounding.CHOP), share(30, 0.5, rounding=Rounding.CHOP, records=2)]
+    assert sensitivity([*usual, *chopped]) == (Moved("rounding, simple model", "nearest", "chop", 5, 2),)
 
 
 def test_one_choice_changes_at_a_time():
