@@ -14,7 +14,7 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.budget import theory as budget
 from gpbnb.geometry import theory as geometry
-from gpbnb.kalman import answers, ensembles, year, year_cases
+from gpbnb.kalman import answers, ensembles, probability, threshold, year, year_cases
 from gpbnb.kalman.forms import Form
 from gpbnb.rolling import experiment as rolling_experiment
 from gpbnb.rolling import theory as rolling
@@ -36,6 +36,38 @@ def alt(page: str, name: str) -> str:
 
 def says(page: str, name: str, *phrases: str) -> None:
     assert [phrase for phrase in phrases if phrase not in alt(page, name)] == []
+
+
+def test_years_within_a_milliarcsecond():
+    places = {}
+    spread = {}
+    for each in probability.shares(threshold.SWEEP.load()):
+        if each.fmt.base == 2 and each.fmt.rounding is Rounding.NEAREST:
+            share = each.within / each.records
+            place = (
+                "all above" if share == 0 else "mostly above" if share < 0.5 else "mostly below" if share < 1 else "all"
+            )
+            places.setdefault((each.states, place), []).append(each.fmt.precision)
+            spread.setdefault(each.states, []).append(max(each.errors) / min(each.errors))
+    assert places == {
+        ("absolute", "all above"): [28, 29],
+        ("absolute", "mostly above"): [30, 31],
+        ("absolute", "mostly below"): [32],
+        ("absolute", "all"): [33, 34, 35, 36],
+        ("deviation", "all above"): [22, 23, 24],
+        ("deviation", "mostly below"): [25],
+        ("deviation", "all"): [26, 27, 28, 29, 30],
+    }
+    assert all(1.5 < factor < 2.5 for factors in spread.values() for factor in factors[:2])
+    assert 9 < max(map(max, spread.values())) < 10
+    says(
+        "mission",
+        "fig-mission-shares",
+        "all above the tolerance of one at 28 and 29 bits, mostly above at 30 and 31",
+        "mostly below at 32, and all below from 33 bits on",
+        "all above up to 24 bits, mostly below at 25, and all below from 26 bits on",
+        "a factor of about two in the coarsest formats and of up to ten in finer ones",
+    )
 
 
 def test_violations_of_the_kalman_bounds():
