@@ -15,7 +15,7 @@ from numba.extending import overload
 
 from gpbnb.arithmetic.kernels.bits import high_product, leading_zeros
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.tags import Away, Down, Even, LimitedDecimal, Odd, Up, Zero
+from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, EVEN, ODD, UP, LimitedDecimal
 
 NARROW = 9  # precision up to which the dividend fits into 64 bits
 LARGEST_EXPONENT = 2**60
@@ -126,16 +126,16 @@ def _increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any)
 
 @overload(_increment, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
-    if getattr(fmt, "instance_class", None) is not LimitedDecimal:
-        return lambda fmt, m, up, tie, inexact, negative: np.uint64(up & fmt.nearest)
-    return {
-        Away: lambda fmt, m, up, tie, inexact, negative: np.uint64(up),
-        Even: lambda fmt, m, up, tie, inexact, negative: np.uint64(up & ((not tie) | ((m & _U1) == _U1))),
-        Zero: lambda fmt, m, up, tie, inexact, negative: _U0,
-        Up: lambda fmt, m, up, tie, inexact, negative: np.uint64(inexact & (not negative)),
-        Down: lambda fmt, m, up, tie, inexact, negative: np.uint64(inexact & negative),
-        Odd: lambda fmt, m, up, tie, inexact, negative: np.uint64(inexact & ((m & _U1) == _U0)),
-    }[fmt.types[0].instance_class]
+    def to_nearest_or_chopped(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+        return np.uint64(up & fmt.nearest)
+
+    def by_mode(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+        mode, odd = fmt.mode, (m & _U1) == _U1
+        nearest = up & ((mode == AWAY) | ((mode == EVEN) & ((not tie) | odd)))
+        outward = ((mode == UP) & (not negative)) | ((mode == DOWN) & negative)
+        return np.uint64(nearest | (inexact & (outward | ((mode == ODD) & (not odd)))))
+
+    return by_mode if getattr(fmt, "instance_class", None) is LimitedDecimal else to_nearest_or_chopped
 
 
 def _within_range(fmt: Any, m: Any, e: Any) -> Any:

@@ -13,13 +13,13 @@ from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Backend, Compil
 from gpbnb.arithmetic.kernels.limited import limited_kernel
 from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Order, Rounding, Rules
 
-_MODES: dict[Rounding, Any] = {
-    Rounding.NEAREST: tags.Away,
-    Rounding.EVEN: tags.Even,
-    Rounding.CHOP: tags.Zero,
-    Rounding.UP: tags.Up,
-    Rounding.DOWN: tags.Down,
-    Rounding.ODD: tags.Odd,
+_CODES = {
+    Rounding.NEAREST: tags.AWAY,
+    Rounding.EVEN: tags.EVEN,
+    Rounding.CHOP: tags.ZERO,
+    Rounding.UP: tags.UP,
+    Rounding.DOWN: tags.DOWN,
+    Rounding.ODD: tags.ODD,
 }
 _REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
 _HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
@@ -119,10 +119,16 @@ class LimitedPairs(Pairs):
         limits, last = rules.limits, rules.precision - 1
         least, largest = (-_UNLIMITED, _UNLIMITED) if limits is None else (limits.emin - last, _emax(rules) - last)
         flush = limits is not None and not limits.subnormal
-        self.tag = tags.LimitedDecimal(_MODES[rules.rounding](), rules.precision, least, largest, flush)
+        self.tag = tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, least, largest, flush)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return limited_backend, (self.rules,)
+
+
+def _mode(rounding: Rounding, seed: int) -> tags.Even | tags.Mode | tags.Random:
+    if rounding is Rounding.STOCHASTIC:
+        return _random(seed)
+    return tags.Even() if rounding is Rounding.EVEN else tags.Mode(_CODES[rounding])
 
 
 def _random(seed: int) -> tags.Random:
@@ -205,7 +211,7 @@ def limited_exact(rules: Rules) -> LimitedExact:
 @lru_cache(maxsize=256)
 def limited_backend(rules: Rules) -> Backend:
     """Return the fastest backend for a format."""
-    if rules.base == 10 and rules.precision <= LARGEST_PRECISION[10] and rules.rounding in _MODES:
+    if rules.base == 10 and rules.precision <= LARGEST_PRECISION[10] and rules.rounding in _CODES:
         if rules.limits is None or (not rules.limits.fixed and rules.limits.largest == _all_nines(rules, _emax(rules))):
             return LimitedPairs(rules)
     elif rules.base in (2, 16) and (tag := _float_tag(rules)) is not None:
@@ -226,7 +232,7 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     # A single binary digit is implicit in float64: no stored bit is even or odd.
     hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
     digits = tags.Two() if base == 2 else tags.Sixteen()
-    mode = _random(seed) if random else _MODES[rounding]()
+    mode = _mode(rounding, seed)
     if limits is None:
         nan, least, largest = math.nan, 2.0**-960, 2.0**960
         return (

@@ -19,7 +19,7 @@ from gpbnb.arithmetic.kernels.binary import LEAST
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.rules import DRAW_BITS
-from gpbnb.arithmetic.kernels.tags import Away, Down, Even, Odd, Random, Sixteen, Two, Up, Zero
+from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, ODD, UP, Even, Mode, Random, Sixteen, Two
 
 EXACT_PRODUCT = 26  # bits; products of numbers this short are exact in float64
 _ONE = np.int64(1)
@@ -42,35 +42,18 @@ def _dropped_hexadecimal(fmt: Any, u: Any) -> Any:
     return np.int64(56) - np.int64(4) * fmt.precision - (((u >> 52) + 1) & 3)
 
 
-def _away(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    unit = _ONE << k
-    return (u + (unit >> 1)) & -unit
-
-
 def _even(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
     unit = _ONE << k
     # A mask finds the last digit, because no vector instruction shifts signed numbers.
     return (u + ((unit >> 1) - 1) + np.int64(((u & unit) != 0) | sticky)) & -unit
 
 
-def _zero(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    return u & -(_ONE << k)
-
-
-def _up(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    unit = _ONE << k
-    return (u + ((unit - 1) + np.int64(sticky)) * np.int64(not negative)) & -unit
-
-
-def _down(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    unit = _ONE << k
-    return (u + ((unit - 1) + np.int64(sticky)) * np.int64(negative)) & -unit
-
-
-def _odd(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    unit = _ONE << k
+def _coded(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
+    unit, code = _ONE << k, fmt.mode.code
+    outward = ((code == UP) & (not negative)) | ((code == DOWN) & negative)
+    added = (unit - 1) + np.int64(sticky) if outward else unit >> 1 if code == AWAY else 0
     inexact = ((u & (unit - 1)) != 0) | sticky
-    return (u & -unit) | (np.int64(inexact) << k)
+    return ((u + added) & -unit) | (np.int64(inexact & (code == ODD)) << k)
 
 
 def _random(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
@@ -89,7 +72,7 @@ def _random(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
     return (u & -unit) + (np.int64(up) << k)
 
 
-_MODES = {Away: _away, Even: _even, Zero: _zero, Up: _up, Down: _down, Odd: _odd, Random: _random}
+_MODES = {Even: _even, Mode: _coded, Random: _random}
 _DROPPED = {Two: _dropped_binary, Sixteen: _dropped_hexadecimal}
 
 
