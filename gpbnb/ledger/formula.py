@@ -28,6 +28,7 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,15 @@ class Link:
         return bool(np.all(compare(left, right)))
 
 
+@lru_cache(maxsize=4096)
+def _tree(text: str) -> ast.expr:
+    tree = ast.parse(text, mode="eval").body
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant):
+            node.literal = ast.get_source_segment(text, node)  # type: ignore[attr-defined]
+    return tree
+
+
 @dataclass(frozen=True)
 class Relation:
     """A printed equation or inequality, as a chain of Python comparisons."""
@@ -95,13 +105,8 @@ class Relation:
 
     @property
     def tree(self) -> ast.expr:
-        """The syntax tree; each number keeps its printed digits as ``literal``."""
-        text = self.text.replace("≈", " is ")
-        tree = ast.parse(text, mode="eval").body
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Constant):
-                node.literal = ast.get_source_segment(text, node)  # type: ignore[attr-defined]
-        return tree
+        """The syntax tree, which must not be changed; each number keeps its printed digits as ``literal``."""
+        return _tree(self.text.replace("≈", " is "))
 
     @property
     def sides(self) -> tuple[Relation, ...]:

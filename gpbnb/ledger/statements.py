@@ -135,7 +135,15 @@ def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
     OSError : the file cannot be read.
     ValueError : the file is not a valid inventory; the message names the line.
     """
-    source = files(__package__) / "statements.csv" if source is None else source
+    return _stored() if source is None else _read(source)
+
+
+@cache
+def _stored() -> tuple[Statement, ...]:
+    return _read(files(__package__) / "statements.csv")
+
+
+def _read(source: Traversable) -> tuple[Statement, ...]:
     try:
         text = source.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import copy
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -58,32 +57,24 @@ def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
         tree = relation.tree
         for k, node in enumerate(ast.walk(tree)):
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
-                new = copy.deepcopy(tree)
-                _substitute(new, list(ast.walk(new))[k], node.left)
-                yield f"dropped factor at {k}", ast.unparse(new)
+                yield f"dropped factor at {k}", _with(tree, node, node.left)
         if "twice the last side" in usual and isinstance(tree, ast.Compare):
-            tree.comparators[-1] = ast.UnaryOp(ast.USub(), tree.comparators[-1])
-            yield "minus the last side", ast.unparse(tree)
+            last = tree.comparators[-1]
+            yield "minus the last side", _with(tree, last, ast.UnaryOp(ast.USub(), last))
 
 
 def _usual(relation: Relation) -> Iterator[tuple[str, str]]:
     """Signs, coefficients, exponents, indices, dropped terms, digits, and the direction of an inequality."""
     tree = relation.tree
-    nodes = list(ast.walk(tree))
     seen = {ast.unparse(tree)}
-    for k, node in enumerate(nodes):
+    for k, node in enumerate(ast.walk(tree)):
         for name, change in _of_node(node):
-            new = copy.deepcopy(tree)
-            place = list(ast.walk(new))[k]
-            _substitute(new, place, change)
-            text = ast.unparse(new)
+            text = _with(tree, node, change)
             if text not in seen:
                 seen.add(text)
                 yield f"{name} at {k}", text
-    if isinstance(tree, ast.Compare) and ast.unparse(tree.comparators[-1]) != "0":
-        new = copy.deepcopy(tree)
-        new.comparators[-1] = ast.BinOp(ast.Constant(2), ast.Mult(), new.comparators[-1])
-        yield "twice the last side", ast.unparse(new)
+    if isinstance(tree, ast.Compare) and ast.unparse(last := tree.comparators[-1]) != "0":
+        yield "twice the last side", _with(tree, last, ast.BinOp(ast.Constant(2), ast.Mult(), last))
 
 
 def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
@@ -118,17 +109,17 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
                     yield name, ast.Compare(left, [*ops[:i], _OPPOSITE[type(op)](), *ops[i + 1 :]], rights)
 
 
-def _substitute(tree: ast.AST, place: ast.AST, new: ast.AST) -> None:
+def _with(tree: ast.AST, place: ast.AST, new: ast.AST) -> str:
+    """The text of a tree with another node in one place; the tree itself stays as it is."""
     if tree is place:
-        for field in tree._fields:
-            if field in new._fields:
-                setattr(tree, field, getattr(new, field))
-        return
+        return ast.unparse(new)
     for parent in ast.walk(tree):
         for field, value in ast.iter_fields(parent):
-            if value is place:
-                setattr(parent, field, new)
-                return
-            if isinstance(value, list) and any(item is place for item in value):
-                setattr(parent, field, [new if item is place else item for item in value])
-                return
+            if value is place or (isinstance(value, list) and any(item is place for item in value)):
+                changed = [new if item is place else item for item in value] if isinstance(value, list) else new
+                setattr(parent, field, changed)
+                try:
+                    return ast.unparse(tree)
+                finally:
+                    setattr(parent, field, value)
+    raise LookupError("got a node of another tree; needed one of this tree")
