@@ -75,5 +75,11 @@ def test_table_of_refused_rows():
 
 
 def test_table_of_the_curve():
-    (row,) = tables.curve([("printed", 44, 0.15)]).body
-    assert row == ("printed", "44", "0.1500", f"{0.15 * 44**0.5:.4f}", "6.600")
+    table = tables.curve([("printed", 44, 0.15)])
+    assert dict(zip(table.header, *table.body, strict=True)) == {
+        "case": "printed",
+        "sources": "44",
+        "error of each (mas)": "0.1500",
+        "root-sum-square (mas)": f"{0.15 * 44**0.5:.4f}",
+        "sum if all have the same sign (mas)": "6.600",
+    }
