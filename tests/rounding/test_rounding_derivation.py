@@ -32,6 +32,20 @@ def test_the_derivations_are_those_of_the_chapter():
     assert sum(steps.lengths(DERIVATIONS).values()) == 24
 
 
+def test_the_steps_of_a_sum_are_named_for_what_they_derive():
+    J, N = derivation.J, derivation.N
+    _, first, *others = derivation.sums().steps
+    named = {step.name: step.right.doit() for step in others}
+    assert first.name == "weight of $x_1$: one more term, one more rounding"
+    assert sp.simplify(first.right.doit()) == N
+    assert sp.simplify(named["weight of $x_j$, $j\\ge2$: the same"] - (N + 2 - J)) == 0
+    assert named["weight of the new term $x_{n+1}$"] == 1
+    # All weights begin as n - 1, and j - 2 is what that of x_j lacks.
+    difference = "(18), first inequality: the difference between the weight of $x_j$ and $n-1$"
+    assert sp.simplify(named[difference]) == N - 1
+    assert sp.expand(named["(18), second inequality: the sum of the weights"] - (N - 1) * (N - 2) / 2) == 0
+
+
 @pytest.mark.parametrize("n", range(1, 7))
 def test_errors_of_sums_have_the_weights_of_theory(n):
     error, x, eps = derivation.sum_error(n)

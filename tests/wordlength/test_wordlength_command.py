@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
+import shlex
+import sys
 from dataclasses import replace
 from fractions import Fraction
 from types import SimpleNamespace
@@ -75,6 +78,15 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
     written = [f"2{''.join('⁻⁰¹²³⁴⁵⁶⁷⁸⁹'['-0123456789'.index(sign)] for sign in str(k))}" for k in (low, high)]
     assert f"<td>{name}</td><td>{written[0]}</td><td>{written[1]}</td>" in text
     Elements(text)
+
+
+def test_a_report_shows_the_arguments_of_the_process(files, monkeypatch, capsys):
+    folder, _ = files
+    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--report", str(folder / "out.html")]
+    monkeypatch.setattr(sys, "argv", ["program", *given])
+    assert main() == 0
+    shown = f"python -m gpbnb.wordlength {shlex.join(given)}"
+    assert html.escape(shown) in (folder / "out.html").read_text(encoding="utf-8")
 
 
 def test_no_answer_has_an_exit_status_of_its_own(files, capsys):

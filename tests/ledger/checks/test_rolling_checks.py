@@ -34,6 +34,14 @@ def test_every_equation_has_a_form():
     assert [entry.id for entry in ENTRIES if entry.kind == "equation" and not entry.form] == []
 
 
+def test_the_short_record_has_the_signal_to_noise_ratio_of_a_year(monkeypatch):
+    def drifted(drift, *_, samples):
+        return 10.0 * samples * drift
+
+    monkeypatch.setattr(experiment, "spectra", drifted)
+    assert material.spectra.__wrapped__() == pytest.approx(theory.DRIFTS[1] * experiment.YEAR)
+
+
 def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert Counter(row.outcome for row in rows) == {
