@@ -93,4 +93,5 @@ def test_distribution(ax):
     assert len({str(style) for style in styles}) == 3
     assert near(names.pop("random draws"), BLUE, (0, top))
     assert not names
+    assert ax.get_ylim() == pytest.approx((0, 1.42 * top))  # above the highest line, at 1.3
     return ax.figure
