@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from fractions import Fraction as F
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 UNIT, UP = F(1, 64), 1 + F(1, 32)
 """In the place of 2**-53 and of 1 + 2**-40."""
+
+
+class Distance(NamedTuple):
+    """What a contraction bound says of a covariance: its weights and the distance in them."""
+
+    L: Any
+    zeta: float
 
 
 def plain(function):

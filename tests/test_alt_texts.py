@@ -63,10 +63,10 @@ def test_years_within_a_milliarcsecond():
     says(
         "mission",
         "fig-mission-shares",
-        "all above the tolerance of one at 28 and 29 bits, mostly above at 30 and 31",
-        "mostly below at 32, and all below from 33 bits on",
-        "all above up to 24 bits, mostly below at 25, and all below from 26 bits on",
-        "a factor of about two in the coarsest formats and of up to ten in finer ones",
+        "all points lie above the tolerance of one at 28 and 29 bits, most at 30 and 31, few at 32",
+        "few at 32, and none from 33 bits on",
+        "all points lie above it up to 24 bits, some at 25, and none from 26 bits on",
+        "a factor of about two in the coarsest formats, and of up to ten in finer ones",
     )
 
 

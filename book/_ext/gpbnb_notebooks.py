@@ -59,7 +59,7 @@ def copies(app: Sphinx) -> Path:
 def use_copy(app: Sphinx, docname: str, source: list[str]) -> None:
     """Read the executed copy of a notebook in place of the notebook.
 
-    Sphinx reads the pages of a new book by name. Those of the API come first, show no outputs, and need not wait.
+    Sphinx reads the pages of a new book in alphabetical order. Those of the API come first, and need no outputs.
     """
     if not docname.startswith("book/api"):
         lay_copies(app)

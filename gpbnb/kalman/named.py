@@ -71,7 +71,7 @@ def whole_number(name: str, value: Any, least: int = 1) -> int:
 
 
 def checked_name(name: Any) -> str:
-    """Return the name of a model, after a check that it is text.
+    """Check that the name of a model is text, and return it.
 
     Raises
     ------

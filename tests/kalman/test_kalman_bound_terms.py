@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_terms import fractions, same
+from exact_terms import Distance, fractions, same
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -115,7 +115,7 @@ def test_the_first_steps_count_among_the_earlier_ones(monkeypatch: pytest.Monkey
 
 
 def test_what_one_state_needs_takes_nothing_from_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first state's error was 9 at first, a quarter of which is carried on, though none is larger than 3.25 later.
+    """The first state begins with an error of 9 and carries a quarter of it on; its later errors are at most 3.25.
 
     The second state's error is 7.25 later, then 20 in some step: the bound is raised twice, but for this state only.
     """
@@ -323,22 +323,15 @@ def test_a_trial_distance_holds_at_the_beginning(larger: float, trial: float, mo
         steps, C, bounds, P = 3, np.full((3, 1, 1), 10.0), (None, "dK"), np.array([[10.0]])
 
         def __init__(self, *_: Any) -> None:
-            self.bound = contraction(2.0, 3.0)
+            self.bound = Distance(np.array([[2.0]]), 3.0)
 
         def take(self, z: Any) -> None:
             tried.append(self.bound.zeta)
             if len(tried) == 2:
-                self.bound = contraction(2.0, 0.25)
+                self.bound = Distance(np.array([[2.0]]), 0.25)
 
         def exactly(self, x: Any) -> Any:
             return fractions(x)
-
-    class Bound(SimpleNamespace):
-        def _replace(self, zeta: float) -> Bound:
-            return Bound(L=self.L, zeta=zeta)
-
-    def contraction(L: float, zeta: float) -> Bound:
-        return Bound(L=np.array([[L]]), zeta=zeta)
 
     monkeypatch.setattr(gains, "BoundedRun", Run)
     stored: Any = SimpleNamespace(m=1)

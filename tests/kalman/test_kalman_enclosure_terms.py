@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_terms import fractions
+from exact_terms import Distance, fractions
 from flint import arb, arb_mat, ctx
 
 from gpbnb.arithmetic.formats import FloatFormat
@@ -233,23 +233,16 @@ def test_a_distance_closes_with_the_period(
 
         def __init__(self, *_: Any) -> None:
             self.P, self.taken = np.array([[10.0]]), 0
-            self.bound = gains_bound(2.0, 1.0)
+            self.bound = Distance(np.array([[2.0]]), 1.0)
 
         def take(self, z: Any) -> None:
             self.taken += 1
             if self.taken == 2:
                 assert self.bound.zeta == 4.0
-                self.P, self.bound = np.array([[10.0 + moved]]), gains_bound(weight, end)
+                self.P, self.bound = np.array([[10.0 + moved]]), Distance(np.array([[weight]]), end)
 
         def exactly(self, x: Any) -> Any:
             return np.vectorize(F, otypes=[object])(x)
-
-    class Bound(SimpleNamespace):
-        def _replace(self, zeta: float) -> Bound:
-            return Bound(L=self.L, zeta=zeta)
-
-    def gains_bound(L: float, zeta: float) -> Bound:
-        return Bound(L=np.array([[L]]), zeta=zeta)
 
     monkeypatch.setattr(gains, "BoundedRun", Run)
     stored: Any = SimpleNamespace(m=1)

@@ -169,8 +169,8 @@ class Judges:
     def ways(self, name: str, line: int) -> tuple[str, How]:
         """How to run the tests on a fault in a line of a file, and a name for it.
 
-        If no compiled function contains the fault, those compiled before can be used. Otherwise they are compiled
-        again, and the tests get more time.
+        A fault outside compiled functions needs no compilation. Otherwise they are compiled again, and the tests get
+        more time.
         """
         seconds = self.known["seconds"]
         module = module_of(self.tree / name, self.tree)
@@ -249,7 +249,7 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
                     found = judges.run(files, way, how)
                 finally:
                     path.write_text(source, encoding="utf-8")
-                    # A newer time of the file would make the tests that are imported already compile it again.
+                    # With a newer time of the file, tests that are already imported would compile again.
                     os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
                 if how.stamps is None:  # what was compiled from a fault is of no further use
                     for file in set(COMPILED.glob("*")) - compiled:

@@ -254,7 +254,7 @@ def test_the_curve_of_two_precisions_spans_the_figure():
     answer = Answer("innovation, emulation", "emulation", 21, "", ((20, 10.0), (21, 1.0), (22, None)))
     report = Report("a", "filter", 21, "", 2, "nearest", 5, (1.0,), "", (answer,), (), (), "", {})
     assert '<polyline points="60.0,30.0 620.0,280.0" ' in report.to_html()
-    # The baseline of a label is 4 below its line of the grid, so that the line meets the middle of the digits.
+    # The baseline of a label is 4 px below its grid line, which thus points at the middle of the digits.
     assert '<text x="52" y="34.0" text-anchor="end">10¹</text><line x1="60" x2="620" y1="30.0"' in report.to_html()
     assert '<text x="52" y="284.0" text-anchor="end">10⁰</text><line x1="60" x2="620" y1="280.0"' in report.to_html()
     alone = replace(report, answers=(replace(answer, tried=answer.tried[:1]),))

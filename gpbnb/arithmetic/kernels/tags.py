@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 LARGEST_SHORT = 8  # precision of ShortDecimal
-# Codes of rounding modes: to nearest with ties away from zero or to the even digit, toward zero, toward plus and minus
-# infinity, and inexact results to the neighbour with an odd last digit.
+# Codes of rounding modes. AWAY and EVEN round to nearest, with ties away from zero or to the even last digit. ZERO, UP
+# and DOWN round toward zero, plus or minus infinity. ODD gives an inexact result the neighbour with an odd last digit.
 AWAY, EVEN, ZERO, UP, DOWN, ODD = range(6)
 
 

@@ -324,7 +324,7 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     part = np.array([ROUNDING] * m + [LOOP] * n + [GAIN] * m)
     X, V = np.zeros(n), np.array(within.measurement)
     x0 = np.abs(given.x0.astype(np.float64)) * (1 + 2.0**-50)
-    tiny = (2 * n + 30) * 2.0**-53  # of the products of a row with these columns, and of their low parts
+    tiny = _product_share(n)
     HPhi = np.ascontiguousarray(given.HPhi[..., 0])
     early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
     for _ in range(60):
@@ -354,6 +354,11 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     return Limits(np.full(n, math.inf), np.full(m, math.inf), within.measurement)
 
 
+def _product_share(n: int) -> float:
+    """Largest relative error in float64 of the products of a row with n columns, low parts included."""
+    return (2 * n + 30) * 2.0**-53
+
+
 def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
     """Bound each operation's own linear function, more tightly than the peaks of the states do.
 
@@ -369,7 +374,7 @@ def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
     of_state, of_input = rows[first:, : program.n, 0], np.abs(rows[first:, program.n :, 0])
     found = _disturbances(given, within, np.zeros(program.n))
     limit = np.array(within.measurement)[None, :]
-    tiny = (2 * program.n + 30) * 2.0**-53
+    tiny = _product_share(program.n)
     slack = tiny * np.abs(found.K) @ within.measurement + found.spread @ within.state
     size = np.abs(found.K[0]) @ within.measurement + 1e-300
     peak = certify(

@@ -81,7 +81,7 @@ def copy(tmp_path):
 
     for key in ("NUMBA_CACHE_DIR", "GPBNB_QUIET"):
         Copy.environment.pop(key, None)
-    # Bytecode of a source that was changed within the same second, and kept its size, is out of date.
+    # Python would take old bytecode for a source that changes within a second and keeps its size.
     Copy.environment["PYTHONDONTWRITEBYTECODE"] = "1"
     return Copy()
 
