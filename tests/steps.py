@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 import sympy as sp
+from sympy.core.function import AppliedUndef
 
 from gpbnb.display.derivation import Derivation, Step
 
@@ -55,3 +56,28 @@ def check(step: Step, alike: bool = False) -> None:
     assert not re.search(r"[-+]\s*[-+]|\bnan\b|None|\?|\$", latex)
     for opening, closing in (("{", "}"), (r"\left", r"\right")):
         assert latex.count(opening) == latex.count(closing)
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"\W", "", name.replace("'", "T"))
+
+
+def written(text: str, step: Step) -> sp.Expr:
+    r"""An expression in the symbols of a step: `\hat{a}_{ij}` is hata_ij, `a(0)` is a0, and `H'` is HT."""
+    parts = (step.left - step.right).atoms(sp.Symbol, AppliedUndef) | step.left.atoms(sp.Symbol)
+    known = {_plain(part.func.__name__ if part.args else part.name): part.func if part.args else part for part in parts}
+    known.pop("", None)  # the side that a limit comes from
+    return sp.sympify(text, locals=known)
+
+
+def equal(found: sp.Expr, wanted: sp.Expr) -> bool:
+    """Whether two expressions are one."""
+    difference = (found - wanted).doit().expand()
+    return any(form(difference) == 0 for form in (sp.S, sp.cancel, sp.simplify))
+
+
+def check_names(derivation: Derivation, names: dict[str, str]) -> None:
+    """The steps have these names, in this order, and each derives the right side written beside its name."""
+    assert [step.name for step in derivation.steps] == list(names)
+    for step, right in zip(derivation.steps, names.values(), strict=True):
+        assert equal(step.right, written(right, step)), step.name

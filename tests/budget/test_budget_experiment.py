@@ -19,10 +19,31 @@ EXAMPLE = theory.read(files("gpbnb.budget") / "example.csv")
 
 DERIVATIONS = steps.collected(derivation.equal_sources, derivation.averages)
 
+NAMES = {
+    "equal_sources": {
+        r"root-sum-square of $N$ errors of $e/\sqrt N$ each": "e",
+        "sum of the same $N$ errors with equal signs": "sqrt(N)*e",
+    },
+    "averages": {
+        "mean of a constant that rolls with the spacecraft, over $c$ rolls": "sin(pi*c)/(pi*c)",
+        "mean of a constant that does not roll: nothing is gained": "e",
+        "variance of the mean of $N$ independent readings of variance $e^2$": "e**2/N",
+        r"variance of the mean of noise with the correlation $\mathrm{e}^{-u/\tau}$": (
+            "2*(T/tau - 1 + exp(-T/tau))*(tau/T)**2"
+        ),
+    },
+}
+"""What each step derives, beside its name; see `steps.check_names`."""
+
 
 @steps.each(DERIVATIONS)
 def test_each_step(step):
     steps.check(step)
+
+
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_the_steps_are_named_for_what_they_derive(name):
+    steps.check_names(DERIVATIONS[name], NAMES[name])
 
 
 def test_the_derivations_are_those_of_the_chapter():

@@ -7,6 +7,7 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+import steps
 import sympy as sp
 from mpmath import mp
 
@@ -20,6 +21,24 @@ from gpbnb.rolling import theory
 from gpbnb.rounding import derivation as rounding
 
 BY_ID = {each.id: each for each in forms.CALCULATORS}
+
+DERIVATIONS = steps.collected(derivation.chopped, derivation.forgotten, derivation.lost)
+NAMES = {
+    "chopped": {
+        "a dropped $vb^{e-t}$ over the least number that had it": "b**(1 - t)/(1 + s + b**(1 - t))",
+        r"which is largest for $v\to1$": "beta/(1 + s + beta)",
+    },
+    "forgotten": {
+        "sum of $f^{k-i}$: one more step": "(1 - f**(k + 1))/(1 - f)",
+        "$a_0$ is not below $a_i$, $i = j+1$": (
+            "(k - j - 1)*(6*n + 3*m + 5) + 4*n + 3*m + 4 + (k*(k - 1)/2 - j*(j - 1)/2)*(3*n + m + 2)"
+        ),
+    },
+    "lost": {
+        "the share lost": "2*sin(phase/2)**2",
+    },
+}
+"""What each step derives, beside its name; see `steps.check_names`."""
 
 
 def evaluated(definitions: tuple[Definition, ...], given: dict[str, float]) -> dict[str, mpmath.mpf]:
@@ -68,6 +87,11 @@ def test_the_derivations_hold():
     assert derivation.chopped().holds
     assert derivation.forgotten().holds
     assert derivation.lost().holds
+
+
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_the_steps_are_named_for_what_they_derive(name):
+    steps.check_names(DERIVATIONS[name], NAMES[name])
 
 
 def test_the_steps_taken_from_the_chapters_hold():

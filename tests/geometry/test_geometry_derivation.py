@@ -22,10 +22,91 @@ DERIVATIONS = steps.collected(
     derivation.precessions,
 )
 
+NAMES = {
+    "turns": {
+        "first column, first row: 1": "1",
+        r"second row: $-\alpha_3$": "-alpha_3",
+        r"third row: $\alpha_2$": "alpha_2",
+        r"third column, second row: $\alpha_1$": "alpha_1",
+    },
+    "deroll": {
+        "(5), first row": "-alpha_3",
+        "(5), second row": "alpha_2",
+        "(6), first row": "-theta_3",
+        "(6), second row": "theta_2",
+        "(7), first row": "alpha_3 - theta_3",
+        "(7), second row": "theta_2 - alpha_2",
+    },
+    "printed_deroll": {
+        r"(8), first row, should be $\alpha_3$": "alpha_2*sin(2*psi) - alpha_3*cos(2*psi)",
+        r"(8), second row, times $-1$, should be $\alpha_2$": "-alpha_2*cos(2*psi) - alpha_3*sin(2*psi)",
+        "mean of the first row over a roll": "0",
+        "mean of the second row over a roll": "0",
+        "correct only after a quarter and three quarters of a roll: first row": "alpha_3",
+        "the same for the second row": "alpha_2",
+    },
+    "first_order_effects": {
+        "telescope, first row: β is fixed in the spacecraft, so the deroll rotates it": (
+            "-alpha_3 - beta_3*cos(psi) - beta_2*sin(psi)"
+        ),
+        "gyro, first row: β and γ appear": ("-theta_3 - (beta_3 + gamma_3)*cos(psi) - (beta_2 + gamma_2)*sin(psi)"),
+        r"gyro less telescope, with $\varphi=\theta-\alpha$, first row: β cancels, γ does not": (
+            "-varphi_3 - gamma_3*cos(psi) - gamma_2*sin(psi)"
+        ),
+        "gyro less telescope, second row": "varphi_2 + gamma_2*cos(psi) - gamma_3*sin(psi)",
+        "mean over a roll of the remaining γ, first row": "0",
+        "the same for the second row": "0",
+    },
+    "second_order_effects": {
+        "mean error of the difference, first row": "(alpha_1 + beta_1 + gamma_1)*varphi_2 + gamma_1*alpha_2",
+        "mean error of the difference, second row": "(alpha_1 + beta_1 + gamma_1)*varphi_3 + gamma_1*alpha_3",
+    },
+    "one_ring": {
+        r"$-2\sin\psi$ times the reading, mean over a roll": "-theta_3",
+        r"$2\cos\psi$ times the reading, mean over a roll": "theta_2",
+    },
+    "precessions": {
+        "mean field along the axis of the Earth": "omega_E/2",
+        "mean field across it, in the plane of the orbit": "0",
+        r"inner product of the two drifts; it vanishes for a star in the plane of the orbit, $\epsilon=0$": (
+            "-omega_E*sin(2*epsilon)*sin(delta)/4"
+        ),
+        "for such a star: frame dragging along the normal of the orbit": "omega_E*cos(delta)/2",
+        "for such a star: frame dragging in the plane of the orbit": "0",
+    },
+}
+"""What each step derives, beside its name; see `steps.check_names`."""
+
 
 @steps.each(DERIVATIONS)
 def test_each_step(step):
     steps.check(step)
+
+
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_the_steps_are_named_for_what_they_derive(name):
+    steps.check_names(DERIVATIONS[name], NAMES[name])
+
+
+@pytest.mark.parametrize(
+    ("derivation", "name", "integrand"),
+    [
+        ("printed_deroll", "mean of the first row over a roll", "alpha_2*sin(2*psi) - alpha_3*cos(2*psi)"),
+        ("printed_deroll", "mean of the second row over a roll", "-alpha_2*cos(2*psi) - alpha_3*sin(2*psi)"),
+        (
+            "first_order_effects",
+            "mean over a roll of the remaining γ, first row",
+            "-gamma_3*cos(psi) - gamma_2*sin(psi)",
+        ),
+        ("first_order_effects", "the same for the second row", "gamma_2*cos(psi) - gamma_3*sin(psi)"),
+        ("precessions", "mean field along the axis of the Earth", "omega_E*(3*sin(u)**2 - 1)"),
+        ("precessions", "mean field across it, in the plane of the orbit", "3*omega_E*cos(u)*sin(u)"),
+    ],
+)
+def test_each_mean_is_of_what_its_name_says(derivation, name, integrand):
+    (step,) = (step for step in DERIVATIONS[derivation].steps if step.name == name)
+    (integral,) = step.left.atoms(sp.Integral)
+    assert steps.equal(integral.function, steps.written(integrand, step))
 
 
 def test_number_of_steps():

@@ -26,10 +26,99 @@ VALUES = {OMEGA: 3, T: sp.Rational(2, 5), P: sp.Rational(289, 100), MU: sp.Ratio
 #: Where what comes out is already written as it is printed.
 ALIKE = ("(18), $P_{31", "(18), $P_{32", "(21), ", "the variance starts at zero")
 
+NAMES = {
+    "transition": {
+        r"equation (6) with $I$ added, first row: $\phi_{11}$": "exp(-omega*T)",
+        r"second row: $\phi_{21}$ of (7) and (9)": "(1 - exp(-omega*T))/omega",
+        r"(9): $\phi_{21}$ by $\phi_{11}$": "(1 - exp(-omega*T))/omega",
+    },
+    "discretization": {
+        "$q_{11}$": "P*(1 - exp(-2*omega*T))",
+        "$q_{12}$": "P*(1 - exp(-omega*T))**2/omega",
+        "$q_{22}$": "P*(2*omega*T - 3 + 4*exp(-omega*T) - exp(-2*omega*T))/omega**2",
+        "$q_{22}$ from positive terms: the parts uncorrelated and correlated with $q_1$": (
+            "P*(2*omega*T - 3 + 4*exp(-omega*T) - exp(-2*omega*T))/omega**2"
+        ),
+    },
+    "covariances": {
+        "(18), $P_{31_n}=E(x_{3n}x_{1n})$": "phi_11*P_31 + P_11n*T/2 + phi_11*P_11*T/2",
+        r"(18), $P_{32_n}$, with $\frac12$ in its last term": (
+            "P_32 + phi_21*P_31 + P_12n*T/2 + P_12*T/2 + phi_21*P_11*T/2"
+        ),
+        "(18), $P_{33_n}$": "P_33 + (1 + phi_11)*P_31*T + P_11n*T**2/4 + (1/4 + phi_11/2)*P_11*T**2",
+    },
+    "continuous": {
+        r"(21), $\dot P_{11}$": "N_P11 - 2*omega*P_11",
+        r"(21), $\dot P_{12}$": "P_11 - omega*P_12",
+        r"(21), $\dot P_{22}$": "2*P_12",
+        "(22) is solved by $P_{12}$ of (23)": "P",
+        "(22) is solved by $P_{22}$ of (23)": "2*P*(1 - exp(-omega*t))/omega",
+        "both start at zero": "0",
+        r"(25) with the missing $1/\omega$": "2*P/omega*(T - (1 - exp(-omega*T))*exp(-omega*t)/omega)",
+    },
+    "steady_state": {
+        "(31) solves (30)": "P*T/2*(1 + exp(-omega*T))/(1 - exp(-omega*T))",
+        r"(32), $\Delta P_{32}$": "2*P*T/omega",
+        r"(32), $\Delta P_{33}$": "P*T**2*(1 + exp(-omega*T))/(1 - exp(-omega*T))",
+        "(33)": "P*T*(1 + exp(-omega*T))/(1 - exp(-omega*T)) - 2*P/omega",
+        "(34) with the missing $T$ in its second member": ("T*(1 + exp(-omega*T))/(1 - exp(-omega*T)) - 2/omega"),
+        r"(35), squared, in units of $P\,T$": "(1 + exp(-mu))/(1 - exp(-mu)) - 2/mu",
+        "a Langevin function": "(exp(mu/2) + exp(-mu/2))/(exp(mu/2) - exp(-mu/2)) - 2/mu",
+    },
+    "independent": {
+        "$r_0$: variance of the trapezoid, of the integral, and their covariance": (
+            "P*T**2*(1 + exp(-omega*T))/2 + 2*P*(omega*T - 1 + exp(-omega*T))/omega**2 - 2*P*T*(1 - "
+            "exp(-omega*T))/omega"
+        ),
+        "$gT$: expected error of the next cycle for a sample of size 1": (
+            "(1 + exp(-omega*T))/2 - (1 - exp(-omega*T))/(omega*T)"
+        ),
+        r"the sum $r_0 + 2r_1/(1-e^{-\omega T})$ equals (35)": (
+            "P*T**2*((1 + exp(-omega*T))/(1 - exp(-omega*T)) - 2/(omega*T))"
+        ),
+    },
+    "transient": {
+        r"$c_n = E(e_nx_{1n})$ in units of $\sigma_x^2T$: its recursion": "L*(1 - varphi**(n + 1))/2",
+        r"$P_{n+1}$ from $P_n$, in units of $\sigma_x^2T^2$": "(n + 1)*L - L**2*(1 - varphi**(n + 1))/2",
+        "the variance starts at zero": "0",
+        r"the same from $n\,r_0 + 2\sum_{k<n}(n-k)\,r_1\varphi^{k-1}$, summed": ("n*L - L**2*(1 - varphi**n)/2"),
+        r"that sum, by induction over $n$: one more cycle adds $r_0 + 2r_1(1-\varphi^n)/(1-\varphi)$": (
+            "r_0 + 2*r_1*(1 - varphi**k)/(1 - varphi)"
+        ),
+    },
+    "small_mu": {
+        "(36): the omitted terms are of higher order": "0",
+        r"(37), numerator: the cubic term is $\frac1{12}\mu^3$, not $\frac16\mu^3$ as printed": (
+            "2 - mu + mu**2/2 - mu**3/6"
+        ),
+        "(37), result": "1/6",
+        "the next term": "-1/360",
+        "(38) to (39)": "sqrt(omega/6)/f_c*sigma_x",
+    },
+}
+"""What each step derives, beside its name; see `steps.check_names`."""
+
 
 @steps.each(DERIVATIONS)
 def test_each_step(step):
     steps.check(step, step.name.startswith(ALIKE))
+
+
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_the_steps_are_named_for_what_they_derive(name):
+    steps.check_names(DERIVATIONS[name], NAMES[name])
+
+
+def test_what_is_derived_twice_is_derived_from_something_else():
+    _, by_integral, by_division = DERIVATIONS["transition"].steps
+    assert by_integral.left.has(sp.Integral)
+    assert not by_division.left.has(sp.Integral)
+    *_, of_the_kernel, of_positive_terms = DERIVATIONS["discretization"].steps
+    assert of_the_kernel.left.has(sp.Integral)
+    assert not of_positive_terms.left.has(sp.Integral)
+    *_, of_a_cycle, langevin = DERIVATIONS["steady_state"].steps
+    assert of_a_cycle.left.has(T)
+    assert langevin.left == derivation.walk()
 
 
 def test_there_are_as_many_steps_as_the_chapter_shows():

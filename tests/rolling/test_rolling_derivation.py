@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 import steps
 import sympy as sp
 
@@ -17,10 +18,77 @@ DERIVATIONS = steps.collected(
     derivation.response,
 )
 
+NAMES = {
+    "one_dimension": {
+        r"(3), the first and last lines agree; the middle line lacks $\cos\omega_rt$": (
+            "s*cos(theta)/2 + s*cos(2*omega_r*t + theta)/2 + n*cos(omega_r*t + theta)"
+        ),
+        "(4), the mean of the signal over a turn": "s*cos(theta)/2",
+        "(10), from which (11) keeps the first term": (
+            "s*cos(Delta*t)/2 + s*cos((2*omega_r + Delta)*t)/2 + n*cos((omega_r + Delta)*t)"
+        ),
+    },
+    "two_dimensions": {
+        "(7), $s_3$: derolling inverts rolling; the noise is rotated": (
+            "s_x + n_1*cos(omega_r*t) - n_2*sin(omega_r*t)"
+        ),
+        "(7), $s_4$": "s_y + n_1*sin(omega_r*t) + n_2*cos(omega_r*t)",
+        "a phase error, $s_3$: the other drift appears": "s_x*cos(theta) - s_y*sin(theta)",
+        "the same, $s_4$": "s_x*sin(theta) + s_y*cos(theta)",
+        r"readouts of unequal gain, $1\pm e/2$: the term at twice the roll frequency returns": (
+            "s_x + e/2*(s_x*cos(2*omega_r*t) + s_y*sin(2*omega_r*t))"
+        ),
+    },
+    "fits": {
+        "a fitted ramp $kt$ has the slope $k$": "k",
+        r"off-tuned by $\Delta$, the drift across is $kt\cdot\Delta t$ to first order": "k*Delta*T",
+        "white noise of one-sided density $A/f_r$": "6*A/(f*T**3)",
+        r"the fit's response to a frequency, $z=\pi fT$": "6/T*(sin(z)/z**2 - cos(z)/z)",
+        r"so $\int j_1^2/z\,dz = \frac14$, from $j_0^2 + j_1^2 = 1$ at zero": "(sin(z)/z**2 - cos(z)/z)**2/z",
+        "noise that begins with the record, with $T=1$: $8A/T^2$": "8*A",
+    },
+    "filters": {
+        "single pole: it lags by τ": "tau",
+        "single pole: noise bandwidth": "1/(4*tau)",
+        "moving average: it lags by half its length": "L/2",
+        "moving average: noise bandwidth": "1/(2*L)",
+        "single pole: lag and noise against its bandwidth": "(k*tau)**2 + N_0/(4*tau)",
+        "moving average: the same function": "(k*L/2)**2 + N_0/(2*L)",
+        "never smaller than at $B=B_0$, where $k^2 = 8N_0B_0^3$": "3*N_0*B_0/2",
+        "the least mean square error": "3/4*(k*N_0)**(2/3)",
+    },
+    "ramp_spectrum": {
+        r"the ramp damped by $e^{-st}$; with $s\to i\omega$ it is $-k/\omega^2$": "k/s**2",
+        r"its sign at $s = i\omega$": "-k/omega**2",
+        r"a record of length $T$, with $z=\omega T/2$": ("T**4/4*(sin(z)**2/z**2 + (sin(z)/z**2 - cos(z)/z)**2)"),
+        r"at a whole number $m$ of cycles, $z=\pi m$: it falls as $\omega^{-2}$": "T**4/(2*pi*m)**2",
+    },
+    "roll_rate": {
+        "effect of a step of the rate at $u$ on the fit": "(1 - u)*(1 - u**3)",
+        "without resets": "383*k**2*q/1260",
+        "the same with resets, but for $P/2$": "1 + 3*u**2 - 4*u**3",
+        "with resets": "38*k**2*q/35*(P/2)**2",
+        "a sinusoidal rate: the mean of the phase over a cycle": "-a/Omega*sin(beta)",
+    },
+    "response": {
+        "the decay of a lag": "sin(phi)**2",
+        r"the weight, $dy/(2\cosh(y/2))$": "-2",
+        r"so that lag 1 has $\binom{2k}{k}/4^k$": "1/2",
+        r"so that lag 2 has $\binom{2k}{k}/4^k$": "3/8",
+        r"so that lag 3 has $\binom{2k}{k}/4^k$": "5/16",
+    },
+}
+"""What each step derives, beside its name; see `steps.check_names`."""
+
 
 @steps.each(DERIVATIONS)
 def test_each_step(step):
     steps.check(step)
+
+
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_the_steps_are_named_for_what_they_derive(name):
+    steps.check_names(DERIVATIONS[name], NAMES[name])
 
 
 def test_the_derivations_are_those_of_the_chapter():
