@@ -17,6 +17,7 @@ COMMANDS = {
     "kalman.ensembles": "compute the random filters again",
     "kalman.threshold": "compute the years of hundreds of records again",
     "kalman.mission_runs": "compute the years of the mission model again",
+    "kalman.guarantee.horizon": "compute the bounds for a year of Gravity Probe B again",
     "kalman.guarantee.survey": "compute the survey of guarantees again",
     "wordlength.guarantees": "compute the table of guarantees again",
 }

@@ -12,7 +12,10 @@ from gpbnb.inversion import experiment, stored
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
-    parser = argparse.ArgumentParser(prog="python -m gpbnb.inversion", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m gpbnb.inversion",
+        description="Recompute the long sweeps of the chapter, and write them to a folder.",
+    )
     parser.add_argument(
         "sweeps", nargs="*", default=list(experiment.SWEEPS), help="sweeps to compute: variants, random; default: both"
     )
