@@ -264,7 +264,7 @@ def test_progress_counts_the_steps_of_a_run(tmp_path):
     assert shown == [BLOCK, BLOCK, 100]
 
 
-def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
+def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch, capsys):
     here = tmp_path / "here"
     given = ["--directory", str(tmp_path / "saved"), "--steps", "100", "--cases", "3", "--output", str(here)]
     assert year.main(given) == 0
@@ -291,6 +291,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):
 
     monkeypatch.setattr(year, "run_cases", interrupted)
     assert year.main(given) == 130
+    assert f"to continue from the progress saved in {tmp_path / 'saved'}\n" in capsys.readouterr().err
 
 
 def test_a_year_that_lost_its_variance_says_when():

@@ -115,11 +115,15 @@ def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(s
     assert command(sweep, "--cells", "3") == 0
     assert len(stored("saved")) == 3 * 3
     assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED
-    assert "continue from the progress saved" in capsys.readouterr().err
+    assert capsys.readouterr().err.endswith(
+        f"\ninterrupted; run the same command again to continue from the progress saved in {tmp_path / 'saved'}\n"
+    )
     assert command(dataclasses.replace(sweep, compute=interrupted), "--store", "--output", str(tmp_path / "new")) == 0
     assert stored("new") == stored("saved")
     assert command(sweep) == 0
     assert len(stored("saved")) == 3 * len(CELLS)
+    assert command(sweep, "--directory", str(tmp_path / "other"), "--cells", "2") == 0
+    assert len(stored("other")) == 3 * 2
 
 
 def test_chunks_of_dead_workers_are_sent_again(sweep, tmp_path):
@@ -192,9 +196,57 @@ def test_the_command_reports(sweep, capsys):
     changed = [(*row[:3], "0.5") for row in sweep.load().rows]
     write(sweep.file, COLUMNS, changed, {})
     assert run([sweep], ["verify"]) == 1
-    assert "computed ('" in capsys.readouterr().out
+    first, *others, last = capsys.readouterr().out.splitlines()
+    name, seed, part, value = sweep.verify(1, 1)[0].computed
+    assert first.startswith("tests/normal, ")
+    assert first.endswith(
+        f": stored ('{name}', '{seed}', '{part}', '0.5'), computed ('{name}', '{seed}', '{part}', '{value}')"
+    )
+    assert last == f"1 sweeps, 1 cells of each: {1 + len(others)} differences"
     sweep.file.write_bytes(sweep.file.read_bytes()[:-20])
     assert run([sweep], ["verify"]) == 1
     assert "rows" in capsys.readouterr().err
     with pytest.raises(DamagedFileError):
         sweep.load()
+
+
+def test_the_command_verifies_the_sweeps_that_it_is_told(sweep, capsys, monkeypatch):
+    asked = []
+    monkeypatch.setattr(Sweep, "verify", lambda self, *given: asked.append((self.name, *given)) or [])
+    sweeps = [sweep, dataclasses.replace(sweep, name="tests/other")]
+    assert run(sweeps, ["verify", "tests/other", "--sample", "4", "--seed", "9"]) == 0
+    assert run(sweeps, ["verify"]) == 0
+    assert asked == [("tests/other", 4, 9, True), ("tests/normal", 1, 1, True), ("tests/other", 1, 1, True)]
+    assert capsys.readouterr().out == (
+        "1 sweeps, 4 cells of each: no differences\n2 sweeps, 1 cells of each: no differences\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["verify", "tests/third"], "got sweeps tests/third; needed some of tests/normal"),
+        (["verify", "--sample", "0"], "got --sample 0; needed at least 1"),
+        ([], "usage: python -m gpbnb.sweeps "),
+    ],
+)
+def test_the_command_refuses_what_it_cannot_verify(sweep, capsys, arguments, words):
+    with pytest.raises(SystemExit, match="2"):
+        run([sweep], arguments)
+    assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--help"], "list name, command and provenance of each stored sweep"),
+        (["--help"], "verify compute a sample of each stored sweep again and compare"),
+        (["verify", "--help"], "names names of sweeps, such as kalman/year; default: all"),
+        (["verify", "--help"], "--sample SAMPLE number of cells to compute for each sweep; default: 1"),
+        (["verify", "--help"], "--seed SEED seed that selects the cells; default: 1"),
+    ],
+)
+def test_the_help_of_the_command(sweep, capsys, arguments, words):
+    with pytest.raises(SystemExit, match="0"):
+        run([sweep], arguments)
+    assert words in " ".join(capsys.readouterr().out.split())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import inspect
 import json
 import math
 import shlex
@@ -21,9 +22,10 @@ from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.system import LinearSystem
+from gpbnb.wordlength import __main__ as command
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements, read_model
-from gpbnb.wordlength.report import Answer, Report
+from gpbnb.wordlength.report import Answer, Report, study
 
 MODEL = """
 name = "tracker <1>"
@@ -35,6 +37,8 @@ x0 = [0, 0]
 P0 = [[100, 0], [0, 100]]
 """
 MATRICES = {"A": [["0.5", 0], [0, "0.25"]], "B": [[1], [1]]}
+
+ANSWERED = SimpleNamespace(text="21 digits", digits=21)
 
 
 @pytest.fixture
@@ -87,6 +91,47 @@ def test_a_report_shows_the_arguments_of_the_process(files, monkeypatch, capsys)
     assert main() == 0
     shown = f"python -m gpbnb.wordlength {shlex.join(given)}"
     assert html.escape(shown) in (folder / "out.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("options", "name", "value"),
+    [
+        ([], "tolerance", [0.01, math.inf]),
+        ([], "steps", None),
+        ([], "z", None),
+        ([], "bases", ("emulation", "bound")),
+        ([], "base", 2),
+        ([], "rounding", "nearest"),
+        ([], "form", "innovation"),
+        ([], "source", ""),
+        ([], "within", None),
+        (["--steps", "70"], "steps", 70),
+        (["--base", "10"], "base", 10),
+        (["--rounding", "chop"], "rounding", "chop"),
+        (["--form", "UD"], "form", "UD"),
+        (["--basis", "bound", "--basis", "emulation"], "bases", ["bound", "emulation"]),
+        (["--basis", "probable", "--measurement", "9"], "within", limits(2, 1, measurement=9)),
+    ],
+)
+def test_each_option_is_the_part_of_the_question_that_it_names(files, monkeypatch, options, name, value):
+    asked = []
+    monkeypatch.setattr(command, "study", lambda *given, **named: asked.append((given, named)) or ANSWERED)
+    assert main([str(files[0] / "model.toml"), "--tolerance", "0.01,inf", *options]) == 0
+    ((given, named),) = asked
+    found = inspect.signature(study).bind(*given, **named).arguments
+    assert repr(found[name]) == repr(value)
+
+
+def test_measurements_are_the_source_of_the_answer(files, monkeypatch):
+    folder, z = files
+    asked = []
+    monkeypatch.setattr(command, "study", lambda *given, **named: asked.append(given) or ANSWERED)
+    given = [str(folder / "model.toml"), "--tolerance", "1", "--measurements", str(folder / "z.csv")]
+    assert main(given) == 0
+    ((_, _, measured, *_, source, shown, _),) = asked
+    assert np.array_equal(measured, z, equal_nan=True)
+    assert source == str(folder / "z.csv")
+    assert shown == f"python -m gpbnb.wordlength {shlex.join(given)}"
 
 
 def test_no_answer_has_an_exit_status_of_its_own(files, capsys):
