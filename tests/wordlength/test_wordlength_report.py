@@ -1,0 +1,147 @@
+"""gpbnb.wordlength.report: what the page says beside each number."""
+
+from __future__ import annotations
+
+import html
+import re
+from dataclasses import replace
+
+import pytest
+
+from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.system import LinearSystem
+from gpbnb.wordlength.report import Answer, Report, study
+
+REPORT = Report(
+    name="tracker",
+    kind="Kalman filter",
+    digits=21,
+    text="21 digits of base 2",
+    base=2,
+    rounding="nearest",
+    steps=60,
+    tolerance=(0.01, None),
+    source="z.csv",
+    answers=(
+        Answer("innovation, emulation", "emulation", 21, "enough", ((20, 10.0), (21, 0.4), (22, 0.2))),
+        Answer("UD, bound", "bound", None, "too few", ((20, 100.0),)),
+    ),
+    errors=(0.25, None, 0.5),
+    ranges=(("gain", -3, 5),),
+    command="python -m gpbnb.wordlength model.toml",
+    versions={"numpy": "2.0", "machine": "x86"},
+    limits={"state": (10.0, 0.5), "measurement": (None,)},
+)
+MODEL = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
+
+
+def text_of(page: str) -> str:
+    """What is read, with a blank between elements."""
+    return " ".join(html.unescape(re.sub(r"<style>.*</style>|<[^>]*>", " ", page, flags=re.DOTALL)).split())
+
+
+def tables_of(page: str) -> dict[str, list[list[str]]]:
+    """The cells of each table, header first, by the heading above it."""
+    found = re.findall(r"<h2>([^<]*)</h2>\n<table>(.*?)</table>", page, re.DOTALL)
+    return {
+        heading: [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", table)]
+        for heading, table in found
+    }
+
+
+def test_the_answer_comes_first():
+    assert text_of(REPORT.to_html()).startswith(
+        "Wordlength for tracker Wordlength for tracker This Kalman filter needs 21 bits to keep rounding errors within "
+        "the tolerance. 21 digits of base 2. State 3 of 3 limits the answer: its error is 0.5 of its tolerance. "
+    )
+    assert "needs 21 digits of base 10 to" in text_of(replace(REPORT, base=10).to_html())
+    assert "needs no precision that can be run to" in text_of(replace(REPORT, digits=None).to_html())
+
+
+def test_each_table_holds_what_its_heading_says():
+    assert tables_of(REPORT.to_html()) == {
+        "Basis of the answer": [
+            ["question", "value"],
+            ["steps", "60"],
+            ["measurements", "z.csv"],
+            ["tolerance", "0.01, any"],
+            ["limit on the state", "10, 0.5"],
+            ["limit on the measurement", "any"],
+            ["rounding", "nearest"],
+        ],
+        "Forms and bases compared": [
+            ["form and basis", "bits", "answer"],
+            ["innovation, emulation", "21", "enough"],
+            ["UD, bound", "none", "too few"],
+        ],
+        "Error of each state at the answer": [
+            ["state", "error / tolerance"],
+            ["1", "0.25"],
+            ["2", "not limited"],
+            ["3", "0.5"],
+        ],
+        "Range of the numbers": [["numbers", "smallest", "largest"], ["gain", "2⁻³", "2⁵"]],
+    }
+
+
+@pytest.mark.parametrize(
+    ("basis", "meaning"),
+    [
+        ("emulation", "An emulation holds for these measurements."),
+        ("bound", "A bound holds for the arithmetic of this run, whatever its roundings."),
+        ("guarantee", "A guarantee holds for ever, for all measurements within the limits."),
+        ("probable", "A probable error is three standard deviations, if roundings are independent of each other"),
+    ],
+)
+def test_each_basis_is_explained_and_no_other(basis, meaning):
+    alone = replace(REPORT, answers=(Answer("UD", basis, 21, "", ()),))
+    shown = text_of(alone.to_html()).partition("rounding nearest ")[2]
+    assert shown.startswith(meaning)
+    assert shown.partition(" None of this limits the exponent range")[0].count(".") == 1
+
+
+def test_the_report_ends_with_how_to_reproduce_it():
+    end = "How to reproduce this report python -m gpbnb.wordlength model.toml numpy: 2.0 machine: x86"
+    assert text_of(REPORT.to_html()).endswith(end)
+    assert "report gpbnb.wordlength.report.study(...) numpy" in text_of(replace(REPORT, command="").to_html())
+
+
+def test_the_figure_has_its_axes_and_a_line_for_each_answer():
+    drawn = REPORT.to_html().partition("<h2>Error against precision</h2>")[2]
+    assert text_of(drawn).startswith(
+        "10⁻¹ 10⁰ 10¹ 10² 20 21 22 error / tolerance bits innovation, emulation UD, bound "
+        "Error or bound, divided by the tolerance. The dashed line marks the tolerance. "
+    )
+    lines = dict(
+        zip(
+            re.findall(r'<polyline [^>]*stroke="var\((--c\d)\)"[^>]*stroke-dasharray="([^"]*)"', drawn),
+            re.findall(r'style="border-top: .2rem (\w+) var\((--c\d)\)"></i>([^<]*)', drawn),
+            strict=True,
+        )
+    )
+    assert lines == {
+        ("--c0", ""): ("solid", "--c0", "innovation, emulation"),
+        ("--c1", "7 3"): ("dashed", "--c1", "UD, bound"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "source"),
+    [
+        ({"steps": 5}, "simulated by the model, seed 0"),
+        ({"z": [[1], [2]]}, "given"),
+        ({"steps": 5, "source": "a"}, "a"),
+    ],
+)
+def test_a_study_says_where_its_measurements_come_from(given, source):
+    told: list[str] = []
+    found = study(MODEL, 0.1, bases=("emulation",), tell=told.append, **given)
+    assert (found.kind, found.source, found.steps) == ("Kalman filter", source, given.get("steps", 2))
+    assert [each.label for each in found.answers] == ["innovation, emulation", "Joseph, emulation", "UD, emulation"]
+    assert told[:2] == ["innovation, emulation …", f"innovation, emulation: {found.text}"]
+
+
+def test_a_study_of_a_system_names_only_the_bases():
+    found = study(LinearSystem([["0.5"]], [[1]]), 0.1, [[1], [2]], bases=("bound", "emulation"))
+    assert (found.kind, found.source) == ("linear system", "given")
+    assert [each.label for each in found.answers] == ["bound", "emulation"]
