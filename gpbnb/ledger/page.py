@@ -42,15 +42,20 @@ class LedgerPage:
 
 PAGES = (
     LedgerPage(
-        "ledger-1984-1", "Report of 1984: rounding and inversion in general", "hung1984", r"I|II\.([1-9]|9\..*|10)"
+        "ledger-1984-1",
+        "Ledger: report of 1984, rounding and inversion in general",
+        "hung1984",
+        r"I|II\.([1-9]|9\..*|10)",
     ),
-    LedgerPage("ledger-1984-2", "Report of 1984: inversion by elimination", "hung1984", r"II\.11.*"),
-    LedgerPage("ledger-1984-3", "Report of 1984: Kalman filter", "hung1984", r"II\.1[234]"),
-    LedgerPage("ledger-1984-4", "Report of 1984: roll and deroll", "hung1984", r"III.*"),
-    LedgerPage("ledger-1982-1", "Report of 1982: budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"),
-    LedgerPage("ledger-1982-2", "Report of 1982: inversion by elimination", "hung1982", r"III\.11.*"),
-    LedgerPage("ledger-1982-3", "Report of 1982: Kalman filter, geometry", "hung1982", r"III\.1[23]|IV"),
-    LedgerPage("ledger-2016", "Note of 2016: digital integration", "savage2016", r".*"),
+    LedgerPage("ledger-1984-2", "Ledger: report of 1984, inversion by elimination", "hung1984", r"II\.11.*"),
+    LedgerPage("ledger-1984-3", "Ledger: report of 1984, Kalman filter", "hung1984", r"II\.1[234]"),
+    LedgerPage("ledger-1984-4", "Ledger: report of 1984, roll and deroll", "hung1984", r"III.*"),
+    LedgerPage(
+        "ledger-1982-1", "Ledger: report of 1982, budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"
+    ),
+    LedgerPage("ledger-1982-2", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11.*"),
+    LedgerPage("ledger-1982-3", "Ledger: report of 1982, Kalman filter and geometry", "hung1982", r"III\.1[23]|IV"),
+    LedgerPage("ledger-2016", "Ledger: note of 2016, digital integration", "savage2016", r".*"),
 )
 """The pages of the complete ledger; each statement is on exactly one of them."""
 

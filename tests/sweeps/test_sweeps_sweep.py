@@ -114,7 +114,7 @@ def test_the_command_goes_on_after_an_interruption_and_stores_what_is_finished(s
 
     assert command(sweep, "--cells", "3") == 0
     assert len(stored("saved")) == 3 * 3
-    assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED
+    assert command(dataclasses.replace(sweep, compute=interrupted)) == INTERRUPTED == 130
     assert capsys.readouterr().err.endswith(
         f"\ninterrupted; run the same command again to continue from the progress saved in {tmp_path / 'saved'}\n"
     )
