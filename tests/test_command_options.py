@@ -18,9 +18,11 @@ from gpbnb.inversion import __main__ as inversion
 from gpbnb.inversion import stored as stored_inversion
 from gpbnb.kalman import ensembles
 from gpbnb.kalman.guarantee import horizon, survey
+from gpbnb.ledger import __main__ as ledger
 from gpbnb.rolling import __main__ as rolling
 from gpbnb.sweeps import read
 from gpbnb.sweeps.sweep import Sweep
+from gpbnb.wordlength import __main__ as wordlength
 from gpbnb.wordlength import guarantees
 
 LIMITS = "guarantee and probable: largest size of each {} of the filter without rounding"
@@ -165,6 +167,26 @@ def test_each_option_has_its_default_and_its_help(module, monkeypatch):
     for action, (default, words) in zip(actions, options.values(), strict=True):
         assert (str(action.default) if isinstance(action.default, Path) else action.default) == default
         assert words in action.help
+
+
+@pytest.mark.parametrize(
+    ("command", "statuses"),
+    [
+        (
+            wordlength,
+            "Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.",
+        ),
+        (
+            ledger,
+            "exit status: 0, every selected entry has a finding; 1, some entries have no check; 2, the arguments are "
+            "invalid, or the ledger or the output file cannot be used; 3, a check raised an exception",
+        ),
+    ],
+)
+def test_the_help_tells_the_exit_statuses(command, statuses, capsys):
+    with pytest.raises(SystemExit, match="0"):
+        command.main(["--help"])
+    assert statuses in " ".join(capsys.readouterr().out.split())
 
 
 # -- python -m gpbnb ----------------------------------------------------------------------------------------
