@@ -116,17 +116,15 @@ class FloatArray(NumPyProtocols):
         given = entries(values)
         m, e = np.empty(given.shape, object), np.empty(given.shape, object)
         kernel = fmt.kernel
-        for index in np.ndindex(given.shape):
-            value = given[index]
-            where = f"entry {_place(index)}: " if index else ""
+        for index, value in np.ndenumerate(given):
             try:
                 ratio = exact_ratio(value)
                 pair = kernel.from_decimal(*ratio)
             except (TypeError, ValueError, OverflowError) as error:
-                raise type(error)(f"{where}{error}") from None
+                raise type(error)(f"{_entry(index)}{error}") from None
             if exactly and not kernel.is_exactly(pair, *ratio):
                 raise ValueError(
-                    f"{where}got the operand {value!r}; needed a number that {fmt} holds exactly; "
+                    f"{_entry(index)}got the operand {value!r}; needed a number that {fmt} holds exactly; "
                     "round it first: fmt.array(...)"
                 )
             m[index], e[index] = pair
@@ -445,6 +443,10 @@ def _first(condition: Any) -> tuple[int, ...] | None:
 
 def _place(index: tuple[int, ...]) -> str:
     return f"[{', '.join(map(str, index))}]"
+
+
+def _entry(index: tuple[int, ...]) -> str:
+    return f"entry {_place(index)}: " if index else ""
 
 
 def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:

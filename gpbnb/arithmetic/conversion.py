@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence, Set
 from decimal import Decimal
+from fractions import Fraction
 from numbers import Rational
 from typing import Any
 
@@ -28,6 +29,8 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
     TypeError : `value` is not a number.
     ValueError : a string that is not a number; NaN or infinity.
     """
+    if type(value) is Fraction:  # the commonest, and its class is slow to ask
+        return value.numerator, value.denominator, 0
     if isinstance(value, str):
         return _read(value)
     if isinstance(value, (bool, np.bool_)):

@@ -36,7 +36,7 @@ def exact(values: Any) -> NDArray[Any]:
                 index = np.unravel_index(i, entries.shape)
                 where = f"entry {', '.join(map(str, index))}: " if index else ""
                 raise type(error)(f"{where}{error}") from None
-            entry = Fraction(p, q) * Fraction(10) ** power
+            entry = Fraction(p, q) * Fraction(10) ** power if power else Fraction(p, q)
         fractions[i] = entry
     return fractions.reshape(entries.shape)
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -15,7 +16,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.rules import Order
+from gpbnb.arithmetic.kernels.rules import Order, Rounding
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
@@ -267,26 +268,14 @@ class Run:
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
     def _packed_matrix(self, model: LinearModel, letter: str) -> NDArray[Any]:
-        try:
-            return self.as_packed(getattr(model, letter))
-        except OverflowError as error:
-            raise OverflowError(f"{letter}: {error}") from None
+        # Random roundings differ from run to run.
+        random = self.fmt is not None and self.fmt.rounding is Rounding.STOCHASTIC
+        packed = _packed_matrix.__wrapped__ if random else _packed_matrix
+        return packed(model, self.fmt, letter).copy()
 
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Round numbers into the format, and return them as the compiled loops expect them."""
-        if self.fmt is None:
-            entries = np.asarray(values)
-            if entries.dtype == np.float64:
-                if not np.isfinite(entries).all():
-                    raise ValueError("got measurements with NaN or infinity; needed finite numbers")
-                return np.stack([entries, np.zeros_like(entries)], axis=-1)
-            return double_doubles(entries)
-        array = self.fmt.array(values)
-        if not isinstance(array.backend, Compiled):
-            raise OverflowError(
-                f"got numbers beyond the range of the compiled loops of {self.fmt}; scale the states, or use base 10"
-            )
-        return array.backend.pack(array.components)
+        return _as_packed(self.fmt, values)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""
@@ -314,6 +303,30 @@ class Run:
             gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
             covariances[at] = covariance_of_factors(U[at])
         return gains, covariances
+
+
+def _as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
+    if fmt is None:
+        entries = np.asarray(values)
+        if entries.dtype == np.float64:
+            if not np.isfinite(entries).all():
+                raise ValueError("got measurements with NaN or infinity; needed finite numbers")
+            return np.stack([entries, np.zeros_like(entries)], axis=-1)
+        return double_doubles(entries)
+    array = fmt.array(values)
+    if not isinstance(array.backend, Compiled):
+        raise OverflowError(
+            f"got numbers beyond the range of the compiled loops of {fmt}; scale the states, or use base 10"
+        )
+    return array.backend.pack(array.components)
+
+
+@lru_cache(maxsize=48)
+def _packed_matrix(model: LinearModel, fmt: FloatFormat | None, letter: str) -> NDArray[Any]:
+    try:
+        return _as_packed(fmt, getattr(model, letter))
+    except OverflowError as error:
+        raise OverflowError(f"{letter}: {error}") from None
 
 
 def check_compiled(fmt: FloatFormat) -> None:

@@ -7,6 +7,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from flint import fmpq
 from numpy.typing import NDArray
 
 from gpbnb.kalman.model import LinearModel
@@ -69,7 +70,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     cycle = math.lcm(turn // math.gcd(turn, 20), orbit // 20)
     times = [20 * (k + 1) for k in range(cycle)]
     C, S = (np.array([wave(t, turn) for t in times], dtype=object) for wave in (_cosine, _sine))
-    size = Fraction("5.2")
+    size = fmpq(26, 5)
     known = np.array([[0, size * _cosine(t, orbit), size * _sine(t, orbit)] for t in times], dtype=object)
     gyro = measurement_rows(C, S, _COLUMNS, derolled=False, nominal_theta=known)[:, 1]
     telescope = measurement_rows(C, S, _COLUMNS, signal="telescope", derolled=False)[:, 1]
@@ -102,10 +103,10 @@ def _diagonal(entries: str) -> NDArray[Any]:
     return matrix
 
 
-def _cosine(part: int, whole: int) -> Fraction:
+def _cosine(part: int, whole: int) -> fmpq:
     # The last digits of a cosine depend on the machine; six decimals do not.
-    return Fraction(round(1_000_000 * math.cos(2 * math.pi * (part % whole) / whole)), 1_000_000)
+    return fmpq(round(1_000_000 * math.cos(2 * math.pi * (part % whole) / whole)), 1_000_000)
 
 
-def _sine(part: int, whole: int) -> Fraction:
-    return Fraction(round(1_000_000 * math.sin(2 * math.pi * (part % whole) / whole)), 1_000_000)
+def _sine(part: int, whole: int) -> fmpq:
+    return fmpq(round(1_000_000 * math.sin(2 * math.pi * (part % whole) / whole)), 1_000_000)

@@ -319,12 +319,17 @@ class LinearModel:
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
         """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter."""
-        return {letter: getattr(self, letter).astype(np.float64) for letter in _LETTERS}
+        return {letter: entries.copy() for letter, entries in _floats(self).items()}
 
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 _INPUTS = ("B", "u", "b", "d")
 _COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
+
+
+@lru_cache(maxsize=16)
+def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
+    return {letter: getattr(model, letter).astype(np.float64) for letter in _LETTERS}
 
 
 @lru_cache(maxsize=16)
