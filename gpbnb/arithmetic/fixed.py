@@ -21,6 +21,7 @@ from gpbnb.arithmetic.kernels.limited_backends import (
     limited_backend,
     limited_exact,
     mixed_tag,
+    restart,
     run_tag,
 )
 from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules, rounding_named
@@ -147,6 +148,10 @@ class FixedFormat:
         if sums is not None:
             return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
         return run_tag(self.backend, self._rules, fused, order, block)
+
+    def restart(self) -> None:
+        """Restart the random numbers of stochastic rounding."""
+        restart(self.kernel, self.backend)
 
     def round(self, value: Any) -> Fraction:
         """Round one number into the format; see :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""

@@ -17,13 +17,13 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
-from gpbnb.arithmetic.kernels.limited import LimitedKernel, limited_kernel
+from gpbnb.arithmetic.kernels.limited import limited_kernel
 from gpbnb.arithmetic.kernels.limited_backends import (
     Accumulator,
-    LimitedFloats,
     limited_backend,
     limited_exact,
     mixed_tag,
+    restart,
     run_tag,
 )
 from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules, rounding_named
@@ -51,8 +51,8 @@ class FloatFormat:
     subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Otherwise
         results that are below it after rounding become zero.
     largest : the largest number, if it is not the one whose t digits are all b - 1.
-    seed : seed for stochastic rounding. Each filter run starts its random numbers from the seed; operations on arrays
-        continue one sequence, which :meth:`restart` restarts.
+    seed : seed for stochastic rounding. Each run of a filter restarts the random numbers from the seed, those of arrays
+        included; operations on arrays continue one sequence, which :meth:`restart` restarts.
 
     Raises
     ------
@@ -201,9 +201,7 @@ class FloatFormat:
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""
-        for part in (self.kernel, self.backend):
-            if isinstance(part, (LimitedKernel, LimitedFloats)):
-                part.restart()
+        restart(self.kernel, self.backend)
 
     @property
     def backend(self) -> Backend:

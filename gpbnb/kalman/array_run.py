@@ -67,6 +67,7 @@ class ArrayRun:
         self._sound = model.definite_in(fmt)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(self._sound.repairs)
+        fmt.restart()
         self._given = {letter: self._cycle(letter) for letter in ("Phi", "H", "Q", "R", "B", "u", "b", "d")}
         self.x, self.P = fmt.array(model.x0), fmt.array(self._sound.P0)
         self._identity = fmt.array(np.eye(model.n, dtype=int))

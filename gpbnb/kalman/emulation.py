@@ -138,6 +138,7 @@ def emulate(
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     if not hasattr(z, "to_fractions"):
         model, z = without_missing(model, z)
+    fmt.restart()
     measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
     model.check_measurements(measured, 0)
     if not len(measured):

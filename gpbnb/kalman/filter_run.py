@@ -106,6 +106,8 @@ class Run:
         stored = model if fmt is None else model.definite_in(fmt)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(stored.repairs)
+        if fmt is not None:
+            fmt.restart()
         Phi, H, Q, R, x0, P0 = (self._packed_matrix(stored, letter) for letter in ("Phi", "H", "Q", "R", "x0", "P0"))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)

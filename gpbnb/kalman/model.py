@@ -311,6 +311,7 @@ class LinearModel:
         ValueError : a stored covariance is indefinite in spite of :meth:`definite_in`.
         """
         sound = self.definite_in(fmt)
+        fmt.restart()
         given = [letter for letter in (*_LETTERS, *_INPUTS) if getattr(self, letter) is not None]
         stored = {letter: fmt.array(getattr(sound, letter)).to_fractions() for letter in given}
         made = LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)

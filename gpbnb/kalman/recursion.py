@@ -128,6 +128,7 @@ def _float(value: Fraction) -> float:
 
 def _outputs(run: Recursion, fmt: FloatFormat, z: NDArray[Any] | None, steps: int | None) -> FloatArray:
     """Return the outputs of the function, (steps, p)."""
+    fmt.restart()
     found = run(fmt) if z is None else run(fmt, fmt.array(z))
     if isinstance(found, (list, tuple)) and found and all(isinstance(each, FloatArray) for each in found):
         found = np.stack(found)

@@ -139,6 +139,7 @@ class LinearSystem:
             if not isinstance(fmt.backend, Compiled):
                 raise ValueError(f"got {fmt}; needed a format with compiled loops: base 2, 10 or 16")
             tag = fmt.run_tag()
+            fmt.restart()
             coefficients, z, x = (pack(fmt, each) for each in (given.coefficients, inputs, start))
         program, out = given.program, np.zeros((len(inputs), *x.shape), x.dtype)
         first = x.copy()

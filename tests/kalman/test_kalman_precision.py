@@ -241,10 +241,32 @@ def test_masked_inputs_are_refused():
 
 
 def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
-    found = required_precision(MODEL, STEPS, 1e-30, z=Z, rounding="stochastic")
+    # Not a model of a filter, for which all forms would be compiled with random rounding.
+    found = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)), rounding="stochastic")
     assert found.fmt is None
     assert found.tried[-1][0] == 29
     assert "no precision up to 29 digits" in str(found)
+
+
+@pytest.mark.parametrize("form", ["innovation", "symmetrized"])
+def test_a_seed_selects_the_random_roundings_of_a_run(form):
+    """The model and the measurements are rounded at random, too."""
+    first, again, other = (
+        emulate(MODEL, Z, FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed), form).state for seed in (1, 1, 2)
+    )
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def squares(fmt, z):
+    return [x * x for x in z]
+
+
+@pytest.mark.parametrize("given", [LinearSystem([["0.9"]], [["0.1"]]), squares], ids=["system", "function"])
+def test_an_answer_with_random_rounding_comes_out_again(given):
+    z = np.round(np.sin(np.arange(8.0)), 3).reshape(-1, 1)
+    first, again = (required_precision(given, 8, 1e-3, z=z, rounding="stochastic") for _ in range(2))
+    assert first == again
 
 
 def test_its_own_measurements_are_seeded():

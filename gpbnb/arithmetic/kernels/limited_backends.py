@@ -10,7 +10,8 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Backend, Compiled, Components, Exact, Floats, Pairs
-from gpbnb.arithmetic.kernels.limited import limited_kernel
+from gpbnb.arithmetic.kernels.exact import ExactKernel
+from gpbnb.arithmetic.kernels.limited import LimitedKernel, limited_kernel
 from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Order, Rounding, Rules
 
 _CODES = {
@@ -160,6 +161,13 @@ def check_order(order: Order, fused: bool, block: int) -> None:
         raise ValueError(f"block: got {block}; needed at least 1")
     if fused and order == "pairwise":
         raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
+
+
+def restart(kernel: ExactKernel, backend: Backend) -> None:
+    """Restart the random numbers of stochastic rounding, if there are any."""
+    for part in (kernel, backend):
+        if isinstance(part, (LimitedKernel, LimitedFloats)):
+            part.restart()
 
 
 def run_tag(backend: Backend, rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
