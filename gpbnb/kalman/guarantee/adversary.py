@@ -375,7 +375,7 @@ def run_against(
         found.limits,
         steer,
         by_range,
-        ramp,
+        float(ramp),
         ahead,
         chosen,
         errors,
