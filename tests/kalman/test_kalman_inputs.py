@@ -166,16 +166,16 @@ CART = {
 
 @pytest.mark.parametrize("basis", ["emulation", "bound"])
 def test_answers_with_inputs(basis):
-    u = np.sin(np.arange(200) / 7).reshape(-1, 1)
+    u = np.sin(np.arange(60) / 7).reshape(-1, 1)
     cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=u, d=["0.5"])
-    answer = required_precision(cart, 200, [1e-3, 1e-2], basis=basis)
+    answer = required_precision(cart, 60, [1e-3, 1e-2], basis=basis)
     assert answer.fmt is not None
     assert dict(answer.tried)[answer.precision] <= 1 < dict(answer.tried)[answer.precision - 1]
 
 
 @pytest.mark.parametrize("basis", ["emulation", "bound"])
 def test_answers_with_inputs_do_not_depend_on_units(basis):
-    u = np.sin(np.arange(60) / 7).reshape(-1, 1)
+    u = np.sin(np.arange(20) / 7).reshape(-1, 1)
     cart = LinearModel(**CART, B=[["0.005"], ["0.1"]], u=u, b=["0.001", 0], d=["0.5"])
     scale = Fraction(2) ** -40
     small = replace(
@@ -186,8 +186,8 @@ def test_answers_with_inputs_do_not_depend_on_units(basis):
         **{letter: getattr(cart, letter) * scale**2 for letter in ("Q", "R", "P0")},
     )
     answers = [
-        required_precision(cart, 60, 1e-3, basis=basis),
-        required_precision(small, 60, 1e-3 * float(scale), basis=basis),
+        required_precision(cart, 20, 1e-3, basis=basis),
+        required_precision(small, 20, 1e-3 * float(scale), basis=basis),
     ]
     assert answers[0].tried == answers[1].tried
 
@@ -227,7 +227,7 @@ def test_missing_measurements_with_inputs():
 def test_answers_of_the_forms_without_compiled_loops(form):
     cart = LinearModel(**CART)
     for basis in ("emulation", "bound"):
-        answer = required_precision(cart, 50, 1e-3, form=form, basis=basis)
+        answer = required_precision(cart, 20, 1e-3, form=form, basis=basis)
         assert answer.fmt is not None
         assert isinstance(answer.form, ArrayForm)
 
@@ -242,8 +242,8 @@ def test_square_roots_survive_where_the_innovation_form_loses_its_variance():
         x0=[0, 0],
         P0=[["1e4", 0], [0, "1e4"]],
     )
-    z = simulated_measurements(precise, 100)
-    needed = {form: required_precision(precise, 100, 0.1, z=z, form=form) for form in ("innovation", "Carlson")}
+    z = simulated_measurements(precise, 30)
+    needed = {form: required_precision(precise, 30, 0.1, z=z, form=form) for form in ("innovation", "Carlson")}
     assert needed["Carlson"].precision < needed["innovation"].precision
 
 
