@@ -57,7 +57,7 @@ class Step:
     @property
     def holds(self) -> bool:
         """Whether SymPy finds both sides equal and `rest` nonnegative."""
-        return _holds(self.left, self.right, self.rest)
+        return _vanishes(self.left - self.right - self.rest) and (self.rest == 0 or self.rest.is_nonnegative is True)
 
     def __str__(self) -> str:
         return f"{self.name}: {self.left} = {self.right}" + (f" + [{self.rest} >= 0]" if self.rest != 0 else "")
@@ -104,9 +104,8 @@ class Derivation:
 
 
 @cache  # a chapter, its checks and its tests evaluate the same steps repeatedly
-def _holds(left: sp.Expr, right: sp.Expr, rest: sp.Expr) -> bool:
-    difference = (left - right - rest).doit().expand().simplify()
-    return bool(difference == 0 and (rest == 0 or rest.is_nonnegative is True))
+def _vanishes(difference: sp.Expr) -> bool:
+    return bool(difference.doit().expand().simplify() == 0)
 
 
 def _latex(expression: sp.Expr) -> str:

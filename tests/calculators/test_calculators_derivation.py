@@ -22,7 +22,7 @@ from gpbnb.rounding import derivation as rounding
 
 BY_ID = {each.id: each for each in forms.CALCULATORS}
 
-DERIVATIONS = steps.collected(derivation.chopped, derivation.forgotten, derivation.lost)
+DERIVATIONS = steps.Derivations(derivation.chopped, derivation.forgotten, derivation.lost)
 NAMES = {
     "chopped": {
         "a dropped $vb^{e-t}$ over the least number that had it": "b**(1 - t)/(1 + s + b**(1 - t))",

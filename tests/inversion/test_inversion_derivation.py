@@ -9,7 +9,7 @@ import sympy as sp
 from gpbnb.display.derivation import first_order
 from gpbnb.inversion import derivation, theory
 
-DERIVATIONS = steps.collected(
+DERIVATIONS = steps.Derivations(
     derivation.first_approach,
     derivation.first_approach_norms,
     derivation.one_step,
@@ -105,9 +105,10 @@ NAMES = {
 """What each step derives, beside its name; see `steps.check_names`."""
 
 
-@steps.each(DERIVATIONS)
-def test_each_step(step):
-    steps.check(step)
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_each_step(name):
+    for step in DERIVATIONS[name].steps:
+        steps.check(step)
 
 
 @pytest.mark.parametrize("name", DERIVATIONS)

@@ -10,7 +10,7 @@ import sympy as sp
 from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.kalman import derivation, exact_step
 
-DERIVATIONS = steps.collected(
+DERIVATIONS = steps.Derivations(
     derivation.report,
     derivation.propagated,
     derivation.general,
@@ -96,9 +96,10 @@ NAMES = {
 """What each step derives, beside its name; see `steps.check_names`."""
 
 
-@steps.each(DERIVATIONS)
-def test_each_step(step):
-    steps.check(step)
+@pytest.mark.parametrize("name", DERIVATIONS)
+def test_each_step(name):
+    for step in DERIVATIONS[name].steps:
+        steps.check(step)
 
 
 @pytest.mark.parametrize("name", DERIVATIONS)
