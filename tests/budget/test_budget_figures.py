@@ -7,6 +7,7 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from tabulated import by_header
 
 from gpbnb.budget import experiment, figures, tables, theory
 from gpbnb.display import style
@@ -67,16 +68,45 @@ def test_table_of_sources():
     assert worst[6] == f"{BUDGET.worst_case:.4g}"
 
 
+def test_a_line_of_the_table_of_sources():
+    noise = theory.Source("readings", theory.Kind.PROCESS, theory.ErrorForm.NOISE, 1.2345, 0.56784, 0.5, 1.0, "sensor")
+    bias = theory.Source("offset", theory.Kind.CONSTANT, theory.ErrorForm.BIAS, 0.12345)
+    table = tables.sources(theory.Budget((noise, bias)))
+    line, _, total, worst = by_header(table)
+    assert table.title == "2 sources"
+    assert line == {
+        "source": "readings",
+        "kind": "random process",
+        "form": "noise",
+        "error (mas)": "1.23",
+        "reduced by": "roll × 0.568, orbit × 0.5",
+        "group": "sensor",
+        "remaining (mas)": "0.35",
+        "share": "89.0 %",
+    }
+    empty = dict.fromkeys(("kind", "form", "error (mas)", "reduced by", "group"), "")
+    assert total == {"source": "root-sum-square", **empty, "remaining (mas)": "0.3716", "share": "100.0 %"}
+    assert worst == {"source": "worst case", **empty, "remaining (mas)": "0.4739", "share": ""}
+
+
 def test_table_of_refused_rows():
     table = tables.refused(READING)
     assert [row[0] for row in table.body] == ["9", "10", "11", "12"]
     assert "TBD" in table.body[0][2]
     assert table.body[0][1].startswith("starlight, deterministic")
+    assert table.title == "4 rejected rows"
+    assert by_header(table)[1] == {
+        "line": "10",
+        "row": "magnetic field, random process, , 0.1, , , , , ",
+        "reason": "form is ''; needed one of bias, drift, scale factor, noise",
+    }
 
 
 def test_table_of_the_curve():
     table = tables.curve([("printed", 44, 0.15)])
-    assert dict(zip(table.header, *table.body, strict=True)) == {
+    assert table.title == "1 cases"
+    (line,) = by_header(table)
+    assert line == {
         "case": "printed",
         "sources": "44",
         "error of each (mas)": "0.1500",

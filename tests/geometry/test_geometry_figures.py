@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from tabulated import by_header
 
 from gpbnb.display import style
 from gpbnb.geometry import experiment, figures, tables, theory
@@ -116,6 +119,23 @@ def test_table_of_misalignments(both):
     assert row[5] == "0.004; −0.640"
 
 
+def test_each_effect_of_a_misalignment_has_its_column(both):
+    still, rolled = both
+    moved = replace(rolled, drift=rolled.drift + np.array([1, 2]) * MAS)
+    table = tables.misalignments({"gamma1 and gamma2": (still, moved)})
+    assert table.title == "1 cases, errors of $\\varphi_2, \\varphi_3$ in milliarcseconds"
+    (line,) = by_header(table)
+    assert line == {
+        "angle": r"$\gamma_1$ and $\gamma_2$",
+        "no roll: angle": "10,000; −0.970",
+        "no roll: drift": "0.004; −0.640",
+        "rolling: at roll frequency": "10,000",
+        "rolling: angle": "0",
+        "rolling: drift": "0.004; −0.640",
+        "drift, simulated": "1.004; 1.360",
+    }
+
+
 def test_table_of_fates():
     size = 20 * ARCSEC
     names = ("alpha1", "alpha2", "beta1", "beta3", "gamma1", "gamma2")
@@ -132,13 +152,21 @@ def test_table_of_fates():
     assert table.body[2][1:4] == ("0", "0.640; 0", "0.640; 0")
     assert table.body[3][1:4] == ("0; 20,000", "0; 20,000", "0")
     assert table.body[5][1:4] == ("0", "0; 20,000", "0; 20,000")
+    assert table.title == "6 angles, errors in milliarcseconds: mean; oscillation at the roll frequency"
+
+
+def test_an_error_that_only_oscillates_in_both_readings_cancels():
+    oscillation = experiment.Part(0.0, ARCSEC)
+    parts = {"telescope": oscillation, "gyro": oscillation, "difference": experiment.Part(0.0, 0.0)}
+    assert tables.fate(parts) == "cancels"
 
 
 def test_numbers_in_cells():
-    assert [tables.number(x * MAS) for x in (0, -1e-5, 1.23456, -12.3456, 20000.4, 123456.7)] == [
+    assert [tables.number(x * MAS) for x in (0, -1e-5, 1.23456, 10, -12.3456, 20000.4, 123456.7)] == [
         "0",
         "0",
         "1.235",
+        "10.00",
         "−12.35",
         "20,000",
         "123,457",
@@ -146,3 +174,6 @@ def test_numbers_in_cells():
     assert tables._symbols("gamma1 and alpha_rate2") == r"$\gamma_1$ and $\dot\alpha_2$"
     assert tables._symbols("no angle") == "no angle"
     assert tables.reach([("beta2", ARCSEC * 3649)], MAS).body == ((r"$\beta_2$", "3,600", "1"),)
+    table = tables.reach([("beta2", ARCSEC * 3649)], 0.25 * MAS)
+    assert table.title == "angles that cause an error of 0.25 mas"
+    assert by_header(table) == [{"angle": r"$\beta_2$", "in arcseconds": "3,600", "in degrees": "1"}]
