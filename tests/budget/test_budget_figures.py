@@ -69,7 +69,7 @@ def test_table_of_sources():
 
 
 def test_a_line_of_the_table_of_sources():
-    noise = theory.Source("readings", theory.Kind.PROCESS, theory.ErrorForm.NOISE, 1.2345, 0.56784, 0.5, 1.0, "sensor")
+    noise = theory.Source("readings", theory.Kind.PROCESS, theory.ErrorForm.NOISE, 1.2345, 0.56781, 0.5, 1.0, "sensor")
     bias = theory.Source("offset", theory.Kind.CONSTANT, theory.ErrorForm.BIAS, 0.12345)
     table = tables.sources(theory.Budget((noise, bias)))
     line, _, total, worst = by_header(table)

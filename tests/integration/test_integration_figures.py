@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from drawn import GREY, named
 from matplotlib.patches import Circle, Rectangle
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
@@ -208,6 +209,20 @@ def test_sensor_table():
     assert "m/s/√h" in table.header[-1]
 
 
+def test_each_walk_of_a_sensor_has_its_column():
+    table = tables.sensor(2.0, 50.0, "m/s", [1234.5, 123.4])
+    assert table.title == "random walk at 2 rates"
+    assert [row["$f_c$, Hz"] for row in by_header(table)] == ["1234.5", "123.4"]
+    assert by_header(table)[1] == {
+        "$f_c$, Hz": "123.4",
+        "$\\mu$, rad": "2.55",
+        "(35), m/s/√s": "0.112",
+        "(39), m/s/√s": "0.117",
+        "(39)/(35) − 1": "0.05",
+        "(35), m/s/√h": "6.7",
+    }
+
+
 def test_rules_table():
     process = theory.first_order(1.0, 1.0)
     table = tables.rules([(process, 2.0)])
@@ -219,15 +234,47 @@ def test_rules_table():
     assert {row[0]: row[1] for row in table.body}["Boole"] == "4"
 
 
+def test_each_input_of_the_table_of_rules_has_its_column():
+    table = tables.rules([(theory.first_order(1.0, 1.0), 2.0), (theory.resonant(1.0, 2.3456, 0.05), 10.0)])
+    assert table.title == "9 rules"
+    rows = {row["rule"]: row for row in by_header(table)}
+    assert rows["Boole"] == {
+        "rule": "Boole",
+        "period (cycles)": "4",
+        "weights of the samples": "8/15, 28/45, 64/45, 64/45",
+        "first order, $|p|T = 0.5$": "1.238",
+        "resonant, ζ = 0.05, $|p|T = 0.235$": "1.955",
+    }
+    assert rows["two speeds, 4 samples"]["weights of the samples"] == "1"
+
+
 def test_slips_table():
-    rows = {row[0]: row for row in tables.misprints(0.3, 0.02).body}
+    table = tables.misprints(0.3125, 0.02)
+    rows = {row[0]: row for row in table.body}
+    assert table.title == "5 misprints"
+    assert by_header(table)[0] == {
+        "misprint in": "(12)",
+        "result as printed / ($\\sigma_x^2T$), at $\\mu = 0.3125$": "-6.348",
+        "correct": "0.051999",
+        "affects (35)": "yes",
+    }
     assert rows["(25)"][-1] == "no"
     assert [place for place, row in rows.items() if row[-1] == "yes"] == ["(12)", "(18)", "(34)", "(37)"]
-    assert float(rows["(12)"][1]) == pytest.approx(float(theory.walk_factor(0.3)) - 2 / 0.3, rel=1e-3)
+    assert float(rows["(12)"][1]) == pytest.approx(float(theory.walk_factor(0.3125)) - 2 / 0.3125, rel=1e-3)
 
 
 def test_design_table():
-    rows = tables.design(628.0, 3600.0, [16]).body
+    table = tables.design(628.0, 3600.0, [16])
+    rows = table.body
+    assert table.title == "2 formats"
+    assert by_header(table)[0] == {
+        "format": "16 bits",
+        "rounding": "nearest",
+        "best $f_c$, Hz": "7.46e+03",
+        "best $f_c$ by closed form, Hz": "9.55e+03",
+        "discretization error, s": "0.082",
+        "rounding error, s": "0.091",
+    }
     assert rows[1] == ("16 bits", "chop", "none", "", "", "")
     fmt = FloatFormat(2, 16)
     best = theory.best_rate(628.0, 3600.0, fmt)
