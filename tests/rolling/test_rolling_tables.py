@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.rolling import experiment, tables, theory
@@ -29,12 +30,60 @@ def test_registers():
             assert cells == pytest.approx(expected, rel=6e-3)
 
 
+def test_each_cost_of_a_register_has_its_column():
+    table = tables.registers(600.5, [FloatFormat(10, 6), FloatFormat(10, 10, Rounding.CHOP)])
+    assert table.title == "What rounding the roll rate of 600.5 s costs"
+    assert table.body[-1][-1] == "0.386"
+    assert by_header(table)[0] == {
+        "register": "6 decimal digits",
+        "case": "worst",
+        "$\\Delta\\omega$ (rad/s)": "5.000e-08",
+        "phase after a year (rad)": "1.577e+00",
+        "share of the signal lost, one dimension": "1.006e+00",
+        "false drift at right angles, two dimensions (mas a year)": "7,285",
+    }
+
+
 def test_phase_costs():
-    (cells,) = tables.phase_costs({"one degree": math.radians(1)}).body
+    table = tables.phase_costs({"one degree": math.radians(1)})
+    assert table.title == "What a phase error costs"
+    assert by_header(table) == [
+        {
+            "phase error": "one degree",
+            "power lost, one dimension": "0.0305 %",
+            "geodetic (mas a year)": "-1.7",
+            "frame dragging (mas a year)": "115",
+        }
+    ]
+    (cells,) = table.body
     x, y = theory.phase_error_cost(theory.DRIFTS, math.radians(1))
     assert cells[0] == "one degree"
     assert float(cells[1].removesuffix(" %")) == pytest.approx(100 * math.sin(math.radians(1)) ** 2, rel=5e-3)
     assert [float(cells[2]), float(cells[3])] == pytest.approx([x, y], rel=5e-3)
+
+
+def test_simulated_and_computed_drift_errors_have_their_columns():
+    """A hundred errors of the same size, whose root mean square has a standard error of a fourteenth."""
+    errors = np.stack([np.full((50, 2), 30.0), np.full((50, 2), 0.1)])
+    study = experiment.DriftStudy((None, 600.5), 100.0, 3155760, 10.0, errors)
+    table = tables.drift_errors(study)
+    assert table.title == "Standard error of a drift rate (mas a year)"
+    assert by_header(table) == [
+        {
+            "roll period": "none",
+            "simulated": "30 ± 2",
+            "closed form": "28.3",
+            "difference / standard error": "+0.9",
+            "gain over no roll": "1",
+        },
+        {
+            "roll period": "600.5 s",
+            "simulated": "0.1 ± 0.007",
+            "closed form": "0.107",
+            "difference / standard error": "-0.9",
+            "gain over no roll": "265",
+        },
+    ]
 
 
 def test_drift_errors():
@@ -57,7 +106,18 @@ def test_drift_errors():
 
 def test_filters():
     named = {"pole": theory.single_pole(500.0), "turn": theory.moving_average(1200.0)}
-    body = tables.filters(named, 6600.0, 10.0, 600.0, 9000, 10.0).body
+    table = tables.filters(named, 6600.0, 10.0, 600.0, 9000, 10.0)
+    body = table.body
+    assert table.title == "What filters leave, in mas at the end of the record"
+    assert by_header(table)[0] == {
+        "filter": "pole",
+        "lag": "0.104",
+        "noise in the band": "1.73",
+        "slow noise let through": "2.1",
+        "total noise, exact": "2.38",
+        "image, one dimension": "1.8",
+    }
+    assert by_header(table)[1]["slow noise let through"] == "0"
     for (name, weights), cells in zip(named.items(), body, strict=True):
         assert cells[0] == name
         image = experiment.image_behind(weights, 6600.0, 600.0, 9000)
@@ -74,7 +134,16 @@ def test_filters():
 
 def test_needed():
     steps = [100, 1000, 4000]
-    body = tables.needed([600.0], [10], 6600.0, steps, 1e-4).body
+    table = tables.needed([600.0], [10], 6600.0, steps, 1e-4)
+    body = table.body
+    assert table.title == "Digits for 0.0001 mas"
+    assert by_header(table)[0] == {
+        "roll period": "600 s",
+        "base": "10",
+        "method": "recursion",
+        "digits, observed": "9",
+        "digits, by the bound": "10",
+    }
     assert [cells[2] for cells in body] == ["recursion", "direct"]
     assert tables.needed([600.0], [10], 6600.0, [100, 1000]).title == "Digits for 1 mas"
     for cells in body:

@@ -6,6 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.rounding import experiment, tables
@@ -26,9 +27,26 @@ def test_bound_statistics_have_a_line_a_bound():
     assert table.title == "6 bounds in random trials"
 
 
+def test_each_statistic_of_a_bound_has_its_column():
+    errors = [Fraction(1), Fraction(1, 7), Fraction(1, 9), Fraction(5), Fraction(1, 8)]
+    bounds = {"strict": Fraction(2)}
+    trials = [experiment.Trial(TWO, (), TWO.array(1), Fraction(1), error, bounds) for error in errors]
+    assert by_header(tables.bound_statistics_table({"sum": trials})) == [
+        {
+            "computation": "sum",
+            "bound": "strict",
+            "trials": "5",
+            "violations": "1",
+            "largest error / bound": "2.5",
+            "median error / bound": "0.0714",
+        }
+    ]
+
+
 def test_worked_examples_show_operands_and_results():
     trial = experiment.sum_trial(TWO.array(["5.6", "5.9", "-11"]))
     table = tables.worked({"a sum": trial}, ["1982 (18)", "1984 (18)"])
+    assert table.title == "1 worked examples"
     assert table.header == (
         "example",
         "operands",
