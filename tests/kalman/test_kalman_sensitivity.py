@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import answers, tables, year, year_cases
@@ -58,8 +59,16 @@ def test_one_choice_changes_at_a_time():
         Moved("model", "simple", "mission", 1, 3),
         Moved("model", "mission", "white noise only", -1, 1),
     )
-    rows = tables.sensitivity(sensitivity(found)).body
-    assert rows[0] == ("states, simple model", "deviation", "absolute", "+8.0", "2")
+    table = tables.sensitivity(sensitivity(found))
+    rows = table.body
+    assert table.title == "what moves the answer"
+    assert by_header(table)[0] == {
+        "choice": "states, simple model",
+        "from": "deviation",
+        "to": "absolute",
+        "bits": "+8.0",
+        "records (at least)": "2",
+    }
     assert rows[-1][3] == "−1.0"
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles, independent, printed, report_bounds, smallest, tables, year, year_cases
@@ -22,7 +23,17 @@ def cells(table):
 
 
 def test_the_example_by_every_formula():
-    rows = cells(tables.example(*report_bounds.EXAMPLE))
+    table = tables.example(*report_bounds.EXAMPLE)
+    rows = cells(table)
+    assert table.title == "the closing example, 4 ways"
+    assert by_header(table)[7] == {
+        "(125)": "and covariance errors carried on",
+        "term": "second",
+        "coefficient": r"$8.8862\times10^{20}$",
+        r"$\beta$ = 1 / coefficient": r"$1.125\times10^{-21}$",
+        "digits": "22",
+        "error in IEEE double": r"$9.9\times10^{4}$",
+    }
     assert [row[0] for row in rows[::2]] == [row[0] for row in rows[1::2]] == list(report_bounds.CORRECTIONS)
     assert rows[0][1:] == ["first", r"$2.5860\times10^{8}$", r"$3.867\times10^{-9}$", "10", r"$2.9\times10^{-8}$"]
     assert rows[1][1:] == ["second", r"$4.0775\times10^{14}$", r"$2.452\times10^{-15}$", "16", r"$4.5\times10^{-2}$"]
@@ -30,7 +41,16 @@ def test_the_example_by_every_formula():
 
 
 def test_the_misprints():
-    rows = {row[0]: row[1:] for row in cells(tables.misprints(*report_bounds.EXAMPLE))}
+    table = tables.misprints(*report_bounds.EXAMPLE)
+    rows = {row[0]: row[1:] for row in cells(table)}
+    assert table.title == "the printed numbers of the closing example"
+    assert by_header(table)[0] == {
+        "number": "first coefficient",
+        "printed": r"$2.6490\times10^{8}$",
+        "formula": r"$2.5860\times10^{8}$",
+        "explanation": "84 times $k$, from a factor $7n+4m+6$ or $7n+3m+8$",
+    }
+    assert rows["second coefficient"][2] == (r"84 as above, and × in place of +: $k(3n+1)\cdot0.5(k-1)\cdot84$")
     assert list(rows) == [
         "first coefficient",
         "second coefficient",
@@ -54,28 +74,57 @@ def test_misprints_that_are_none_are_not_claimed():
 
 
 def test_what_one_grants():
-    rows = cells(tables.tolerances(*report_bounds.EXAMPLE, Fraction(1), Fraction(6606)))
+    table = tables.tolerances(*report_bounds.EXAMPLE, Fraction(1), Fraction(6606))
+    rows = cells(table)
+    assert table.title == "digits for an error of 1 and for the tolerance"
+    assert by_header(table)[3] == {
+        "dominant term": "second",
+        "allowed error, relative": r"$1.5\times10^{-4}$",
+        "allowed error (mas)": "$1.0$",
+        "decimal digits": "20",
+        "bits": "62",
+    }
     assert [row[3:] for row in rows] == [["10", "28"], ["13", "41"], ["16", "49"], ["20", "62"]]
     assert rows[1][1:3] == [r"$1.5\times10^{-4}$", "$1.0$"]
 
 
 def test_violations():
-    rows = cells(tables.violations([FloatFormat(10, 4), FloatFormat(10, 4, Rounding.CHOP)]))
+    table = tables.violations([FloatFormat(10, 4), FloatFormat(10, 4, Rounding.CHOP)])
+    rows = cells(table)
+    assert table.title == "4 runs of the smallest filter"
+    assert by_header(table)[0] == {
+        "arithmetic": "4 decimal digits",
+        "form of (99)": "first",
+        "error / (105)": "333",
+        "error / (108)": "0.00222",
+        "error / (125)": "125",
+    }
     assert rows[0] == ["4 decimal digits", "first", "333", "0.00222", "125"]
     assert rows[1] == ["4 decimal digits", "second", "333", "222", r"$1.25\times10^{7}$"]
     assert rows[2][0] == "4 decimal digits, chopped"
 
 
 def test_the_order():
-    assert cells(tables.order()) == [
-        ["first", "(100) → (99) → (101) → (98)"],
-        ["second", "none: (99) needs the result of (101), and (101) that of (99)"],
+    table = tables.order()
+    assert table.title == "the order of (98)-(101)"
+    assert by_header(table) == [
+        {"form of (99)": "first", "order": "(100) → (99) → (101) → (98)"},
+        {"form of (99)": "second", "order": "none: (99) needs the result of (101), and (101) that of (99)"},
     ]
 
 
 def test_the_largest_violating_noise():
     fmt = FloatFormat(2, 5)
-    rows = cells(tables.largest_violating_noise([fmt]))
+    table = tables.largest_violating_noise([fmt])
+    rows = cells(table)
+    assert table.title == "the largest noise that breaks a bound, 2 ways"
+    assert by_header(table)[1] == {
+        "arithmetic": "5 bits",
+        "form of (99)": "second",
+        "$R$ for (105)": "0.117",
+        "$R$ for (108)": "0.105",
+        "$R$ for (125)": "0.164",
+    }
     first, second = (smallest.largest_violating_noise(fmt, form) for form in (False, True))
     assert [row[:2] for row in rows] == [["5 bits", "first"], ["5 bits", "second"]]
     assert rows[0][2] == f"{float(first['covariance']):.3g}"
@@ -84,7 +133,16 @@ def test_the_largest_violating_noise():
 
 
 def test_the_states():
-    rows = cells(tables.states(gravity_probe_b()))
+    table = tables.states(gravity_probe_b())
+    rows = cells(table)
+    assert table.title == "10 states"
+    assert by_header(table)[8] == {
+        "state": "readout bias",
+        "unit": "mas",
+        "transition per step": "0.999",
+        "initial standard deviation": "2.24",
+        "random walk per step": "0.1",
+    }
     assert rows[2] == ["drift rate 2", "mas/yr", "1", "10000", "0.0001"]
     assert rows[4] == ["pointing α2", "mas", "0.9", "20", "8.72"]
     assert len(rows) == 10
@@ -113,6 +171,16 @@ def run(**changes):
 def test_year_ends():
     table = tables.year_ends([run(), run(indefinite=2)])
     assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
+    assert table.title == "2 years"
+    assert by_header(table)[0] == {
+        "arithmetic": "24 bits",
+        "form": "Hung (1984)",
+        "error of the drift (mas)": "2",
+        "error of the rate (mas/yr)": "0.5",
+        "relative error of the gain": "0.12",
+        "relative error of the covariance": r"$1.0\times10^{-6}$",
+        "smallest eigenvalue": "-0.5",
+    }
     rows = cells(table)
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5; first non-positive variance at step 2"
@@ -129,8 +197,19 @@ def test_slack():
     terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
     zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
     bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
-    row = cells(tables.slack([run()], [bounds], terms))[0]
+    table = tables.slack([run()], [bounds], terms)
+    row = cells(table)[0]
     first, second = report_bounds.coefficients(k, 10, 2)
+    assert table.title == "bound over error, 1 years"
+    assert table.header == (
+        "arithmetic",
+        "error of the rate (mas/yr)",
+        "(125), as printed",
+        "(125), roundings counted once",
+        "(125), and errors of either sign",
+        "(125), and covariance errors carried on",
+        "companion bound",
+    )
     assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
     assert row[-1] == "1.25000"
     with pytest.raises(ValueError, match="needed one up to step 3"):
@@ -164,7 +243,18 @@ def test_trials():
             kind="a", trials=10, violations_125=1, worst_125=2.0, contraction_violations=1, compared=3, typical=1 / 64
         ),
     ]
-    rows = cells(tables.trials(found))
+    table = tables.trials(found)
+    rows = cells(table)
+    assert table.title == "50 random filters"
+    assert table.header == (
+        "models",
+        "runs",
+        "(105): violations, largest error / bound",
+        "(108): violations, largest error / bound",
+        "(125): violations, largest error / bound",
+        "contraction bound: violations, largest error / bound",
+        "contraction bound / error, typical",
+    )
     assert rows == [
         ["a", "20", "50.0 %, 3", "0.0 %, 0", "5.0 %, 2", "1, 0.500", "32"],
         ["b", "30", "3.3 %, 7", "0.0 %, 0", "0.0 %, 0.1", "0, 0.750", ""],
@@ -177,10 +267,16 @@ def test_requirements():
         ("one", Requirement(FloatFormat(2, 9), "bound", 5, ((8, 2.0), (9, 0.5)))),
         ("two", Requirement(None, "emulation", 5, ((8, 2.0),))),
     ]
-    assert cells(tables.requirements(answers)) == [
-        ["one", "bound", "5", "9 bits", "0.5"],
-        ["two", "emulation", "5", "none", ""],
-    ]
+    table = tables.requirements(answers)
+    assert table.title == "2 answers"
+    assert by_header(table)[0] == {
+        "filter": "one",
+        "found by": "bound",
+        "steps": "5",
+        "smallest precision": "9 bits",
+        "error or bound / tolerance": "0.5",
+    }
+    assert cells(table)[1] == ["two", "emulation", "5", "none", ""]
 
 
 def share(precision, within, records, **changes):
@@ -192,25 +288,74 @@ def share(precision, within, records, **changes):
 
 def test_shares():
     """Nine errors of 0.1 and one of 2: the 90 % quantile lies a tenth of the way from the ninth to the last."""
-    row = ["absolute", "hung", "32 bits", "9 of 10", "0.606 to 0.995", "0.1", "0.29", "2", "0.5"]
-    assert cells(tables.shares([share(32, 9, 10)])) == [row]
+    table = tables.shares([share(32, 9, 10)])
+    assert table.title == "records that stay within a milliarcsecond for a year"
+    assert by_header(table) == [
+        {
+            "state": "absolute",
+            "form": "hung",
+            "arithmetic": "32 bits",
+            "within tolerance": "9 of 10",
+            "probability": "0.606 to 0.995",
+            "median": "0.1",
+            "90 %": "0.29",
+            "largest": "2",
+            "upper limit for 99 % of records": "0.5",
+        }
+    ]
 
 
 def test_needed_precisions():
     found = [share(32, 9, 10), share(33, 300, 300), share(27, 5, 5, states="deviation")]
     chopped = share(36, 1, 30)._replace(fmt=FloatFormat(2, 36, Rounding.CHOP))
     assert cells(tables.needed_precisions([chopped]))[0][2:5] == ["none", "–", "–"]
-    assert cells(tables.needed_precisions(found)) == [
-        ["simple, absolute", "hung, nearest", "33 bits", "300 of 300", "0.990 to 1.000", "32 bits", "33 bits"],
-        ["simple, deviation", "hung, nearest", "27 bits", "5 of 5", "0.549 to 1.000", "27 bits", "none"],
-    ]
+    table = tables.needed_precisions(found)
+    assert table.title == "smallest precision that stays within a milliarcsecond"
+    assert by_header(table)[0] == {
+        "model and states": "simple, absolute",
+        "form and rounding": "hung, nearest",
+        "99 % of the records": "33 bits",
+        "passed": "300 of 300",
+        "probability": "0.990 to 1.000",
+        "99 %, lognormal": "32 bits",
+        "99 %, proved with 95 % confidence": "33 bits",
+    }
+    row = ["simple, deviation", "hung, nearest", "27 bits", "5 of 5", "0.549 to 1.000", "27 bits", "none"]
+    assert cells(table)[1] == row
+    decimal = tables.needed_precisions([share(10, 5, 5, fmt=FloatFormat(10, 10))])
+    assert cells(decimal)[0][2] == "10 digits"
 
 
 def test_first_steps_and_shares_by_form():
     first = independent.FirstStep("stable", 100, 25, 0.18, 0.33)
-    assert cells(tables.first_steps([first])) == [["stable", "100", "25", "0.18 to 0.33"]]
+    table = tables.first_steps([first])
+    assert table.title == "models that exceed (105) in their first step"
+    assert by_header(table) == [
+        {"kind": "stable", "models": "100", "models that exceed (105)": "25", "probability": "0.18 to 0.33"}
+    ]
     by_model = independent.ModelShare("105", Form.HUNG, 170, 0.845, 0.7997, 0.8904, 159)
-    assert cells(tables.shares_by_form([by_model])) == [["Hung (1984)", "(105)", "170", "84 %", "80 to 89 %"]]
+    table = tables.shares_by_form([by_model])
+    assert table.title == "random models that exceed a bound"
+    assert by_header(table) == [
+        {
+            "form": "Hung (1984)",
+            "bound": "(105)",
+            "models": "170",
+            "mean share of formats": "84 %",
+            "95 % interval by model": "80 to 89 %",
+        }
+    ]
+
+
+def test_the_parameters_of_the_mission():
+    table = tables.parameters()
+    assert table.title == "parameters of the mission model"
+    assert by_header(table)[7] == {
+        "parameter": "right ascension of IM Pegasi",
+        "value": "343.259",
+        "unit": "deg",
+        "source": "star catalogues, J2000",
+    }
 
 
 def test_what_a_bound_costs():
@@ -222,7 +367,15 @@ def test_what_a_bound_costs():
     found = SimpleNamespace(history=history, state=bound)
     reference = SimpleNamespace(steps=np.array([1, k]), rate=np.array([[0, 0], [0, 0.125]]))
     first, second = report_bounds.coefficients(k, 10, 2)
-    rows = cells(tables.bound_costs([(fmt, found)], terms, reference, 8.2))
+    table = tables.bound_costs([(fmt, found)], terms, reference, 8.2)
+    rows = cells(table)
+    assert table.title == "what a bound costs, after 3 steps"
+    assert by_header(table)[1] == {
+        "bound": "running bound",
+        "processor time": "8 times the run",
+        "extra digits": "106 bits, to repeat each step",
+        "bound / error, 24 bits": "8",
+    }
     beta = float(fmt.unit_roundoff)
     assert rows[0] == ["(125), least $B$", "a formula", "none", f"{beta * (7 * first + 5 * second) / 0.5:.3g}"]
     assert rows[1] == ["running bound", "8 times the run", "106 bits, to repeat each step", "8"]

@@ -31,9 +31,9 @@ def test_registers():
 
 
 def test_each_cost_of_a_register_has_its_column():
-    table = tables.registers(600.5, [FloatFormat(10, 6), FloatFormat(10, 10, Rounding.CHOP)])
-    assert table.title == "What rounding the roll rate of 600.5 s costs"
-    assert table.body[-1][-1] == "0.386"
+    table = tables.registers(600.25, [FloatFormat(10, 6), FloatFormat(10, 10, Rounding.CHOP)])
+    assert table.title == "What rounding the roll rate of 600.25 s costs"
+    assert table.body[-1][-1] == "1.28"
     assert by_header(table)[0] == {
         "register": "6 decimal digits",
         "case": "worst",

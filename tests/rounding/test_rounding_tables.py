@@ -80,3 +80,12 @@ def test_worked_examples_of_matrices_products_and_many_terms():
     assert "…" in rows["long"][1]
     assert len(rows["long"][1]) <= 60
     assert Fraction(rows["long"][4]) == long.true
+
+
+def test_operands_of_more_than_sixty_characters_are_cut():
+    def shown(tens):
+        operand = TWO.array([10] * tens + [1] * (20 - tens))
+        return tables.worked({"sum": experiment.sum_trial(operand)}, []).body[0][1]
+
+    assert shown(2) == "10, 10, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1"
+    assert shown(3) == "10, 10, 10, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1 … , 1, 1, 1, 1"

@@ -7,11 +7,12 @@ import math
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
 from gpbnb.kalman.guarantee.linear import biquad
-from gpbnb.wordlength import figures, fixed_point, processor_tables
+from gpbnb.wordlength import figures, fixed_point, guarantees, processor_tables
 from gpbnb.wordlength.processors import Outcome, Processor, Sum
 
 
@@ -23,6 +24,7 @@ def test_outcomes_show_errors_or_why_there_is_none() -> None:
     }
     table = processor_tables.outcomes(found)
     assert table.header == ("processor", "tilt, °", "tracker, m")
+    assert table.title == "1 processors"
     assert table.body == (("narrow", "0.25", "refused: overflow in the gain at step 812"),)
 
 
@@ -30,18 +32,33 @@ def test_variants_say_which_are_refused() -> None:
     ways = (Processor("first", BINARY32), Processor("second", BFLOAT16))
     table = processor_tables.variants(ways, {"tilt": np.array([[0.5, 1.0], [math.inf, math.inf]])})
     assert table.body == (("first", "0.5"), ("second", "refused"))
+    assert table.header == ("arithmetic", "tilt")
+    assert table.title == "2 ways to compute"
 
 
 def test_integrators_show_scatter_and_mean() -> None:
     x = np.ones((4, 2))
     table = processor_tables.integrators([Sum("half too much", lambda y: y.sum(axis=0) + 0.5)], x)
     assert table.body == (("half too much", "0.5", "0.5"),)
+    too_much_in_one_path = Sum("one path", lambda y: y.sum(axis=0) + np.array([3.0, 0.0]))
+    table = processor_tables.integrators([too_much_in_one_path], x)
+    assert table.title == "1 integrators"
+    assert by_header(table) == [{"processor": "one path", "rms error": "2.1", "mean error": "1.5"}]
 
 
 def test_formats_show_their_limits() -> None:
     table = processor_tables.formats({"BINARY32": BINARY32, "IBM_HEX32": IBM_HEX32, "free": FloatFormat(3, 5)})
     assert table.body[0] == ("BINARY32", "2", "24", "even", r"$1.2\times10^{-38}$", r"$3.4\times10^{38}$")
     assert table.body[1][0] == "IBM HEX32"
+    assert table.title == "3 formats"
+    assert by_header(table)[1] == {
+        "format": "IBM HEX32",
+        "base": "16",
+        "digits": "6",
+        "rounding": "chop",
+        "least normal": r"$5.4\times10^{-79}$",
+        "largest": r"$7.2\times10^{75}$",
+    }
     assert table.body[2][-2:] == ("any", "any")
 
 
@@ -50,12 +67,47 @@ def test_fixed_point_bounds_stand_beside_what_was_observed() -> None:
     z = np.random.default_rng(2).uniform(-1, 1, (60, 1))
     ways = [("nearest", 12, {"rounding": Rounding.NEAREST}), ("floor", 12, {"rounding": Rounding.DOWN})]
     table = processor_tables.fixed_point({"section": (given, z)}, ways)
+    assert table.header == ("arithmetic", "section: observed", "guaranteed")
+    assert table.title == "2 fixed-point ways"
+    assert [row[0] for row in table.body] == ["nearest", "floor"]
     for _, observed, bound in table.body:
         assert 0 < float(observed) <= float(bound)
     assert float(table.body[1][2]) > 1.9 * float(table.body[0][2])
     # The last of 11 bits behind the sign; the bound of one rounding is half of it. The cell has two figures.
     unit = 2.0 ** (fixed_point.integer_bits(given, z) - 11)
     assert float(table.body[0][2]) == pytest.approx(fixed_point.bound_per_unit(given)[0] * unit / 2, rel=0.05)
+
+
+def test_guarantees_and_bits_have_their_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    row = guarantees.Row(
+        "tilt", "3", "2", "27", "4", "0.5", "0.94", "0.97", "6e-05", "0.68", "20", "18", "15", "17", "0.1"
+    )
+    empty = guarantees.Row("empty", "5", "6", *[""] * 12)
+    monkeypatch.setattr(guarantees, "load", lambda: (row, empty))
+    table, bits = guarantees.table(), guarantees.bits_table()
+    assert table.title == "guarantees of some filters in binary32"
+    assert by_header(table)[0] == {
+        "filter": "tilt",
+        "n, m": "3, 2",
+        "repeats from step": "27",
+        "period": "4",
+        "bound": "0.5",
+        "achieved / bound": "0.94",
+        "ceiling / bound": "0.97",
+        "probable error": "6e-05",
+        "scatter / probable": "0.68",
+    }
+    assert table.body[1] == ("empty", "5, 6", *["–"] * 7)
+    assert bits.title == "bits that some filters need"
+    assert by_header(bits)[0] == {
+        "filter": "tilt",
+        "guarantee": "20",
+        "contraction bound": "18",
+        "3 × probable error": "15",
+        "emulation": "17",
+        "seconds": "0.1",
+    }
+    assert bits.body[1] == ("empty", *["–"] * 5)
 
 
 def test_figures_draw_every_finite_point() -> None:

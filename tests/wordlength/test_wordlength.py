@@ -9,6 +9,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import small_filter
+from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.display import style
@@ -313,17 +314,27 @@ def test_answers():
     table = tables.answers({"report": [("a minute", FOUND), ("an hour", NONE)]})
     assert table.header == ("form", "a minute", "an hour")
     assert table.body == (("report", "17", "none"),)
+    assert table.title == "1 lines of answers"
     with pytest.raises(ValueError, match="got rows with 2 different sets"):
         tables.answers({"a": [("x", FOUND)], "b": [("y", FOUND)]})
 
 
 def test_cells():
     deaf = tables.update_stagnation([study.UpdateStagnation(FloatFormat(2, 12), 0.5, 0.25, 0.03)], 0.01)
-    assert deaf.body == (("12 bits", "0.5", "25 %", "3"),)
+    assert deaf.title == "1 formats"
+    assert by_header(deaf) == [
+        {
+            "arithmetic": "12 bits",
+            "variance, computed / true": "0.5",
+            "steps without a change": "25 %",
+            "error / tolerance": "3",
+        }
+    ]
     spans = tables.binary_ranges(
         [study.BinaryRange("gain", -20, 3), study.BinaryRange("all", -2000, 2000), study.BinaryRange("x", -14, 15)]
     )
     assert spans.header == ("numbers", "smallest", "largest", "normal in")
+    assert spans.title == "3 kinds of numbers"
     assert spans.body[0][:3] == ("gain", "$2^{-20}$", "$2^{3}$")
     assert [row[-1] for row in spans.body] == [
         "binary32, binary64, bfloat16, TF32",
@@ -331,7 +342,16 @@ def test_cells():
         "binary16, binary32, binary64, bfloat16, TF32",
     ]
     inverses = tables.inverse_precisions([study.InversePrecision("fit", 123.0, 45.0, 6, 7)])
-    assert inverses.body == (("fit", "120", "45", "6", "7"),)
+    assert inverses.title == "1 inverses"
+    assert by_header(inverses) == [
+        {
+            "matrix": "fit",
+            "condition $\\kappa_1$": "120",
+            "$\\kappa_1$, scaled": "45",
+            "bits, rule of thumb": "6",
+            "bits, proved": "7",
+        }
+    ]
 
 
 def test_ranges_of_processors():
@@ -351,6 +371,16 @@ def test_integrator():
     assert table.body[0][1:3] == tuple(needed)
     best, stall = (float(cell.replace(",", "")) for cell in table.body[0][3:])
     assert best < stall
+    assert table.title == "1 durations"
+    assert by_header(table) == [
+        {
+            "duration": "an hour",
+            "bits, rounded": "17",
+            "bits, chopped": "28",
+            "best rate with 24 bits, Hz": "1.86e+05",
+            "increments vanish at, Hz": "4.66e+06",
+        }
+    ]
 
 
 # -- figures ------------------------------------------------------------------------------------------
