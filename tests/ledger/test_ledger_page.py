@@ -131,6 +131,26 @@ def test_printed_statements_are_collapsed_under_their_title():
     assert [a["href"] for a in Elements(html).all("a")] == [page.address(row.statement) for row in ROWS[:3]]
 
 
+def test_each_table_has_a_title_and_names_its_columns():
+    root = next(iter(ledger.load_roots()))
+    spoiled = Row(STATEMENTS[0], compare(False, "1", Verdict.WRONG, root=root))
+    expected = {
+        ledger.error_table(ROWS[:3]): ("2 statements that disagree", ["Error", "Verdict", "Statements affected"]),
+        ledger.printed_table(ROWS[:3], "three"): ("three", ["Statement", "As printed"]),
+        ledger.root_table([spoiled]): (
+            "1 root errors",
+            ["Root error", "Statements", "Explanation and affected statements"],
+        ),
+        ledger.claim_table([Row(statement, FINDINGS[0]) for statement in STATEMENTS]): (
+            f"{len(page.CLAIMS)} claims",
+            ["Claim", "Outcome", "Printed statement, and the chapter that examines it"],
+        ),
+    }
+    for table, (title, header) in expected.items():
+        assert repr(table) == f"<{title}>"
+        assert re.findall(r'<th scope="col">(.*?)</th>', table.html) == header
+
+
 def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
     root = next(iter(ledger.load_roots()), None)
     if root is None:
@@ -217,7 +237,8 @@ def test_counts_add_up(by):
     assert all(sum(line[:-1]) == line[-1] for line in numbers)
     assert [sum(column) for column in zip(*numbers[:-1], strict=True)] == numbers[-1]
     assert numbers[-1][-1] == len(ROWS)
-    assert head[0] == by.capitalize()
+    assert (head[0], head[-1]) == (by.capitalize(), "statements")
+    assert found.title == f"Counts of {len(ROWS)} statements by {by}"
     for outcome, number in zip(head[1:-1], numbers[-1], strict=False):
         assert number == sum(row.outcome == outcome for row in ROWS)
     if by == "document":
