@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tabulated import by_header
 
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
 from gpbnb.kalman.guarantee.linear import biquad
@@ -76,6 +77,21 @@ def test_fixed_point_bounds_stand_beside_what_was_observed() -> None:
     # The last of 11 bits behind the sign; the bound of one rounding is half of it. The cell has two figures.
     unit = 2.0 ** (fixed_point.integer_bits(given, z) - 11)
     assert float(table.body[0][2]) == pytest.approx(fixed_point.bound_per_unit(given)[0] * unit / 2, rel=0.05)
+
+
+def test_a_wide_sum_has_a_bound_of_its_own() -> None:
+    given = fixed_point.unscaled(biquad("0.3", "0.2", "0.1", "-0.5", "0.25"))
+    z = np.random.default_rng(2).uniform(-8, 8, (60, 1))
+    options = {"rounding": Rounding.NEAREST, "wide": True}
+    table = processor_tables.fixed_point({"section": (given, z)}, [("wide", 16, options)], state=1)
+    before = fixed_point.integer_bits(given, z)
+    fmt = FixedFormat(before, 15 - before, Rounding.NEAREST)
+    observed = np.abs(fixed_point.emulated(given, z, fmt, wide=True)).max(axis=0)
+    bound = fixed_point.bound_per_unit(given, wide=True) * 2.0 ** (before - 15) / 2
+    assert before > 0
+    assert [float(cell) for cell in table.body[0][1:]] == pytest.approx(
+        [observed[1], bound[1]], rel=0.05
+    )  # two figures
 
 
 def test_guarantees_and_bits_have_their_columns(monkeypatch: pytest.MonkeyPatch) -> None:

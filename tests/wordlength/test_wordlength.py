@@ -320,13 +320,13 @@ def test_answers():
 
 
 def test_cells():
-    deaf = tables.update_stagnation([study.UpdateStagnation(FloatFormat(2, 12), 0.5, 0.25, 0.03)], 0.01)
+    deaf = tables.update_stagnation([study.UpdateStagnation(FloatFormat(2, 12), 0.54321, 0.8765, 0.03)], 0.01)
     assert deaf.title == "1 formats"
     assert by_header(deaf) == [
         {
             "arithmetic": "12 bits",
-            "variance, computed / true": "0.5",
-            "steps without a change": "25 %",
+            "variance, computed / true": "0.543",
+            "steps without a change": "88 %",
             "error / tolerance": "3",
         }
     ]
