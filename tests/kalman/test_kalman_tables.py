@@ -73,6 +73,12 @@ def test_misprints_that_are_none_are_not_claimed():
     assert rows["second coefficient"][2] == "not found"
 
 
+def test_a_printed_beta_that_does_not_follow_is_named(monkeypatch):
+    monkeypatch.setitem(report_bounds.PRINTED, "first beta", ".5e-8")
+    rows = {row[0]: row[1:] for row in cells(tables.misprints(*report_bounds.EXAMPLE))}
+    assert rows["first beta"][2] == "not one over the printed coefficient"
+
+
 def test_what_one_grants():
     table = tables.tolerances(*report_bounds.EXAMPLE, Fraction(1), Fraction(6606))
     rows = cells(table)
@@ -84,6 +90,7 @@ def test_what_one_grants():
         "decimal digits": "20",
         "bits": "62",
     }
+    assert [row[0] for row in rows] == ["first", "first", "second", "second"]
     assert [row[3:] for row in rows] == [["10", "28"], ["13", "41"], ["16", "49"], ["20", "62"]]
     assert rows[1][1:3] == [r"$1.5\times10^{-4}$", "$1.0$"]
 
@@ -169,7 +176,7 @@ def run(**changes):
 
 
 def test_year_ends():
-    table = tables.year_ends([run(), run(indefinite=2)])
+    table = tables.year_ends([run(), run(indefinite=12345)])
     assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
     assert table.title == "2 years"
     assert by_header(table)[0] == {
@@ -183,7 +190,7 @@ def test_year_ends():
     }
     rows = cells(table)
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
-    assert rows[1][-1] == "-0.5; first non-positive variance at step 2"
+    assert rows[1][-1] == "-0.5; first non-positive variance at step 12,345"
     other = run(case=run().case._replace(model=year_cases.MODELS[1]))
     table = tables.year_ends([run(), other])
     assert table.header[0] == "model"
@@ -264,7 +271,7 @@ def test_trials():
 
 def test_requirements():
     answers = [
-        ("one", Requirement(FloatFormat(2, 9), "bound", 5, ((8, 2.0), (9, 0.5)))),
+        ("one", Requirement(FloatFormat(2, 9), "bound", 5, ((8, 2.0), (9, 0.5432)))),
         ("two", Requirement(None, "emulation", 5, ((8, 2.0),))),
     ]
     table = tables.requirements(answers)
@@ -274,7 +281,7 @@ def test_requirements():
         "found by": "bound",
         "steps": "5",
         "smallest precision": "9 bits",
-        "error or bound / tolerance": "0.5",
+        "error or bound / tolerance": "0.54",
     }
     assert cells(table)[1] == ["two", "emulation", "5", "none", ""]
 
@@ -288,7 +295,7 @@ def share(precision, within, records, **changes):
 
 def test_shares():
     """Nine errors of 0.1 and one of 2: the 90 % quantile lies a tenth of the way from the ninth to the last."""
-    table = tables.shares([share(32, 9, 10)])
+    table = tables.shares([share(32, 9, 10, quantile_limit=0.5432)])
     assert table.title == "records that stay within a milliarcsecond for a year"
     assert by_header(table) == [
         {
@@ -300,7 +307,7 @@ def test_shares():
             "median": "0.1",
             "90 %": "0.29",
             "largest": "2",
-            "upper limit for 99 % of records": "0.5",
+            "upper limit for 99 % of records": "0.54",
         }
     ]
 
