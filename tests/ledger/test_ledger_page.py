@@ -149,6 +149,7 @@ def test_each_table_has_a_title_and_names_its_columns():
     for table, (title, header) in expected.items():
         assert repr(table) == f"<{title}>"
         assert re.findall(r'<th scope="col">(.*?)</th>', table.html) == header
+        assert Elements(table.html).cells[: len(header)] == header
 
 
 def test_root_errors_list_the_statements_that_they_spoil(monkeypatch):
