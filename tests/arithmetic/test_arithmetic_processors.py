@@ -26,35 +26,45 @@ BINARY = [operator.add, operator.sub, operator.mul, TRUEDIV]
 DETERMINISTIC = [mode for mode in Rounding if mode is not Rounding.STOCHASTIC]
 
 
-def rounded(x: Fraction, unit: Fraction, mode: Rounding) -> Fraction:
-    """x as a multiple of the unit, by the definition of each mode."""
-    low = math.floor(x / unit)
-    rest = x / unit - low
-    if rest == 0:
-        return x
-    up = {
-        Rounding.NEAREST: rest > Fraction(1, 2) or (rest == Fraction(1, 2) and x > 0),
-        Rounding.EVEN: rest > Fraction(1, 2) or (rest == Fraction(1, 2) and low % 2 == 1),
-        Rounding.CHOP: x < 0,
-        Rounding.UP: True,
-        Rounding.DOWN: False,
-        Rounding.ODD: low % 2 == 0,
-    }[mode]
-    return (low + up) * unit
+def up(mode: Rounding, negative: Any, odd: Any, inexact: Any, half: Any) -> Any:
+    """Whether the size of a number is rounded up, by the definition of each mode.
+
+    `odd` tells about the last digit kept; `half` is above, at or below 0 if the rest is above, at or below one half.
+    """
+    return (
+        inexact
+        & {
+            Rounding.NEAREST: half >= 0,
+            Rounding.EVEN: (half > 0) | ((half == 0) & odd),
+            Rounding.CHOP: False,
+            Rounding.UP: ~negative,
+            Rounding.DOWN: negative,
+            Rounding.ODD: ~odd,
+        }[mode]
+    )
 
 
 def expected(x: Fraction, fmt: FloatFormat) -> Fraction | None:
     """The number of the format for an exact result; None if it overflows."""
     if x == 0:
         return x
+
+    def scaled(k: int) -> tuple[int, int]:
+        """Numerator and denominator of abs(x) / base**k."""
+        p, q = abs(x.numerator), x.denominator
+        return (p, q * fmt.base**k) if k > 0 else (p * fmt.base**-k, q)
+
     power = int((x.numerator.bit_length() - x.denominator.bit_length()) / math.log2(fmt.base))
-    while abs(x) >= Fraction(fmt.base) ** (power + 1):
+    while operator.ge(*scaled(power + 1)):
         power += 1
-    while abs(x) < Fraction(fmt.base) ** power:
+    while operator.lt(*scaled(power)):
         power -= 1
     if fmt.emin is not None and fmt.subnormal:
         power = max(power, fmt.emin)
-    y = rounded(x, Fraction(fmt.base) ** (power - fmt.precision + 1), fmt.rounding)
+    p, q = scaled(power - fmt.precision + 1)
+    m, rest = divmod(p, q)
+    m += bool(up(fmt.rounding, np.bool_(x < 0), np.bool_(m % 2), rest > 0, 2 * rest - q))
+    y = (m if x > 0 else -m) * Fraction(fmt.base) ** (power - fmt.precision + 1)
     limits = fmt.limits
     if limits is None:
         return y
@@ -76,55 +86,103 @@ TINY = [
 ]
 
 
-def numbers(fmt: FloatFormat) -> list[Fraction]:
-    """Every number of a small format; of an unlimited one those near 1."""
-    emin, emax = (-2, 2) if fmt.emin is None or fmt.emax is None else (fmt.emin, fmt.emax)
-    least = fmt.base ** (fmt.precision - 1)
-    normal = [
-        Fraction(m) * Fraction(fmt.base) ** (e - fmt.precision + 1)
-        for m in range(least, fmt.base * least)
-        for e in range(emin, emax + 1)
-    ]
-    if fmt.emin is not None and fmt.subnormal:
-        normal += [Fraction(m) * Fraction(fmt.base) ** (emin - fmt.precision + 1) for m in range(1, least)]
-    return [0 * normal[0], *normal, *(-x for x in normal)]
+def pairs(operation: Any, counts: Any, scale: Fraction) -> tuple[Any, Any, Any, Any]:
+    """Every pair of numbers that are multiples of 1 / scale, as indices; and the exact results p / q, likewise."""
+    i, j = (part.ravel() for part in np.indices((len(counts), len(counts))))
+    if operation is TRUEDIV:
+        i, j = i[counts[j] != 0], j[counts[j] != 0]
+        return i, j, np.sign(counts[j]) * counts[i] * scale.numerator, abs(counts[j]) * scale.denominator
+    if operation is operator.mul:
+        return i, j, counts[i] * counts[j] * scale.denominator, np.full(i.shape, scale.numerator)
+    return i, j, operation(counts[i], counts[j]), np.ones(i.shape, int)
+
+
+def some(beyond: Any, p: Any, q: Any) -> Any:
+    """Of the results p / q beyond a range the eight smallest in size, and eight of all."""
+    beyond = np.flatnonzero(beyond)
+    beyond = beyond[np.argsort(abs(p[beyond]) / q[beyond], kind="stable")]
+    return np.unique([*beyond[:8], *beyond[:: -(-len(beyond) // 8) or 1]]).astype(int)
+
+
+class Small:
+    """Every number of a small format; of an unlimited one those near 1. `counts` are multiples of 1 / scale."""
+
+    def __init__(self, fmt: FloatFormat) -> None:
+        base, t = fmt.base, fmt.precision
+        emin, emax = (-2, 2) if fmt.emin is None or fmt.emax is None else (fmt.emin, fmt.emax)
+        gradual = fmt.emin is not None and fmt.subnormal
+        reach = 2 * max(-emin, emax) + 2 * t + 2  # enough for products, quotients and all digits of small differences
+        self.scale, least = base**reach, base ** (t - 1)
+        # As if there were no limit above, and without subnormal numbers none below.
+        last = range(emin - t + 1 if gradual else -reach, reach)
+        table = [(m * base ** (e + reach), m, e) for e in last for m in range(least, base * least)]
+        table += [(m * base ** (last[0] + reach), m, last[0]) for m in range(1, least)] if gradual else []
+        self.table, m, e = np.array([(0, 0, 0), *sorted(table)]).T
+        self.odd = m % 2 == 1
+        while (short := (m > 0) & (m < least)).any():
+            m, e = np.where(short, m * base, m), e - short
+        self.m, self.e = m, e
+        below, above = base ** (emin + reach), (base * least - 1) * base ** (emax - t + 1 + reach)
+        normal = self.table[(self.table >= below) & (self.table <= above)]
+        held = self.table[(self.table > 0) & (self.table < below)] if gradual else normal[:0]
+        self.counts = np.concatenate([[0], normal, held, -normal, -held])
+        self.below, self.above = (0 if gradual else below, above) if fmt.emin is not None else (0, self.table[-1])
+
+    def fractions(self) -> list[Fraction]:
+        return [Fraction(int(count), self.scale) for count in self.counts]
+
+    def rounded(self, p: Any, q: Any, mode: Rounding) -> tuple[Any, Any, Any]:
+        """The exact results rounded, as significands and exponents, and whether they are within the range."""
+        below = np.searchsorted(self.table, abs(p) // q, side="right") - 1
+        low, high = self.table[below] * q, self.table[below + 1] * q
+        found = below + up(mode, p < 0, self.odd[below], low < abs(p), 2 * abs(p) - low - high)
+        found = np.where(self.table[found] < self.below, 0, found)
+        return np.sign(p) * self.m[found], self.e[found], self.table[found] <= self.above
+
+
+small = cache(Small)
+
+
+def same(found: Any, m: Any, e: Any) -> bool:
+    """Whether an array has these significands and exponents, both normalized."""
+    return all(np.array_equal(*parts) for parts in zip(found.to_pairs(), (m, e), strict=True))
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)
 @pytest.mark.parametrize("tiny", TINY, ids=str)
 def test_every_pair_of_a_small_format(tiny: FloatFormat, mode: Rounding) -> None:
-    fmt = replace(tiny, rounding=mode)
-    every, result = numbers(fmt), cache(lambda value: expected(value, fmt))
-    assert len(set(every)) == len(every)
-    x = fmt.array(every)
-    assert x.to_fractions().tolist() == every
+    fmt, every = replace(tiny, rounding=mode), small(tiny)
+    assert len(set(every.counts)) == len(every.counts)
+    x = fmt.array(every.fractions())
+    assert x.to_fractions().tolist() == every.fractions()
     overflows = 0
     for operation in BINARY:
-        pairs = list(product(range(len(every)), [i for i, b in enumerate(every) if b or operation is not TRUEDIV]))
-        results = [result(operation(every[i], every[j])) for i, j in pairs]
-        held = [pair for pair, value in zip(pairs, results, strict=True) if value is not None]
-        i, j = np.array(held).T
-        found = operation(x[i], x[j]).to_fractions()
-        assert found.tolist() == [value for value in results if value is not None]
-        assert np.array_equal(found, operation(x[i].on_exact_backend(), x[j].on_exact_backend()).to_fractions())
-        beyond = sorted(set(pairs) - set(held))
-        overflows += len(beyond)
-        for i, j in beyond[:: -(-len(beyond) // len(every)) or 1]:
+        i, j, p, q = pairs(operation, every.counts, Fraction(every.scale))
+        m, e, held = every.rounded(p, q, mode)
+        assert same(operation(x[i[held]], x[j[held]]), m[held], e[held])
+        exactly = held & (every.counts[i] >= 0)  # which gives results of either sign
+        found = operation(x[i[exactly]].on_exact_backend(), x[j[exactly]].on_exact_backend())
+        assert same(found, m[exactly], e[exactly])
+        overflows += int(np.count_nonzero(~held))
+        for k in some(~held, p, q):
             with pytest.raises(OverflowError):
-                operation(x[i], x[j])
+                operation(x[i[k]], x[j[k]])
     assert (overflows > 0) is (fmt.emin is not None)
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)
 @pytest.mark.parametrize("tiny", [TINY[0], TINY[3], TINY[6]], ids=str)
 def test_fused_multiply_add_of_every_triple(tiny: FloatFormat, mode: Rounding) -> None:
-    fmt = replace(tiny, rounding=mode)
-    every, result = numbers(fmt)[:: 1 if fmt.base == 10 else 3], cache(lambda value: expected(value, fmt))
-    x, triples = fmt.array(every), list(product(range(len(every)), repeat=3))
-    results = [result(every[a] * every[b] + every[c]) for a, b, c in triples]
-    a, b, c = np.array([each for each, value in zip(triples, results, strict=True) if value is not None]).T
-    found = x[a].multiply_add(x[b], x[c])
-    assert found.to_fractions().tolist() == [value for value in results if value is not None]
+    fmt, every = replace(tiny, rounding=mode), small(tiny)
+    kept = slice(None, None, 1 if fmt.base == 10 else 3)
+    x, counts = fmt.array(every.fractions()[kept]), every.counts[kept]
+    # In base 10 on Python integers; there a product of either sign needs no first factor of either sign.
+    first = counts >= 0 if fmt.base == 10 else counts == counts
+    a, b, c = (part.ravel() for part in np.meshgrid(*map(np.arange, [len(x)] * 3), indexing="ij"))
+    a, b, c = a[first[a]], b[first[a]], c[first[a]]
+    p = counts[a] * counts[b] + counts[c] * every.scale
+    m, e, held = every.rounded(p, np.full(p.shape, every.scale), mode)
+    assert same(x[a[held]].multiply_add(x[b[held]], x[c[held]]), m[held], e[held])
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)
@@ -171,7 +229,9 @@ def test_conversion_of_every_power_of_two(fmt: FloatFormat) -> None:
 def test_roots(mode: Rounding) -> None:
     for fmt in (named.FP8_E4M3, named.BINARY16, named.DECIMAL32, FloatFormat(16, 2), FloatFormat(2, 50)):
         fmt = replace(fmt, rounding=mode)
-        values = fmt.array([Fraction(k, 8) for k in range(1, 200)] if fmt.precision > 4 else numbers(TINY[0])[1:20])
+        values = fmt.array(
+            [Fraction(k, 8) for k in range(1, 200)] if fmt.precision > 4 else small(TINY[0]).fractions()[1:20]
+        )
         for x, y in zip(values.to_fractions(), np.sqrt(values).to_fractions(), strict=True):
             # 200 bits of the root, with a last bit for what follows: no mode needs more.
             root = math.isqrt((x.numerator << 401) // x.denominator * 2)
@@ -366,27 +426,28 @@ class TestFixed:
     def test_every_pair(self, bits: tuple[int, int], mode: Rounding, overflow: str) -> None:
         fmt = FixedFormat(*bits, mode, overflow)
         count = 2 ** (sum(bits) + 1)
-        every = [fmt.lowest + k * fmt.unit for k in range(count)]
-        assert every[-1] == fmt.largest
+        counts = np.arange(count) - count // 2
+        every = [int(k) * fmt.unit for k in counts]
+        assert (every[0], every[-1]) == (fmt.lowest, fmt.largest)
         x = fmt.array(every)
         assert x.to_fractions().tolist() == every
         for operation in BINARY:
-            for a in every:
-                others = [b for b in every if b or operation is not operator.truediv]
-                results = [rounded(operation(a, b), fmt.unit, mode) for b in others]
-                inside = [fmt.lowest <= y <= fmt.largest for y in results]
-                if overflow == "raise":
-                    if not all(inside):
-                        with pytest.raises(OverflowError):
-                            operation(fmt.array(a), fmt.array(others))
-                    others = [b for b, kept in zip(others, inside, strict=True) if kept]
-                    results = [y for y, kept in zip(results, inside, strict=True) if kept]
-                elif overflow == "saturate":
-                    results = [min(max(y, fmt.lowest), fmt.largest) for y in results]
-                else:
-                    results = [(y - fmt.lowest) % (count * fmt.unit) + fmt.lowest for y in results]
-                found = operation(fmt.array(a), fmt.array(others)).to_fractions().tolist()
-                assert found == results
+            i, j, p, q = pairs(operation, counts, 1 / fmt.unit)
+            size, rest = np.divmod(abs(p), q)
+            result = np.sign(p) * (size + up(mode, p < 0, size % 2 == 1, rest > 0, 2 * rest - q))
+            held = (result >= counts[0]) & (result <= counts[-1])
+            if overflow == "raise":
+                for k in some(~held, p, q):
+                    with pytest.raises(OverflowError):
+                        operation(x[i[k]], x[j[k]])
+                i, j, result = i[held], j[held], result[held]
+            elif overflow == "saturate":
+                result = np.clip(result, counts[0], counts[-1])
+            else:
+                result = (result - counts[0]) % count + counts[0]
+            found = operation(x[i], x[j])
+            assert type(found) is type(x)
+            assert np.array_equal(found.to_float(), result * float(fmt.unit))
 
     def test_negation_of_the_lowest_overflows(self) -> None:
         for overflow, result in (("saturate", Fraction(7, 8)), ("wrap", Fraction(-1))):

@@ -47,6 +47,9 @@ class LimitedKernel(ExactKernel):
             largest = self.limits.largest / Fraction(rules.base) ** self.quantum
             m, e = self._normalized(int(largest), self.quantum)
             self.top = e, m  # exponent first, so that tuples compare by size
+            # The limits of a fixed-point format, in units of its last digit.
+            self._lowest = int(self.limits.lowest / Fraction(rules.base) ** self.quantum)
+            self._largest = int(largest)
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""
@@ -184,8 +187,7 @@ class LimitedKernel(ExactKernel):
         """Apply the limits to a fixed-point number; returns it in units of its last digit."""
         limits = cast(Limits, self.limits)
         count = m * self.power(e - self.quantum)
-        unit = Fraction(self.base) ** self.quantum
-        lowest, largest = int(limits.lowest / unit), int(limits.largest / unit)
+        lowest, largest = self._lowest, self._largest
         if lowest <= count <= largest:
             return count
         if limits.overflow == "saturate":
@@ -193,7 +195,7 @@ class LimitedKernel(ExactKernel):
         if limits.overflow == "wrap":
             return (count - lowest) % (largest - lowest + 1) + lowest
         raise OverflowError(
-            f"got a result of about {float(count * unit):.7g}; needed one from {float(limits.lowest):.7g} to "
+            f"got a result of about {float(count * Fraction(self.base) ** self.quantum):.7g}; needed one from {float(limits.lowest):.7g} to "
             f"{float(limits.largest):.7g}; scale the numbers, or use more integer bits"
         )
 
