@@ -8,21 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from math import log2
 
 Matrix = list[list[Fraction]]
 
 
 def split(x: Fraction, base: int, precision: int) -> tuple[int, Fraction, int]:
     """Write x > 0 as (digits + rest) * base**e with `precision` digits before the point and 0 <= rest < 1."""
-    e = 0
-    while x >= base**precision:
-        x /= base
+    p, q = x.numerator, x.denominator  # plain integers are many times faster than Fractions
+    e = int((p.bit_length() - q.bit_length()) / log2(base)) - precision  # roughly; corrected below
+    p, q = p * base ** max(-e, 0), q * base ** max(e, 0)
+    while p >= q * base**precision:
+        q *= base
         e += 1
-    while x < base ** (precision - 1):
-        x *= base
+    while p < q * base ** (precision - 1):
+        p *= base
         e -= 1
-    digits = x.numerator // x.denominator
-    return digits, x - digits, e
+    digits, rest = divmod(p, q)
+    return digits, Fraction(rest, q), e
 
 
 def as_pair(x: Fraction, base: int, precision: int) -> tuple[int, int]:

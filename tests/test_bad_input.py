@@ -34,7 +34,7 @@ numbers = st.one_of(
     st.none(),
     st.booleans(),
     st.sampled_from([math.nan, math.inf, -math.inf, -0.0, 1e308, 5e-324, 10**400, -1, 0, 1, 2, 3, 0.5]),
-    st.sampled_from(["", "nan", "1_0", "٣", "0.1", "1/0", "x", "1e999999", b"1"]),
+    st.sampled_from(["", "nan", "1_0", "٣", "0.1", "1/0", "x", "1e99999", b"1"]),
     st.sampled_from(
         [1j, Decimal("NaN"), Decimal("0.1"), Fraction(1, 3), np.float32(2), np.int8(-1), np.datetime64(0, "s")]
     ),

@@ -9,7 +9,6 @@ import pickle
 from dataclasses import replace
 from fractions import Fraction
 from functools import cache
-from itertools import product
 from typing import Any
 
 import numpy as np

@@ -194,8 +194,9 @@ class LimitedKernel(ExactKernel):
             return largest if count > 0 else lowest
         if limits.overflow == "wrap":
             return (count - lowest) % (largest - lowest + 1) + lowest
+        about = float(count * Fraction(self.base) ** self.quantum)
         raise OverflowError(
-            f"got a result of about {float(count * Fraction(self.base) ** self.quantum):.7g}; needed one from {float(limits.lowest):.7g} to "
+            f"got a result of about {about:.7g}; needed one from {float(limits.lowest):.7g} to "
             f"{float(limits.largest):.7g}; scale the numbers, or use more integer bits"
         )
 
