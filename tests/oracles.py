@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fractions import Fraction
-from math import log2
+from math import isqrt, log2
 
 Matrix = list[list[Fraction]]
 
@@ -50,25 +50,16 @@ def rounded(x: Fraction, base: int, precision: int, nearest: bool) -> Fraction:
 
 
 def square_root(x: Fraction, base: int, precision: int, nearest: bool) -> Fraction:
-    """The root of x >= 0, rounded: digit after digit, the largest whose square is not above x."""
+    """The root of x >= 0, rounded: the largest multiple of its last digit's unit whose square is not above x."""
     if x == 0:
         return Fraction(0)
-    unit = Fraction(1)
-    while unit * unit > x:
-        unit /= base
-    while (unit * base) ** 2 <= x:
-        unit *= base
-    root = Fraction(0)
-    for _ in range(precision):
-        digit = 0
-        while (root + (digit + 1) * unit) ** 2 <= x:
-            digit += 1
-        root += digit * unit
-        unit /= base
-    last = unit * base
-    if nearest and (root + last / 2) ** 2 <= x:
-        root += last
-    return root
+    e = split(x, base, 1)[2] // 2 - precision + 1  # of the root's last digit
+    square = x / Fraction(base) ** (2 * e)
+    root = isqrt(square.numerator // square.denominator)
+    assert root**2 <= square < (root + 1) ** 2
+    if nearest and (2 * root + 1) ** 2 <= 4 * square:
+        root += 1
+    return root * Fraction(base) ** e
 
 
 def numbers_below(limit: int, base: int, precision: int) -> list[int]:
