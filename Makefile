@@ -58,7 +58,6 @@ book: .venv/made-for ## execute the notebooks and build the HTML book; what has 
 test: .venv/made-for ## unit and property tests, the examples in docstrings, and every notebook against its stored outputs
 	$(PY) scripts/execute_notebooks.py --check
 	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder --ignore=tests/pages tests
-	$(PY) -m pytest -q --doctest-modules gpbnb
 
 test-pages: .venv/made-for ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
