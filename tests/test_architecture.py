@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+from functools import cache
 from pathlib import Path
 
 import grimp
@@ -22,7 +23,6 @@ LAYERS = (
 )
 LEVEL = {name: level for level, names in enumerate(LAYERS) for name in names}
 FILES = {".".join(path.relative_to(ROOT.parent).with_suffix("").parts): path for path in sorted(ROOT.rglob("*.py"))}
-TREES = {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
 
 
 def room(module):
@@ -35,6 +35,12 @@ def imports():
     """The modules that each module imports, at its top or within its functions; imports for types alone left out."""
     graph = grimp.build_graph("gpbnb", exclude_type_checking_imports=True, cache_dir=None)
     return {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
+
+
+@cache
+def trees():
+    """The syntax tree of each module."""
+    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
 
 
 def test_every_room_has_its_level():
@@ -112,7 +118,7 @@ EXTERNAL = {
 def test_private_names_stay_in_their_module():
     outside = {
         module: found
-        for module, tree in TREES.items()
+        for module, tree in trees().items()
         if (
             found := {name for name in names_used(tree) if name.startswith("_") and not name.endswith("__")}
             - set(names_defined(tree))
@@ -125,7 +131,7 @@ def test_private_names_stay_in_their_module():
 def test_nothing_is_imported_by_string():
     called = {
         module: {ast.unparse(node.func).split(".")[-1] for node in ast.walk(tree) if isinstance(node, ast.Call)}
-        for module, tree in TREES.items()
+        for module, tree in trees().items()
     }
     forbidden = {"import_module", "__import__", "exec", "eval"}
     assert [module for module, names in called.items() if names & forbidden] == ["gpbnb.__init__"]

@@ -21,7 +21,11 @@ from gpbnb.kalman.year_cases import MODELS, model
 from gpbnb.kalman.year_cases import simulation as year_simulation
 
 STEPS, COUNT = 300, 5
-MEASURED = np.stack([SimpleYear("absolute").simulation(record).measurements(STEPS) for record in range(COUNT)], axis=-1)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return np.stack([SimpleYear("absolute").simulation(record).measurements(STEPS) for record in range(COUNT)], axis=-1)
 
 
 @pytest.mark.parametrize("form", [form for form in Form if form is not Form.UD], ids=str)
@@ -37,13 +41,13 @@ MEASURED = np.stack([SimpleYear("absolute").simulation(record).measurements(STEP
     ],
     ids=str,
 )
-def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form):
+def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form, measured):
     told = model(MODELS[0], 10 if fmt is not None and fmt.base == 10 else 2)
     many = Records(told, fmt, form, COUNT)
-    estimates = np.concatenate([many.carry(MEASURED[:170], 4), many.carry(MEASURED[170:], 4)])
+    estimates = np.concatenate([many.carry(measured[:170], 4), many.carry(measured[170:], 4)])
     for record in range(COUNT):
         one = Run(told, fmt, form, (1, STEPS))
-        one.take(MEASURED[:, :, record])
+        one.take(measured[:, :, record])
         assert (many.x[:, record] == one.x[:, 0]).all()
         assert (many.P == one.P).all()
         first, last = one.checkpoints().x[:, :4].astype(float)
@@ -53,21 +57,21 @@ def test_every_record_gets_the_digits_of_a_run_of_its_own(fmt, form):
     assert len({tuple(each) for each in many.x.reshape(10, COUNT, -1)[:, :, 0].T.tolist()}) == COUNT
 
 
-def test_a_filter_that_stops_leaves_no_numbers():
+def test_a_filter_that_stops_leaves_no_numbers(measured):
     told = model(MODELS[0], 2)
     many = Records(told, FloatFormat(2, 24), Form.HUNG, 2)
-    measured = MEASURED[:20, :, :2].copy()
-    measured[7, 0, 1] = 2.0**1000
-    before = many.carry(measured[:7], 4)
+    given = measured[:20, :, :2].copy()
+    given[7, 0, 1] = 2.0**1000
+    before = many.carry(given[:7], 4)
     assert np.isfinite(before).all()
-    after = many.carry(measured[7:], 4) if np.isfinite(measured).all() else None
+    after = many.carry(given[7:], 4) if np.isfinite(given).all() else None
     assert after is not None
     largest = np.zeros((4, 2))
     update_largest(after, np.zeros_like(after), largest)
     assert (np.isinf(largest) == np.isnan(after).any(axis=0)).all()
 
 
-def test_what_does_not_fit_is_refused():
+def test_what_does_not_fit_is_refused(measured):
     told = model(MODELS[0], 2)
     with pytest.raises(ValueError, match="any but UD"):
         Records(told, REFERENCE, Form.UD, 2)
@@ -75,29 +79,29 @@ def test_what_does_not_fit_is_refused():
         Records(told, REFERENCE, Form.HUNG, 0)
     many = Records(told, REFERENCE, Form.HUNG, 2)
     with pytest.raises(ValueError, match=r"needed \(steps, 2, 2\)"):
-        many.carry(MEASURED, 4)
+        many.carry(measured, 4)
     with pytest.raises(ValueError, match=r"needed \(p, 2, 10\)"):
         many.use_measurement_matrices(np.zeros((3, 2, 9)))
 
 
-def test_measurement_matrices_may_be_replaced():
+def test_measurement_matrices_may_be_replaced(measured):
     told = model(MODELS[0], 2)
     H = told.to_float()["H"]
     many, other = (Records(told, FloatFormat(2, 30), Form.INNOVATION, COUNT) for _ in range(2))
-    expected = many.carry(MEASURED, 4)
+    expected = many.carry(measured, 4)
     assert (len(H) > STEPS) is True
     other.use_measurement_matrices(H[:STEPS])
-    assert (other.carry(MEASURED, 4) == expected).all()
+    assert (other.carry(measured, 4) == expected).all()
     changed = Records(told, FloatFormat(2, 30), Form.INNOVATION, COUNT)
     changed.use_measurement_matrices(np.zeros_like(H[:1]))  # nothing is measured
-    assert (changed.carry(MEASURED, 4) == 0).all()
+    assert (changed.carry(measured, 4) == 0).all()
 
 
 # -- the sweep ------------------------------------------------------------------------------------
 
 
-def test_record_0_is_the_year_of_one_record():
-    assert (MEASURED[:, :, 0] == year_simulation(MODELS[0]).measurements(STEPS)).all()
+def test_record_0_is_the_year_of_one_record(measured):
+    assert (measured[:, :, 0] == year_simulation(MODELS[0]).measurements(STEPS)).all()
     assert SimpleYear("deviation").simulation(0).start[2:4] == threshold.DEVIATION
     with pytest.raises(ValueError, match="needed one of absolute, deviation"):
         SimpleYear("other")
