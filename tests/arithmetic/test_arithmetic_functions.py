@@ -138,6 +138,9 @@ def test_differences_are_one_subtraction_each(fmt):
     assert np.diff(x, axis=0).tolist() == (x[1:] - x[:-1]).tolist()
     assert np.diff(x, 2).tolist() == np.diff(np.diff(x)).tolist()
     assert np.diff(x, n=0).tolist() == x.tolist()
+    solid = fmt.array(np.arange(24).reshape(2, 3, 4) % 7)
+    for axis in range(3):
+        assert (np.diff(solid, axis=axis).to_float() == np.diff(solid.to_float(), axis=axis)).all()
 
 
 def test_products_of_vectors_and_diagonals(fmt):
