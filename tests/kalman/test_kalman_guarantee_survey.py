@@ -31,6 +31,12 @@ def test_a_sample_recomputes_no_row_twice(monkeypatch: pytest.MonkeyPatch) -> No
     assert len(set(computed)) == 3
 
 
+@pytest.mark.parametrize("seed", [8, 9, 26, 27])
+def test_a_row_comes_out_again(seed: int) -> None:
+    (row,) = (row for row in survey.load() if row.seed == seed)
+    assert survey.compute(seed) == row
+
+
 def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
     """Its notebook has Q = 0.001 I and an initial covariance of 0.1 I."""
     model, unit = dynamax_tracking(), np.eye(4, dtype=int)

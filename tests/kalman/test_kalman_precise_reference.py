@@ -33,6 +33,15 @@ def test_one_step_with_a_precise_sensor_is_enough_for_more_digits():
         assert filter_run._loses_digits(model, np.arange(2), P) is precise
 
 
+@pytest.mark.parametrize(("share", "agree"), [(Fraction(1, 2), True), (Fraction(3, 2), False)])
+def test_results_agree_in_104_bits_of_the_largest_of_each_entry(share, agree):
+    some, other = (
+        [(np.array([value]), np.array([[1]]), np.array([[1]])) for value in values]
+        for values in ((1, Fraction(4)), (1, 4 + 4 * share / 2**104))
+    )
+    assert precise_reference._agree(some, other) is agree
+
+
 def exactly(model, z):
     """The filter in Fractions; with inputs, as the exact step of a filter without them."""
     x, P, states = model.x0, model.P0, []
