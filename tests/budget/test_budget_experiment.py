@@ -47,6 +47,11 @@ def test_the_steps_are_named_for_what_they_derive(name):
     steps.check_names(DERIVATIONS[name], NAMES[name])
 
 
+def test_sources_are_counted():
+    assert derivation.N.is_integer
+    assert derivation.J.is_integer
+
+
 def test_the_derivations_are_those_of_the_chapter():
     assert steps.lengths(DERIVATIONS) == {"equal_sources": 2, "averages": 4}
 

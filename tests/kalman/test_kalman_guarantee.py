@@ -14,7 +14,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import derivation
+from gpbnb.kalman.guarantee import derivation, gains
 from gpbnb.kalman.guarantee.adversary import attack, ceiling, random_errors
 from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
@@ -310,6 +310,11 @@ def test_a_second_order_section(fmt: FloatFormat) -> None:
     found = from_schedule(biquad("0.01", "0.02", "0.01", "-1.6", "0.7").schedule(fmt), limits(3, 1, measurement=1))
     outcome = attack(found, 1000, 100)
     assert 0.3 < outcome.ratio <= 1
+
+
+def test_a_gain_whose_distances_do_not_close_is_not_known_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gains, "_closes", lambda *_: None)
+    assert not schedule(tracker(), FloatFormat(2, 24), Form.INNOVATION, 500).settled
 
 
 def test_published_error_coefficients() -> None:

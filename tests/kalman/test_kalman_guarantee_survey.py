@@ -37,6 +37,13 @@ def test_a_row_comes_out_again(seed: int) -> None:
     assert survey.compute(seed) == row
 
 
+def test_the_command_computes_rows_again_into_the_same_folder(tmp_path) -> None:
+    for _ in range(2):
+        assert survey.main(["--rows", "1", "--output", str(tmp_path)]) == 0
+    lines = (tmp_path / survey.FILE.name).read_text(encoding="utf-8").splitlines()
+    assert lines[-1].split(",")[:6] == ["0", "3", "1", "10", str(survey.load()[0].precision), survey.load()[0].rounding]
+
+
 def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
     """Its notebook has Q = 0.001 I and an initial covariance of 0.1 I."""
     model, unit = dynamax_tracking(), np.eye(4, dtype=int)

@@ -197,6 +197,7 @@ def test_dots_have_no_value():
         ("x == .7654e3 + (-.56e-5)", r"x=.7654\times10^{3}+\left(-.56\times10^{-5}\right)"),
         ("x[i,j] == P[k-1].inv", r"x_{ij}=P_{k-1}^{-1}"),
         ("x[i,k-1] == y[10,2]", r"x_{i,k-1}=y_{10,2}"),
+        ("phi_2[k] == x", r"\phi_{2,k}=x"),
         ("x == 60*degree + y_total", r"x=60^{\circ}+y_{\text{total}}"),
         ("a - (b - c)", r"a-\left(b-c\right)"),
         ("s == Sum(x[j],(j,1,n))", r"s=\sum_{j=1}^{n}x_{j}"),

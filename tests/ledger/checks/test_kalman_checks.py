@@ -237,6 +237,11 @@ def test_every_excess_is_of_the_arithmetic(patch, statement):
     assert (excess.excess(statement) > 1) == (statement not in ("(102)", "(106)"))
 
 
+@pytest.mark.parametrize("statement", ["(104)", "(107)"])
+def test_the_second_gain_exceeds_its_bounds_twofold(statement):
+    assert excess.excess(statement) == pytest.approx(2.141, abs=1e-3)
+
+
 def test_an_unknown_statement_has_no_excess():
     with pytest.raises(KeyError):
         excess.excess("(1)")
