@@ -195,6 +195,18 @@ def test_fused_multiply_add_with_cancellation(fmt: FloatFormat, mode: Rounding) 
     assert a.multiply_add(b, near).to_fractions().tolist() == exact
 
 
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 52), FloatFormat(16, 13)], ids=str)
+def test_results_of_long_numbers_of_either_sign(fmt: FloatFormat, mode: Rounding) -> None:
+    """The float64 result is often a number of the format, or half way between two: its residual decides."""
+    fmt = replace(fmt, rounding=mode)
+    rng = np.random.default_rng(52)
+    x, y = (fmt.array(rng.normal(size=60)) for _ in range(2))
+    for operation in BINARY:
+        exact = map(operation, x.to_fractions(), y.to_fractions())
+        assert operation(x, y).to_fractions().tolist() == [expected(value, fmt) for value in exact]
+
+
 CONVERTED = [named.BINARY16, named.BFLOAT16, named.TF32, named.FP8_E4M3, FloatFormat(2, 11), FloatFormat(2, 52)]
 
 

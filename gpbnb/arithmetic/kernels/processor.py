@@ -81,6 +81,7 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
     """Make the scalar operations for a class of digits and a class of rounding mode."""
     dropped = inner(forceinline=True)(_DROPPED[digits])
     round_magnitude = inner(forceinline=True)(_MODES[mode])
+    exact_product = EXACT_PRODUCT // (4 if digits is Sixteen else 1)  # digits
 
     @inner(forceinline=True)
     def fit(fmt: Any, p: Any, r: Any, exact_zero: Any) -> Any:
@@ -114,7 +115,7 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
     def multiply(fmt: Any, a: Any, b: Any) -> Any:
         p = a * b
         zero = (a == 0.0) | (b == 0.0)
-        return fit(fmt, p, 0.0 if fmt.precision <= EXACT_PRODUCT else fma(a, b, -p), zero)
+        return fit(fmt, p, 0.0 if fmt.precision <= exact_product else fma(a, b, -p), zero)
 
     @inner(error_model="numpy", forceinline=True)
     def divide(fmt: Any, a: Any, b: Any) -> Any:
