@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.conversion import entries, exact_ratio
 from gpbnb.arithmetic.functions import kept, lines, power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
+from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.text import decimal_text, in_columns
 
@@ -114,21 +116,30 @@ class FloatArray(NumPyProtocols):
         if type(values) is np.ndarray and (components := fmt.backend.from_numbers(values, exactly)) is not None:
             return cls.from_components(fmt.backend, components, fmt)
         given = entries(values)
-        m, e = np.empty(given.shape, object), np.empty(given.shape, object)
-        kernel = fmt.kernel
-        for index, value in np.ndenumerate(given):
+        pairs = []
+        # Large cycles of matrices have few different entries. Random roundings differ for equal ones, too.
+        known: dict[Any, Any] = {}
+        random = fmt.rounding is Rounding.STOCHASTIC
+        for i, value in enumerate(given.ravel().tolist()):
             try:
                 ratio = exact_ratio(value)
-                pair = kernel.from_decimal(*ratio)
+                if random or ratio not in known:
+                    known[ratio] = cls._rounded(value, ratio, fmt, exactly)
             except (TypeError, ValueError, OverflowError) as error:
-                raise type(error)(f"{_entry(index)}{error}") from None
-            if exactly and not kernel.is_exactly(pair, *ratio):
-                raise ValueError(
-                    f"{_entry(index)}got the operand {value!r}; needed a number that {fmt} holds exactly; "
-                    "round it first: fmt.array(...)"
-                )
-            m[index], e[index] = pair
+                raise type(error)(f"{_entry(np.unravel_index(i, given.shape))}{error}") from None
+            pairs.append(known[ratio])
+        found = np.array(pairs, object).reshape(-1, 2).T
+        m, e = (np.ascontiguousarray(part).reshape(given.shape) for part in found)
         return cls.from_pairs(m, e, fmt)
+
+    @staticmethod
+    def _rounded(value: Any, ratio: tuple[int, int, int], fmt: Any, exactly: bool) -> tuple[int, int]:
+        pair: tuple[int, int] = fmt.kernel.from_decimal(*ratio)
+        if exactly and not fmt.kernel.is_exactly(pair, *ratio):
+            raise ValueError(
+                f"got the operand {value!r}; needed a number that {fmt} holds exactly; round it first: fmt.array(...)"
+            )
+        return pair
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self).from_pairs, (*self.to_pairs(), self.format)
@@ -393,7 +404,7 @@ class FloatArray(NumPyProtocols):
         ------
         OverflowError : an entry is too long to write out.
         """
-        to_fraction = np.frompyfunc(self.format.kernel.to_fraction, 2, 1)
+        to_fraction = np.frompyfunc(cache(self.format.kernel.to_fraction), 2, 1)
         return np.asarray(to_fraction(*self.to_pairs()), dtype=object)[()]
 
     # -- text ----------------------------------------------------------------------------------

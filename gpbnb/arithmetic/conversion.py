@@ -31,6 +31,10 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
     """
     if type(value) is Fraction:  # the commonest, and its class is slow to ask
         return value.numerator, value.denominator, 0
+    if type(value) is int:
+        return value, 1, 0
+    if (pair := _of_mpmath_or_flint(value)) is not None:
+        return pair
     if isinstance(value, str):
         return _read(value)
     if isinstance(value, (bool, np.bool_)):
@@ -47,8 +51,6 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
             raise ValueError(_not_finite(value))
         p = int(Decimal((0, digits, 0)))
         return (-p if sign else p), 1, exponent
-    if (pair := _of_mpmath_or_flint(value)) is not None:
-        return pair
     # floats of Python, NumPy, gmpy2 and sympy, and everything else that converts exactly
     if hasattr(value, "as_integer_ratio"):
         try:
