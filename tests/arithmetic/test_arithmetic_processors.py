@@ -207,6 +207,12 @@ def test_results_of_long_numbers_of_either_sign(fmt: FloatFormat, mode: Rounding
         assert operation(x, y).to_fractions().tolist() == [expected(value, fmt) for value in exact]
 
 
+def test_entries_that_differ_in_the_power_of_ten_alone() -> None:
+    fmt = FloatFormat(2, 4, Rounding.CHOP)
+    values = fmt.array([["3", "0.3"], ["3e1", "0.3"]]).to_fractions()
+    assert values.tolist() == [[3, Fraction(9, 32)], [30, Fraction(9, 32)]]
+
+
 CONVERTED = [named.BINARY16, named.BFLOAT16, named.TF32, named.FP8_E4M3, FloatFormat(2, 11), FloatFormat(2, 52)]
 
 
@@ -368,6 +374,11 @@ class TestStochastic:
         up = np.mean(x > 1)
         assert set(x) == {1.0, 1 + 2.0**-7}
         assert abs(up - 0.3) < 5 * math.sqrt(0.3 * 0.7 / count)  # five standard errors
+
+    def test_equal_entries_are_rounded_each_by_itself(self) -> None:
+        self.FMT.restart()
+        values = self.FMT.array(["1.003"] * 100).to_fractions()
+        assert set(values) == {1, 1 + Fraction(1, 128)}
 
     def test_the_same_seed_gives_the_same_digits_on_either_backend(self) -> None:
         rng = np.random.default_rng(5)
