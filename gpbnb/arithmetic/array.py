@@ -116,7 +116,7 @@ class FloatArray(NumPyProtocols):
         if type(values) is np.ndarray and (components := fmt.backend.from_numbers(values, exactly)) is not None:
             return cls.from_components(fmt.backend, components, fmt)
         given = entries(values)
-        pairs = []
+        read = []
         # Large cycles of matrices have few different entries. Random roundings differ for equal ones, too.
         known: dict[Any, Any] = {}
         random = fmt.rounding is Rounding.STOCHASTIC
@@ -127,8 +127,8 @@ class FloatArray(NumPyProtocols):
                     known[ratio] = cls._rounded(value, ratio, fmt, exactly)
             except (TypeError, ValueError, OverflowError) as error:
                 raise type(error)(f"{_entry(np.unravel_index(i, given.shape))}{error}") from None
-            pairs.append(known[ratio])
-        found = np.array(pairs, object).reshape(-1, 2).T
+            read.append(known[ratio])
+        found = np.array(read, object).reshape(-1, 2).T
         m, e = (np.ascontiguousarray(part).reshape(given.shape) for part in found)
         return cls.from_pairs(m, e, fmt)
 
@@ -456,7 +456,7 @@ def _place(index: tuple[int, ...]) -> str:
     return f"[{', '.join(map(str, index))}]"
 
 
-def _entry(index: tuple[int, ...]) -> str:
+def _entry(index: tuple[Any, ...]) -> str:
     return f"entry {_place(index)}: " if index else ""
 
 

@@ -11,6 +11,7 @@ from small_filter import FORMATS, STEPS, measurements, model, run
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import smallest
+from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import gravity_probe_b
 from gpbnb.kalman.model import LinearModel
@@ -218,3 +219,10 @@ def test_a_year_of_gravity_probe_b_begins_like_the_exact_filter():
         slow.step(k, [Fraction(float(v)) for v in z[k]], Form.HUNG)
         assert [[v] for v in checkpoints.x[k]] == slow.x
         assert checkpoints.P[k].tolist() == slow.P
+
+
+def test_the_parts_of_a_double_double_are_added_exactly():
+    given = LinearModel([[1]], [[1]], [[1]], [[1]], [0], [[1]])
+    parts = np.array([[1.5, 2.0**-70], [2.0**-60, -(2.0**-130)], [3.0, 0.0]])
+    found = Run(given, None, Form.INNOVATION, ()).exactly(parts)
+    assert found.tolist() == [Fraction(3, 2) + Fraction(1, 2**70), Fraction(2**70 - 1, 2**130), 3]
