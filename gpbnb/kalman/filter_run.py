@@ -270,10 +270,13 @@ class Run:
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
     def _packed_matrix(self, model: LinearModel, letter: str) -> NDArray[Any]:
-        # Random roundings differ from run to run.
-        random = self.fmt is not None and self.fmt.rounding is Rounding.STOCHASTIC
-        packed = _packed_matrix.__wrapped__ if random else _packed_matrix
-        return packed(model, self.fmt, letter).copy()
+        try:
+            # A stored result would draw no random numbers, and the measurements would be rounded with others.
+            if self.fmt is not None and self.fmt.rounding is Rounding.STOCHASTIC:
+                return self.as_packed(getattr(model, letter))
+            return _packed_once(model, self.fmt, letter).copy()
+        except OverflowError as error:
+            raise OverflowError(f"{letter}: {error}") from None
 
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Round numbers into the format, and return them as the compiled loops expect them."""
@@ -330,11 +333,8 @@ def _as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
 
 
 @lru_cache(maxsize=48)
-def _packed_matrix(model: LinearModel, fmt: FloatFormat | None, letter: str) -> NDArray[Any]:
-    try:
-        return _as_packed(fmt, getattr(model, letter))
-    except OverflowError as error:
-        raise OverflowError(f"{letter}: {error}") from None
+def _packed_once(model: LinearModel, fmt: FloatFormat | None, letter: str) -> NDArray[Any]:
+    return _as_packed(fmt, getattr(model, letter))
 
 
 def check_compiled(fmt: FloatFormat) -> None:
