@@ -80,3 +80,10 @@ def check_names(derivation: Derivation, names: dict[str, str]) -> None:
     assert [step.name for step in derivation.steps] == list(names)
     for step, right in zip(derivation.steps, names.values(), strict=True):
         assert equal(step.right, written(right, step)), step.name
+
+
+def check_each(derivation: Derivation, names: dict[str, str], alike: tuple[str, ...] = ()) -> None:
+    """Each step passes :func:`check` and :func:`check_names`; the sides of those that begin with `alike` look alike."""
+    for step in derivation.steps:
+        check(step, step.name.startswith(alike))
+    check_names(derivation, names)

@@ -37,14 +37,8 @@ NAMES = {
 
 
 @pytest.mark.parametrize("name", DERIVATIONS)
-def test_each_step(name):
-    for step in DERIVATIONS[name].steps:
-        steps.check(step)
-
-
-@pytest.mark.parametrize("name", DERIVATIONS)
-def test_the_steps_are_named_for_what_they_derive(name):
-    steps.check_names(DERIVATIONS[name], NAMES[name])
+def test_each_step_holds_and_is_named_for_what_it_derives(name):
+    steps.check_each(DERIVATIONS[name], NAMES[name])
 
 
 def test_sources_are_counted():
