@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 LARGEST_SHORT = 8  # precision of ShortDecimal
 # Codes of rounding modes. AWAY and EVEN round to nearest, with ties away from zero or to the even last digit. ZERO, UP
-# and DOWN round toward zero, plus or minus infinity. ODD gives an inexact result the neighbour with an odd last digit.
+# and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to neighbours with an odd last digit.
 AWAY, EVEN, ZERO, UP, DOWN, ODD = range(6)
 
 
