@@ -11,7 +11,7 @@ import pytest
 
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import Run
@@ -45,7 +45,7 @@ MEASURED = np.random.default_rng(3).normal(size=(STEPS, 1)) + 2
     [
         (named.BFLOAT16, named.BINARY32),
         (named.BFLOAT16, None),
-        (FixedFormat(3, 12), FixedFormat(7, 24)),
+        (FixedFormat(3, 12, Rounding.EVEN), named.BINARY32),
     ],
     ids=str,
 )
