@@ -67,9 +67,11 @@ class ArrayRun:
         self._sound = model.definite_in(fmt)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(self._sound.repairs)
-        fmt.restart()
-        self._given = {letter: self._cycle(letter) for letter in ("Phi", "H", "Q", "R", "B", "u", "b", "d")}
-        self.x, self.P = fmt.array(model.x0), fmt.array(self._sound.P0)
+        stored = self._sound.arrays(fmt)
+        self.x, self.P = stored.pop("x0"), stored.pop("P0")
+        self._given: dict[str, list[FloatArray]] = {letter: [] for letter in ("B", "u", "b", "d")}
+        for letter, each in stored.items():
+            self._given[letter] = list(each[np.newaxis] if each.ndim == 1 else each)
         self._identity = fmt.array(np.eye(model.n, dtype=int))
         if form is ArrayForm.COMPENSATED:
             self._given["increment"] = [fmt.array(each - np.eye(model.n, dtype=int)) for each in model.Phi]
@@ -215,12 +217,6 @@ class ArrayRun:
         return gains, definite
 
     # -- what it needs ----------------------------------------------------------------------------------
-
-    def _cycle(self, letter: str) -> list[FloatArray]:
-        members = getattr(self._sound, letter)
-        if members is None:
-            return []
-        return [self.fmt.array(each) for each in (members[np.newaxis] if members.ndim == 1 else members)]
 
     def _at(self, letter: str, k: int) -> FloatArray:
         members = self._given[letter]

@@ -106,9 +106,9 @@ class Run:
         stored = model if fmt is None else model.definite_in(fmt)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(stored.repairs)
-        if fmt is not None:
-            fmt.restart()
-        Phi, H, Q, R, x0, P0 = (self._packed_matrix(stored, letter) for letter in ("Phi", "H", "Q", "R", "x0", "P0"))
+        # A result that was stored would draw no random numbers, and the measurements would be rounded with others.
+        random = fmt is not None and fmt.rounding is Rounding.STOCHASTIC
+        Phi, H, Q, R, x0, P0 = (each.copy() for each in (_packed if random else _packed_once)(stored, fmt))
         PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         identity = self.as_packed(np.eye(n, dtype=int))
@@ -269,15 +269,6 @@ class Run:
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
         return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
 
-    def _packed_matrix(self, model: LinearModel, letter: str) -> NDArray[Any]:
-        try:
-            # A stored result would draw no random numbers, and the measurements would be rounded with others.
-            if self.fmt is not None and self.fmt.rounding is Rounding.STOCHASTIC:
-                return self.as_packed(getattr(model, letter))
-            return _packed_once(model, self.fmt, letter).copy()
-        except OverflowError as error:
-            raise OverflowError(f"{letter}: {error}") from None
-
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Round numbers into the format, and return them as the compiled loops expect them."""
         return _as_packed(self.fmt, values)
@@ -324,17 +315,32 @@ def _as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
                 raise ValueError("got measurements with NaN or infinity; needed finite numbers")
             return np.stack([entries, np.zeros_like(entries)], axis=-1)
         return double_doubles(entries)
-    array = fmt.array(values)
+    return _packed_array(fmt.array(values))
+
+
+def _packed_array(array: FloatArray) -> NDArray[Any]:
     if not isinstance(array.backend, Compiled):
         raise OverflowError(
-            f"got numbers beyond the range of the compiled loops of {fmt}; scale the states, or use base 10"
+            f"got numbers beyond the range of the compiled loops of {array.format}; scale the states, or use base 10"
         )
     return array.backend.pack(array.components)
 
 
-@lru_cache(maxsize=48)
-def _packed_once(model: LinearModel, fmt: FloatFormat | None, letter: str) -> NDArray[Any]:
-    return _as_packed(fmt, getattr(model, letter))
+def _packed(model: LinearModel, fmt: FloatFormat | None) -> list[NDArray[Any]]:
+    """Phi, H, Q, R, x0 and P0 as the compiled loops expect them."""
+    letters = "Phi", "H", "Q", "R", "x0", "P0"
+    if fmt is None:
+        return [double_doubles(getattr(model, letter)) for letter in letters]
+    arrays, packed = model.arrays(fmt), []
+    for letter in letters:
+        try:
+            packed.append(_packed_array(arrays[letter]))
+        except OverflowError as error:
+            raise OverflowError(f"{letter}: {error}") from None
+    return packed
+
+
+_packed_once = lru_cache(maxsize=8)(_packed)
 
 
 def check_compiled(fmt: FloatFormat) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
@@ -311,11 +312,32 @@ class LinearModel:
         ValueError : a stored covariance is indefinite in spite of :meth:`definite_in`.
         """
         sound = self.definite_in(fmt)
-        fmt.restart()
-        given = [letter for letter in (*_LETTERS, *_INPUTS) if getattr(self, letter) is not None]
-        stored = {letter: fmt.array(getattr(sound, letter)).to_fractions() for letter in given}
+        stored = {letter: array.to_fractions() for letter, array in sound.arrays(fmt).items()}
         made = LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
         object.__setattr__(made, "repairs", sound.repairs)
+        return made
+
+    def arrays(self, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
+        """Return Phi, H, Q, R, x0, P0 and the inputs there are, with each entry rounded into the format, by letter.
+
+        Stochastic rounding starts with its first random number; entries of a covariance below the diagonal are those
+        above it, so that it stays symmetric.
+
+        Raises
+        ------
+        OverflowError : an entry is beyond the range of the format.
+        """
+        fmt.restart()
+        made: dict[str, FloatArray] = {}
+        for letter in (*_LETTERS, *_INPUTS):
+            if (given := getattr(self, letter)) is None:
+                continue
+            try:
+                made[letter] = fmt.array(given)
+            except OverflowError as error:
+                raise OverflowError(f"{letter}: {error}") from None
+            if letter in _COVARIANCES and fmt.rounding is Rounding.STOCHASTIC:
+                made[letter] = made[letter].moved(_mirrored)
         return made
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
@@ -326,6 +348,12 @@ class LinearModel:
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 _INPUTS = ("B", "u", "b", "d")
 _COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
+
+
+def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
+    """Copy the entries above the diagonals of (..., n, n) below them."""
+    above = np.triu(np.ones(matrices.shape[-2:], dtype=bool))
+    return np.where(above, matrices, np.swapaxes(matrices, -1, -2))
 
 
 @lru_cache(maxsize=16)

@@ -311,3 +311,16 @@ def test_a_rounded_model_keeps_its_inputs():
     assert isinstance(model, Model)
     assert model.has_inputs
     assert model.steps == STEPS
+
+
+def test_random_rounding_stores_one_model_whose_covariances_are_symmetric():
+    """The stored model is the one that a run takes, with its inputs, too."""
+    fmt = FloatFormat(2, 9, Rounding.STOCHASTIC, seed=4)
+    model = replace(drawn(), P0=np.eye(3) + drawn().Q[0])
+    assert np.any(fmt.array(model.P0) != fmt.array(model.P0).T)
+    stored = model.rounded(fmt)
+    run = ArrayRun(model, fmt, Form.INNOVATION, range(1, STEPS + 1))
+    assert np.array_equal(run.x.to_fractions(), stored.x0)
+    assert np.array_equal(run.P.to_fractions(), stored.P0)
+    z = simulated_measurements(model, STEPS, 1)
+    assert 0 < emulate(model, z, fmt, "symmetrized").state.max() < 1
