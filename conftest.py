@@ -1,5 +1,6 @@
 """Settings for every test and notebook that pytest runs here."""
 
+import gc
 import os
 import re
 
@@ -50,6 +51,13 @@ def pytest_collection_modifyitems(items):
     groups = [group(item.nodeid) for item in items]
     rank = {name: LONGEST.index(name) if name in LONGEST else len(LONGEST) for name in groups}
     items[:] = [item for _, item in sorted(zip(groups, items, strict=True), key=lambda pair: rank[pair[0]])]
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish():
+    """Look for garbage less often, and not among the modules and tests, which stay: saves 6 % of the time."""
+    gc.freeze()
+    gc.set_threshold(20_000, 50, 50)
 
 
 # pytest-xdist has --dist loadgroup, whose groups pytest 9.2 does not let it write into the names of tests.
