@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator
 from dataclasses import replace
 from fractions import Fraction
+from functools import lru_cache
 
 from gpbnb.ledger.formula import Number, Part, Relation, Words
 from gpbnb.ledger.statements import Statement
@@ -113,13 +114,22 @@ def _with(tree: ast.AST, place: ast.AST, new: ast.AST) -> str:
     """The text of a tree with another node in one place; the tree itself stays as it is."""
     if tree is place:
         return ast.unparse(new)
-    for parent in ast.walk(tree):
-        for field, value in ast.iter_fields(parent):
-            if value is place or (isinstance(value, list) and any(item is place for item in value)):
-                changed = [new if item is place else item for item in value] if isinstance(value, list) else new
-                setattr(parent, field, changed)
-                try:
-                    return ast.unparse(tree)
-                finally:
-                    setattr(parent, field, value)
-    raise LookupError("got a node of another tree; needed one of this tree")
+    parent, field = _parents(tree)[place]
+    value = getattr(parent, field)
+    setattr(parent, field, [new if item is place else item for item in value] if isinstance(value, list) else new)
+    try:
+        return ast.unparse(tree)
+    finally:
+        setattr(parent, field, value)
+
+
+@lru_cache(maxsize=64)
+def _parents(tree: ast.AST) -> dict[ast.AST, tuple[ast.AST, str]]:
+    """The parent of each node, and the field of the parent that holds the node."""
+    return {
+        node: (parent, field)
+        for parent in ast.walk(tree)
+        for field, value in ast.iter_fields(parent)
+        for node in (value if isinstance(value, list) else [value])
+        if isinstance(node, ast.AST)
+    }

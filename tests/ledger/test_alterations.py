@@ -125,9 +125,10 @@ def test_a_claim_in_words_has_a_negation_that_is_rejected(statement):
 
 def test_each_exception_is_an_alteration_with_its_reason():
     by_id = {statement.id: statement for statement in STATEMENTS}
+    alterations = {key: dict(altered(by_id[key])) for key, _ in STILL_TRUE}
     for (key, name), why in STILL_TRUE.items():
         assert why
-        assert name in dict(altered(by_id[key])), (key, name)
+        assert name in alterations[key], (key, name)
 
 
 def test_each_equation_number_example_and_table_has_a_form():
