@@ -193,8 +193,8 @@ def no_excess(patch):
 
 
 @pytest.mark.parametrize("key", ALGEBRA_IS_RIGHT)
-def test_a_step_that_no_filter_exceeds_is_verified_as_printed_only(patch, key):
-    assert judged(key).verdict is Verdict.WRONG
+def test_a_step_that_no_filter_exceeds_is_verified_as_printed_only(rows, patch, key):
+    assert finding(rows, key).verdict is Verdict.WRONG
     no_excess(patch)
     assert judged(key).verdict is Verdict.VERIFIED
     right = []
@@ -270,9 +270,8 @@ NOT_RIGHT = [
 
 
 @pytest.mark.parametrize(("key", "change"), NOT_RIGHT)
-def test_a_check_that_agrees_can_disagree(patch, key, change):
-    assert judged(key).agrees is True
-    faults.forget(*CACHING)
+def test_a_check_that_agrees_can_disagree(rows, patch, key, change):
+    assert finding(rows, key).agrees is True
     change(patch)
     assert judged(key).agrees is False
 
