@@ -91,9 +91,11 @@ class Link:
 @lru_cache(maxsize=4096)
 def _tree(text: str) -> ast.expr:
     tree = ast.parse(text, mode="eval").body
+    lines = text.encode().splitlines()  # ast.get_source_segment splits the text anew for each node
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant):
-            node.literal = ast.get_source_segment(text, node)  # type: ignore[attr-defined]
+            literal = lines[node.lineno - 1][node.col_offset : node.end_col_offset]
+            node.literal = literal.decode()  # type: ignore[attr-defined]
     return tree
 
 
@@ -240,6 +242,7 @@ def read(form: str) -> tuple[Part, ...]:
     return tuple(_part(text.strip()) for text in form.split(";")) if form.strip() else ()
 
 
+@lru_cache(maxsize=4096)
 def _part(text: str) -> Part:
     labelled = _LABELLED.fullmatch(text)
     if labelled and "|" in labelled[2]:
@@ -264,6 +267,8 @@ def _part(text: str) -> Part:
 
 # -- evaluation -----------------------------------------------------------------------------------
 
+_fraction = lru_cache(maxsize=4096)(Fraction)
+
 
 class _Evaluation:
     """Compute the value of an expression tree with the names given."""
@@ -277,7 +282,7 @@ class _Evaluation:
                 sides = [self(side) for side in (left, *rights)]
                 return all(OPERATORS[type(op)][1](a, b) for a, op, b in zip(sides[:-1], ops, sides[1:], strict=True))
             case ast.Constant(value=int() | float()):
-                return self.number(Fraction(getattr(node, "literal", None) or ast.unparse(node)))
+                return self.number(_fraction(getattr(node, "literal", None) or ast.unparse(node)))
             case ast.Name(id=name):
                 return self.names[name] if name in self.names else sp.Symbol(name)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
