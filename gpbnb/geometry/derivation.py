@@ -203,7 +203,8 @@ def fewest_signs() -> tuple[tuple[int, ...], ...]:
             left3, left2, c1, s1, s2, c2 = (-1 if k in changed else 1 for k in range(6))
             third = left3 * (c1 * C * y + s1 * S * z)
             second = -left2 * (-s2 * S * y + c2 * C * z)
-            if all(sp.simplify(e) == 0 for e in (third - ALPHA[2], second - ALPHA[1])):
+            errors = (sp.expand(third - ALPHA[2]), sp.expand(second - ALPHA[1]))
+            if all(sp.expand(error.subs(S**2, 1 - C**2)) == 0 for error in errors):
                 found.append(changed)
         if found:
             break
