@@ -326,6 +326,7 @@ def expansion(terms: int) -> list[sp.Expr]:
     return quotient[2 : terms + 2]
 
 
+@cache
 def printed_37(cubic: sp.Expr) -> sp.Expr:
     r"""Return the walk to order μ² from (37) with the numerator :math:`1-\frac12\mu+\frac14\mu^2-c\mu^3`."""
     numerator = 1 - MU / 2 + MU**2 / 4 - cubic * MU**3

@@ -182,14 +182,14 @@ def series(printed: Statement) -> Finding:
         Verdict.MISPRINT if others else Verdict.WRONG,
         otherwise_note="the factor 2 in front halves the quadratic term but was not applied to the cubic term, due "
         "to the author or the scan; the next line drops the cubic term, so nothing depends on it. If "
-        f"kept, it would add a term ${sp.latex(derivation.misprints()['(37)'] - MU / 6)}$ to an odd "
+        f"kept, it would add a term ${sp.latex(derivation.printed_37(sp.Rational(1, 6)) - MU / 6)}$ to an odd "
         "function of $\\mu$",
     )
 
 
 def _rational(link: Any) -> sp.Expr:
     """Return left minus right side, with the exponential replaced by its series up to μ⁶."""
-    cut = sp.series(sp.exp(-MU), MU, 0, 7).removeO()
+    cut = sum(((-MU) ** k / sp.factorial(k) for k in range(7)), start=sp.S.Zero)
     return (link.left - link.right).subs(sp.exp(-MU), cut)
 
 
