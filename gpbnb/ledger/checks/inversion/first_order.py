@@ -40,13 +40,15 @@ class FirstOrder:
         return quantity(other) - self
 
     def __mul__(self, other: Any) -> FirstOrder:
+        if isinstance(other, int | Fraction):
+            return FirstOrder(self.value * other, self.slope * other)
         other = quantity(other)
         return FirstOrder(
             _product(self.value, other.value), _product(self.value, other.slope) + _product(self.slope, other.value)
         )
 
     def __rmul__(self, other: Any) -> FirstOrder:
-        return quantity(other) * self
+        return self * other if isinstance(other, int | Fraction) else quantity(other) * self
 
     def inv(self) -> FirstOrder:
         """The inverse of a matrix, or of a number."""

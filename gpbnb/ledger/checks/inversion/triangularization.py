@@ -231,13 +231,13 @@ def upper_triangular(printed: Statement) -> Finding:
 # -- one ε for all roundings: (48)-(60) -----------------------------------------------------------
 
 
+@cache
 def _within(relation: Relation, n: int) -> int:
     """Count the runs in which the printed right side, with β for ε, allows the errors that occur."""
     count = 0
     for _, names, _ in runs(n):
-        given_names = {**COMMON, **names}
-        left, right = relation.links(given_names, Fraction)[0].left, relation.value(given_names, Fraction)
-        count += abs(left) <= abs(right)
+        links = relation.links({**COMMON, **names}, Fraction)
+        count += abs(links[0].left) <= abs(links[-1].right)
     return count
 
 
