@@ -138,6 +138,7 @@ def _toward(x: Fraction, wordlength: Wordlength, places: int, step: int) -> Frac
     return chopped if chopped < x else _next(chopped, wordlength, places, -1)
 
 
+@cache
 def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
     """Return the neighbour of a number of the wordlength."""
     if wordlength.kind == "fixed point":
