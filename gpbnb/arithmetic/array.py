@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.formats import FloatFormat
 
 
+MANY = 100
+"""In arrays with more entries than this, equal entries are converted once; for fewer, remembering takes longer."""
+
+
 class NegativeRootError(ValueError):
     """The square root of a negative number."""
 
@@ -404,8 +408,9 @@ class FloatArray(NumPyProtocols):
         ------
         OverflowError : an entry is too long to write out.
         """
-        to_fraction = np.frompyfunc(cache(self.format.kernel.to_fraction), 2, 1)
-        return np.asarray(to_fraction(*self.to_pairs()), dtype=object)[()]
+        to_fraction = self.format.kernel.to_fraction
+        convert = np.frompyfunc(cache(to_fraction) if self.size > MANY else to_fraction, 2, 1)
+        return np.asarray(convert(*self.to_pairs()), dtype=object)[()]
 
     # -- text ----------------------------------------------------------------------------------
 

@@ -27,8 +27,11 @@ def exact(values: Any) -> NDArray[Any]:
     if hasattr(values, "to_fractions"):
         values = values.to_fractions()
     entries: NDArray[Any] = np.asarray(values, dtype=object)
+    given = entries.ravel().tolist()
+    if set(map(type, given)) == {Fraction}:
+        return entries.copy()
     fractions = np.empty(entries.size, object)
-    for i, entry in enumerate(entries.ravel().tolist()):
+    for i, entry in enumerate(given):
         if not isinstance(entry, Fraction):
             try:
                 p, q, power = exact_ratio(entry)
@@ -43,8 +46,9 @@ def exact(values: Any) -> NDArray[Any]:
 
 def integers(fractions: NDArray[Any]) -> tuple[NDArray[Any], Fraction]:
     """Write exact Fractions as integers times one unit; sums and products of integers are much faster."""
-    common = math.lcm(*(entry.denominator for entry in fractions.flat))
-    counts = [entry.numerator * (common // entry.denominator) for entry in fractions.flat]
+    ratios = [entry.as_integer_ratio() for entry in fractions.flat]
+    common = math.lcm(*(q for _, q in ratios))
+    counts = [p * (common // q) for p, q in ratios]
     return np.array(counts, dtype=object).reshape(fractions.shape), Fraction(1, common)
 
 
@@ -102,16 +106,20 @@ def column_sum_norm(a: Any) -> Fraction:
         sums = (sum((abs(entry) for entry in column), fmpq(0)) for column in a.transpose().tolist())
         largest = max(sums, default=fmpq(0))
         return Fraction(int(largest.p), int(largest.q))
-    return max(_sizes(a).sum(axis=0), default=Fraction(0))
+    sizes, unit = _sizes(a)
+    return max(sizes.sum(axis=0), default=0) * unit
 
 
 def row_sum_norm(a: Any) -> Fraction:
     r"""Largest row sum, :math:`\max_i \sum_j |a_{ij}|`, the matrix norm that is compatible with (21)."""
-    return max(_sizes(a).sum(axis=1), default=Fraction(0))
+    sizes, unit = _sizes(a)
+    return max(sizes.sum(axis=1), default=0) * unit
 
 
-def _sizes(a: Any) -> NDArray[Any]:
+def _sizes(a: Any) -> tuple[NDArray[Any], Fraction]:
+    """Return absolute values as integers times one unit."""
     entries = exact(a)
     if entries.ndim != 2:
         raise ValueError(f"got shape {entries.shape}; needed a matrix (m, n); reshape a vector to (n, 1)")
-    return np.asarray(abs(entries))
+    counts, unit = integers(entries)
+    return np.asarray(abs(counts)), unit

@@ -215,11 +215,9 @@ def random_numbers(
     significands = rng.integers(limit // fmt.base, limit, shape)
     if kind != "like signs":
         significands = significands * rng.choice([-1, 1], shape)
-    if kind == "far exponents":
-        powers = np.array([Fraction(fmt.base) ** e for e in range(-fmt.precision, fmt.precision + 1)])
-        numbers = fmt.array(significands.astype(object) * powers[rng.integers(0, len(powers), shape)])
-    else:
-        numbers = fmt.array(significands)
+    far = fmt.precision if kind == "far exponents" else 0
+    exponents = rng.integers(-far, far + 1, shape) if far else np.zeros(shape, np.int64)
+    numbers = FloatArray.from_pairs(significands.astype(object), exponents.astype(object), fmt)
     if kind == "cancelling":
         head = numbers[..., :-1]
         last: Any = -head.sum(axis=-1)[..., np.newaxis]
