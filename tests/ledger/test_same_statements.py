@@ -1,6 +1,7 @@
 """Statements that say the same have the same verdict."""
 
 import ast
+from functools import cache
 from itertools import combinations
 
 import pytest
@@ -31,14 +32,21 @@ def comparisons(relation):
         return
     sides = [tree.left, *tree.comparators]
     for left, op, right in zip(sides[:-1], tree.ops, sides[1:], strict=True):
-        equation = isinstance(op, ast.Eq | ast.Is)
-        try:
-            (link,) = Relation(f"{ast.unparse(left)} == {ast.unparse(right)}").links(NAMES)
-            difference = sp.expand(link.left - link.right)
-            texts = [str(difference), str(sp.expand(-difference))]
-        except (AttributeError, TypeError, ValueError):  # matrices in brackets, cases, sums with symbols
-            texts = [f"{ast.unparse(left)}|{ast.unparse(right)}", f"{ast.unparse(right)}|{ast.unparse(left)}"]
-        yield type(op).__name__, min(texts) if equation else texts[0]
+        one, other = ast.unparse(left), ast.unparse(right)
+        texts = [difference(one, other)]
+        if isinstance(op, ast.Eq | ast.Is):
+            texts.append(difference(other, one))
+        yield type(op).__name__, min(texts)
+
+
+@cache  # both reports print most formulas
+def difference(left, right):
+    """The difference of two sides as a text."""
+    try:
+        (link,) = Relation(f"{left} == {right}").links(NAMES)
+        return str(sp.expand(link.left - link.right))
+    except (AttributeError, TypeError, ValueError):  # matrices in brackets, cases, sums with symbols
+        return f"{left}|{right}"
 
 
 def content(statement):
