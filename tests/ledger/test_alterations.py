@@ -3,16 +3,20 @@
 import csv
 import random
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
+import faults
 import pytest
 from alterations import altered
 
 from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.checks.rounding import instances, introduction, matrices, products, sums
 from gpbnb.ledger.finding import Verdict
 from gpbnb.ledger.formula import Undefined, Words
 from gpbnb.ledger.registry import takes_statement
 from gpbnb.ledger.statements import Statement, load_statements
+from gpbnb.rounding import experiment
 
 STATEMENTS = load_statements()
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
@@ -26,6 +30,16 @@ LOST = {
     "hung1982.III.s11-1.b-i-1-definition": "of the equation, the scan keeps one divisor",
 }
 """Statements that the scan has lost, so that there is nothing to write down."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_surveys():
+    """Survey a third of the trials: fewer trials make it harder to reject a statement."""
+    survey = experiment.survey.__wrapped__
+    surveying = (instances, introduction, matrices, products, sums, experiment)
+    with pytest.MonkeyPatch.context() as patch, faults.forgetting(patch, *surveying):
+        patch.setattr(experiment, "survey", cache(lambda trial: survey(trial, repeats=3)))
+        yield
 
 
 def still_true():
