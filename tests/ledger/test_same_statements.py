@@ -32,21 +32,19 @@ def comparisons(relation):
         return
     sides = [tree.left, *tree.comparators]
     for left, op, right in zip(sides[:-1], tree.ops, sides[1:], strict=True):
-        one, other = ast.unparse(left), ast.unparse(right)
-        texts = [difference(one, other)]
-        if isinstance(op, ast.Eq | ast.Is):
-            texts.append(difference(other, one))
-        yield type(op).__name__, min(texts)
+        texts = differences(ast.unparse(left), ast.unparse(right))
+        yield type(op).__name__, min(texts) if isinstance(op, ast.Eq | ast.Is) else texts[0]
 
 
 @cache  # both reports print most formulas
-def difference(left, right):
-    """The difference of two sides as a text."""
+def differences(left, right):
+    """The left side minus the right side, and the reverse, as texts."""
     try:
         (link,) = Relation(f"{left} == {right}").links(NAMES)
-        return str(sp.expand(link.left - link.right))
+        difference = sp.expand(link.left - link.right)
+        return str(difference), str(sp.expand(-difference))
     except (AttributeError, TypeError, ValueError):  # matrices in brackets, cases, sums with symbols
-        return f"{left}|{right}"
+        return f"{left}|{right}", f"{right}|{left}"
 
 
 def content(statement):
