@@ -30,6 +30,11 @@ LONGEST = (
 )
 
 
+# An opened page is looked at on a desktop, then on a phone, and is printed last.
+OPENED = re.compile(r"(.+?\.html)-(desktop|phone|paper)\b")
+LOOKS = ("", "desktop", "phone", "paper")
+
+
 def group(nodeid):
     """What one process is to run: a file; a chapter whose statements are altered; all tests of an opened page.
 
@@ -41,16 +46,25 @@ def group(nodeid):
         chapter = re.match(r"\w+\.\w+", parameters)
         # Chapter III of 1982 prints most of chapter II of 1984, and their checks compute the same.
         return f"alterations of {chapter[0].replace('hung1982.III', 'hung1984.II')}" if chapter else file
-    if file.endswith(("pages/test_pages.py", "pages/test_calculators.py")):
-        page = re.match(r".+?\.html-(desktop|phone)\b", parameters)
-        return page[0] if page else name
+    if file.endswith("pages/test_pages.py"):
+        page = OPENED.match(parameters)
+        return page[1] if page else name
     return file
 
 
+# After pytest's own order, which knows of no groups.
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
-    groups = [group(item.nodeid) for item in items]
-    rank = {name: LONGEST.index(name) if name in LONGEST else len(LONGEST) for name in groups}
-    items[:] = [item for _, item in sorted(zip(groups, items, strict=True), key=lambda pair: rank[pair[0]])]
+    first = {}
+
+    def place(numbered):
+        number, item = numbered
+        name = group(item.nodeid)
+        look = OPENED.match(item.nodeid.partition("[")[2])
+        rank = LONGEST.index(name) if name in LONGEST else len(LONGEST)
+        return rank, first.setdefault(name, number), LOOKS.index(look[2] if look else ""), number
+
+    items[:] = [item for _, item in sorted(enumerate(items), key=place)]
 
 
 @pytest.hookimpl(trylast=True)

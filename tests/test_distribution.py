@@ -22,10 +22,10 @@ def root(pytestconfig):
         ("book/kalman.ipynb::Cell 3", "book/kalman.ipynb"),
         ("tests/ledger/test_alterations.py::test_a[hung1984.II.eq8]", "alterations of hung1984.II"),
         ("tests/ledger/test_alterations.py::test_a", "tests/ledger/test_alterations.py"),
-        ("tests/pages/test_pages.py::test_a[book/story.html-phone]", "book/story.html-phone"),
-        ("tests/pages/test_pages.py::test_a[book/story.html-phone-dark]", "book/story.html-phone"),
+        ("tests/pages/test_pages.py::test_a[book/story.html-phone]", "book/story.html"),
+        ("tests/pages/test_pages.py::test_a[book/story.html-paper]", "book/story.html"),
         ("tests/pages/test_pages.py::test_a[dark]", "test_a"),
-        ("tests/pages/test_calculators.py::test_b[kalman]", "test_b"),
+        ("tests/pages/test_calculators.py::test_b[kalman]", "tests/pages/test_calculators.py"),
         ("tests/pages/test_ledger_page.py::test_a[True]", "tests/pages/test_ledger_page.py"),
     ],
 )

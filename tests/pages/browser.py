@@ -30,6 +30,8 @@ FLAGS = [
 ]
 # Formulas are typeset, except those in closed details, and fonts are there.
 SETTLED = "async () => { await window.formulasTypeset; await document.fonts.ready }"
+# What follows from a new size is done: the boxes are observed before a frame is painted.
+RESTED = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done))))"
 # Milliseconds until the text is painted, and until every formula that is shown is typeset.
 TIMES = """() => {
   const [text] = performance.getEntriesByName("first-contentful-paint");
@@ -41,6 +43,7 @@ LOADS = 10  # at most
 HIGHEST = 20_000  # pixels, on a desktop
 HEAVIEST = 300_000  # bytes of HTML
 SIZES = {"desktop": {"width": 1280, "height": 900}, "phone": {"width": 390, "height": 844}}
+PAPER = {"width": 688, "height": 974}  # A4 without margins, at 96 dots an inch
 
 
 def missing() -> str | None:
@@ -88,6 +91,10 @@ def chromium() -> str | None:
 
 class QuietHandler(SimpleHTTPRequestHandler):
     protocol_version = "HTTP/1.1"  # connections stay open
+
+    def end_headers(self) -> None:
+        self.send_header("Cache-Control", "max-age=3600")  # else the browser asks again for every script and font
+        super().end_headers()
 
     def log_message(self, *args: object) -> None:
         pass

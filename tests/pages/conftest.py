@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
 
@@ -57,15 +57,43 @@ def open_page():
         yield open_page
 
 
-# One page is opened at a time, and serves all tests of it.
-@pytest.fixture(scope="module", params=[(a, s) for a in tools.opened() for s in tools.SIZES], ids="-".join)
-def page(request, open_page):
-    with open_page(*request.param, shared=True) as page:
-        yield page
-
-
 @pytest.fixture(scope="session")
-def axe():
-    from axe_playwright_python.sync_playwright import Axe
+def look_at(open_page):
+    """A function that shows an address as on a desktop, a phone or paper; it keeps the last address open.
 
-    return Axe()
+    A narrow window shows what a phone does, as a test finds; nothing makes a page whole again that has been printed.
+    """
+    with ExitStack() as opened:
+        shown = None
+
+        def look_at(address, look):
+            nonlocal shown
+            if shown is None or shown[0] != address or shown[2] == "paper":
+                opened.close()
+                page = opened.enter_context(open_page(address))
+                page.times = page.evaluate(tools.TIMES)
+                shown = address, page, "desktop"
+            _, page, before = shown
+            if look != before:
+                page.emulate_media(color_scheme="light")
+                page.set_viewport_size(tools.SIZES["desktop" if look == "paper" else look])
+                page.evaluate(tools.RESTED)
+            if look == "paper":
+                page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+                page.set_viewport_size(tools.PAPER)
+                page.emulate_media(media="print")
+            shown = address, page, look
+            return page
+
+        yield look_at
+
+
+# All tests of one address follow each other.
+@pytest.fixture(params=[(a, s) for a in tools.opened() for s in tools.SIZES], ids="-".join)
+def page(request, look_at):
+    return look_at(*request.param)
+
+
+@pytest.fixture(params=tools.opened(), ids=lambda address: f"{address}-paper")
+def paper(request, look_at):
+    return look_at(request.param, "paper")

@@ -9,10 +9,21 @@ from urllib.parse import unquote, urljoin, urlsplit
 import pytest
 from markup import Elements
 
+from . import axe
 from . import browser as tools
 
 PAGES = tools.pages()
+FORMULAS = 12
+"""Formulas that axe looks at, at the beginning and at the end of a page."""
 LONG_PAGES = ("book/kalman.html", "book/inversion.html", "book/ledger-1984-3.html")
+CHAPTERS = [each for each in PAGES if each.startswith("book/") and not each.startswith(("book/api/", "book/ledger-"))]
+
+
+def on_a_desktop(addresses):
+    """Mark a test that looks at these pages on a desktop alone."""
+    return pytest.mark.parametrize("page", [(a, "desktop") for a in addresses], ids="-".join, indirect=True)
+
+
 FOCUS = """() => {
   const e = document.activeElement;
   const box = e.getBoundingClientRect();
@@ -67,10 +78,9 @@ def test_never_scrolls_sideways(page):
     assert page.evaluate("[document.documentElement.scrollWidth, window.scrollX]") == [page.viewport_size["width"], 0]
 
 
+@on_a_desktop(tools.opened())
 def test_on_a_desktop_only_formulas_scroll(page):
     """Code, outputs and tables fit the column; a formula scrolls only where it has no place left to break."""
-    if page.viewport_size != tools.SIZES["desktop"]:
-        pytest.skip("a phone scrolls")
     scrolling = page.locator("article :is(div, pre)").evaluate_all(
         "all => all.filter(e => e.scrollWidth > e.clientWidth + 1 && /auto|scroll/.test(getComputedStyle(e).overflowX))"
         ".map(e => e.textContent.trim().slice(0, 80))"
@@ -117,83 +127,27 @@ CUT = """() => {
 }"""
 
 
-def test_nothing_is_cut_on_paper(page):
-    if page.viewport_size != tools.SIZES["desktop"]:
-        pytest.skip("paper is as wide for all")
-    try:
-        page.evaluate("window.collapsed = [...document.querySelectorAll('details:not([open])')]")
-        page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
-        page.set_viewport_size({"width": 688, "height": 974})  # A4 without margins, at 96 dots an inch
-        page.emulate_media(media="print")
-        assert page.evaluate(CUT) == []
-        assert page.locator(".math:not(:has(mjx-container))").all_text_contents() == []
-    finally:
-        page.emulate_media(media="screen")
-        page.set_viewport_size(tools.SIZES["desktop"])
-        page.evaluate("for (const each of window.collapsed) each.open = false")
+def test_nothing_is_cut_on_paper(paper):
+    assert paper.evaluate(CUT) == []
+    assert paper.locator(".math:not(:has(mjx-container))").all_text_contents() == []
 
 
-# Formulas are most of a page, and MathJax makes them all alike.
-EMPTY = """(kept) => {
-  const all = [...document.querySelectorAll("mjx-container")];
-  window.emptied = all.slice(kept, Math.max(kept, all.length - kept)).map((each) => [each, [...each.childNodes]]);
-  for (const [each] of window.emptied) each.replaceChildren();
-}"""
-FILL = "for (const [each, parts] of window.emptied) each.replaceChildren(...parts)"
-FORMULAS = 12
-"""Formulas that axe looks at, at the beginning and at the end of a page; on one page it looks at all."""
-# The contrast of every text takes nine tenths of the time: three texts of each look, on alike backgrounds, will do.
-VIOLATIONS = """async () => {
-  const layers = new Map([[null, ""]]);
-  const behind = (e) => {
-    if (!layers.has(e)) {
-      const { backgroundColor, backgroundImage, opacity, filter, position } = getComputedStyle(e);
-      const clear = backgroundColor === "rgba(0, 0, 0, 0)" && backgroundImage === "none" && opacity === "1";
-      const own = clear && filter === "none" ? "" : [backgroundColor, backgroundImage, opacity, filter].join();
-      layers.set(e, `${behind(e.parentElement)} ${own}${/fixed|absolute|sticky/.test(position) ? position : ""}`);
-    }
-    return layers.get(e);
-  };
-  const chosen = [...document.querySelectorAll("input, select, textarea, button, summary")];
-  const looks = new Map();
-  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (texts.nextNode()) {
-    const e = texts.currentNode.parentElement;
-    if (!texts.currentNode.data.trim() || !e.checkVisibility()) continue;
-    const { color, fontSize, fontWeight, textShadow } = getComputedStyle(e);
-    const look = [color, fontSize, fontWeight, textShadow, behind(e)].join();
-    looks.set(look, [...(looks.get(look) ?? []), e]);
-  }
-  for (const alike of looks.values()) chosen.push(...new Set([alike[0], alike[alike.length >> 1], alike.at(-1)]));
-  const resultTypes = ["violations"];
-  const others = await axe.run(document, { resultTypes, rules: { "color-contrast": { enabled: false } } });
-  const contrast = await axe.run({ include: chosen }, { resultTypes, runOnly: ["color-contrast"] });
-  const found = [...others.violations, ...contrast.violations];
-  return found.flatMap(({ id, nodes }) => nodes.map(({ target, html }) => `${id}: ${target} ${html.slice(0, 160)}`));
-}"""
+def test_axe_finds_no_violation(page):
+    """Formulas are the same in each look: one look is enough for them, at all of them on one page."""
+    formulas = 0
+    if page.viewport_size == tools.SIZES["desktop"]:
+        formulas = page.locator("mjx-container").count() if page.url.endswith(LONG_PAGES[0]) else FORMULAS
+    assert axe.violations(page, formulas) == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_axe_finds_no_violation(page, axe, scheme):
-    """Formulas are the same in each look: one look is enough for them."""
-    page.emulate_media(color_scheme=scheme)
-    page.wait_for_function(f"document.documentElement.dataset.theme === '{scheme}'")
-    first_look = (page.viewport_size, scheme) == (tools.SIZES["desktop"], "light")
-    long = page.url.endswith(LONG_PAGES[0])
-    page.evaluate(EMPTY, 0 if not first_look else page.locator("mjx-container").count() if long else FORMULAS)
-    page.evaluate(axe.axe_script)
-    found = page.evaluate(VIOLATIONS)
-    page.evaluate(FILL)
-    assert found == []
-
-
-def test_faint_text_is_a_violation(open_page, axe):
-    """Also where only a few texts of each look are compared with what is behind them."""
-    with open_page("book/index.html") as page:
-        page.evaluate(axe.axe_script)
-        page.evaluate("document.querySelector('article p').style.color = '#999'")
-        found = page.evaluate(VIOLATIONS)
-        assert {each.partition(":")[0] for each in found} == {"color-contrast"}
+def test_faint_text_is_a_violation(open_page):
+    """Also where only a few texts of each look are compared with what is behind them, and in one scheme alone."""
+    with open_page("book/index.html", shared=True) as page:
+        faint = "html[data-theme=dark] article p { color: #666 } html[data-theme=light] article li { color: #999 }"
+        page.add_style_tag(content=faint)
+        found = axe.violations(page)
+        assert {each.rpartition(":")[0].partition(": ")[0] for each in found} >= {"light", "dark"}
+        assert all("color-contrast" in each for each in found)
 
 
 def test_index_leads_to_the_first_page(open_page):
@@ -212,12 +166,14 @@ def test_the_colour_mode_can_be_chosen(open_page):
         assert page.faults == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_the_button_back_to_the_top_can_be_read(open_page, axe, scheme):
-    with open_page("book/rounding.html") as page:
-        page.emulate_media(color_scheme=scheme)
-        page.locator("#pst-back-to-top").evaluate("button => { button.style.display = 'block' }")
-        assert axe.run(page, context="#pst-back-to-top").response["violations"] == []
+@on_a_desktop(["book/rounding.html"])
+def test_the_button_back_to_the_top_can_be_read(page):
+    button = page.locator("#pst-back-to-top")
+    button.evaluate("button => { button.style.display = 'block' }")
+    try:
+        assert axe.violations(page, within="#pst-back-to-top") == []
+    finally:
+        button.evaluate("button => { button.style.display = '' }")
 
 
 def test_the_keyboard_skips_to_the_text_and_shows_where_it_is(open_page):
@@ -246,15 +202,15 @@ def test_the_keyboard_gets_through_a_page(open_page):
         assert page.evaluate("document.activeElement === document.body")
 
 
-def test_chapters_show_their_errors_with_badges(open_page):
-    with open_page("book/kalman.html") as page:
-        table = page.locator(".ledger-errors")
-        assert table.count() == 1
-        assert table.locator("thead th").all_inner_texts() == ["Error", "Verdict", "Statements affected"]
-        rows = table.locator("tbody tr")
-        assert rows.count() == table.locator("tbody tr > th").count() > 5
-        assert table.locator("tbody tr:has(> td .verdict):has(> td a)").count() == rows.count()
-        assert table.locator("tbody tr:has(details)").count() > 5
+@on_a_desktop(["book/kalman.html"])
+def test_chapters_show_their_errors_with_badges(page):
+    table = page.locator(".ledger-errors")
+    assert table.count() == 1
+    assert table.locator("thead th").all_inner_texts() == ["Error", "Verdict", "Statements affected"]
+    rows = table.locator("tbody tr")
+    assert rows.count() == table.locator("tbody tr > th").count() > 5
+    assert table.locator("tbody tr:has(> td .verdict):has(> td a)").count() == rows.count()
+    assert table.locator("tbody tr:has(details)").count() > 5
 
 
 def test_search_finds_a_word(open_page):
@@ -293,14 +249,13 @@ def test_every_link_within_the_book_leads_somewhere():
     assert dead == []
 
 
-@pytest.mark.parametrize("address", PAGES)
-def test_no_page_is_too_heavy(address):
-    assert (tools.HTML / address).stat().st_size <= tools.HEAVIEST
+def test_no_page_is_too_heavy():
+    sizes = {address: (tools.HTML / address).stat().st_size for address in PAGES}
+    assert {address: size for address, size in sizes.items() if size > tools.HEAVIEST} == {}
 
 
+@on_a_desktop(tools.opened())
 def test_no_page_is_too_high(page):
-    if page.viewport_size != tools.SIZES["desktop"]:
-        pytest.skip("a phone is narrow")
     assert page.evaluate("document.documentElement.scrollHeight") <= tools.HIGHEST
 
 
@@ -330,30 +285,35 @@ def test_what_was_collapsed_is_ready_once_opened(open_page):
         assert all(box["stop"] == box["scrolls"] for box in boxes)
 
 
-CHAPTERS = [each for each in PAGES if each.startswith("book/") and not each.startswith(("book/api/", "book/ledger-"))]
+@on_a_desktop(LONG_PAGES)
+def test_a_page_can_be_read_before_all_its_formulas_are_typeset(page):
+    near, shown = page.evaluate("[window.formulas.near, window.formulas.shown]")
+    every = page.locator(".math").count()
+    assert every > 200
+    assert near["count"] < shown["count"] / 4
+    assert shown["count"] <= every
 
 
-@pytest.mark.parametrize("address", LONG_PAGES)
-def test_a_page_can_be_read_before_all_its_formulas_are_typeset(open_page, address):
-    with open_page(address) as page:
-        near, shown = page.evaluate("[window.formulas.near, window.formulas.shown]")
-        every = page.locator(".math").count()
-        assert every > 200
-        assert near["count"] < shown["count"] / 4
-        assert shown["count"] <= every
-
-
-@pytest.mark.parametrize("address", CHAPTERS)
-def test_a_chapter_shows_its_text_and_its_formulas_in_time(open_page, address):
+@on_a_desktop(CHAPTERS)
+def test_a_chapter_shows_its_text_and_its_formulas_in_time(page, open_page):
     """Of several loads the fastest counts, because other programs delay some of them."""
-    fastest = dict.fromkeys(tools.LONGEST, 60_000.0)
-    for _ in range(tools.LOADS):
-        with open_page(address) as page:
-            fastest = {name: min(time, fastest[name]) for name, time in page.evaluate(tools.TIMES).items()}
-        slow = {name: time for name, time in fastest.items() if time > tools.LONGEST[name]}
-        if not slow:
+    fastest = page.times
+    for _ in range(1, tools.LOADS):
+        if all(time <= tools.LONGEST[name] for name, time in fastest.items()):
             break
-    assert slow == {}
+        with open_page(urlsplit(page.url).path.removeprefix("/")) as again:
+            fastest = {name: min(time, fastest[name]) for name, time in again.evaluate(tools.TIMES).items()}
+    assert {name: time for name, time in fastest.items() if time > tools.LONGEST[name]} == {}
+
+
+def test_a_narrow_window_shows_what_a_phone_does(open_page, look_at):
+    """The tests of a page on a phone make its window narrow, in place of opening it again."""
+    boxes = """[...document.querySelectorAll("article *")].map((e) => {
+      const { left, top, width, height } = e.getBoundingClientRect();
+      return [e.tagName, e.tabIndex, ...[left, top + scrollY, width, height].map(Math.round)].join(" ");
+    })"""
+    with open_page(LONG_PAGES[0], "phone") as page:
+        assert look_at(LONG_PAGES[0], "phone").evaluate(boxes) == page.evaluate(boxes)
 
 
 def test_formulas_far_away_are_typeset_at_once_when_scrolled_to(open_page):
@@ -367,12 +327,11 @@ def test_formulas_far_away_are_typeset_at_once_when_scrolled_to(open_page):
         last.locator("mjx-container").wait_for()
 
 
-@pytest.mark.parametrize("address", PAGES)
-def test_no_page_names_a_host_for_scripts(address):
+def test_no_page_names_a_host_for_scripts():
     """What a browser would only load when asked to is seen in the page's text."""
-    text = (tools.HTML / address).read_text(encoding="utf-8")
-    for host in ("unpkg.com", "jsdelivr.net", "cdnjs", "googleapis.com", "gstatic.com"):
-        assert host not in text
+    hosts = ("unpkg.com", "jsdelivr.net", "cdnjs", "googleapis.com", "gstatic.com")
+    texts = {address: (tools.HTML / address).read_text(encoding="utf-8") for address in PAGES}
+    assert [(address, host) for address, text in texts.items() for host in hosts if host in text] == []
 
 
 def test_every_page_of_the_book_has_a_preview_and_an_entry_in_the_sitemap():
