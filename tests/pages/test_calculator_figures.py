@@ -91,7 +91,7 @@ READ_FIGURE = """id => {
 @pytest.fixture(scope="module")
 def page(open_page):
     """The page as it is when it is opened: each calculator shows its first example."""
-    with open_page(ADDRESS) as page:
+    with open_page(ADDRESS, shared=True) as page:
         yield page
 
 

@@ -17,7 +17,7 @@ SHOWN = "document.querySelectorAll('.ledger tbody tr[id]:not([hidden])').length"
 
 @pytest.fixture(scope="module")
 def page(open_page):
-    with open_page(LEDGER) as page:
+    with open_page(LEDGER, shared=True) as page:
         yield page
 
 
@@ -125,7 +125,7 @@ UNSET = (
 
 
 def test_collapsed_formulas_are_typeset_when_opened_and_all_before_printing(open_page):
-    with open_page(LEDGER) as page:
+    with open_page(LEDGER, shared=True) as page:
         evidence = page.locator(".ledger tr[id] details:has(.math)").first
         assert evidence.locator("mjx-container").count() == 0
         evidence.locator("summary").click()
@@ -191,7 +191,7 @@ def test_other_pages_can_be_led_to_a_statement():
 
 
 def test_a_link_can_set_the_filters(open_page):
-    with open_page(LEDGER + "?verdict=wrong") as page:
+    with open_page(LEDGER + "?verdict=wrong", shared=True) as page:
         shown = page.evaluate(
             "[...document.querySelectorAll('.ledger tbody tr[id]:not([hidden])')].map(r => r.dataset.verdict)"
         )

@@ -177,7 +177,7 @@ def test_the_button_back_to_the_top_can_be_read(page):
 
 
 def test_the_keyboard_skips_to_the_text_and_shows_where_it_is(open_page):
-    with open_page("book/rounding.html") as page:
+    with open_page("book/rounding.html", shared=True) as page:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.getAttribute('href')") == "#main-content"
         page.wait_for_function("document.activeElement.getBoundingClientRect().top >= 0")  # it slides in
@@ -193,7 +193,7 @@ def test_the_keyboard_skips_to_the_text_and_shows_where_it_is(open_page):
 
 
 def test_the_keyboard_gets_through_a_page(open_page):
-    with open_page("book/geometry.html") as page:
+    with open_page("book/geometry.html", shared=True) as page:
         stops = page.evaluate("[...document.querySelectorAll('a[href], button, input, [tabindex=\"0\"]')].length")
         for _ in range(stops + 5):
             page.keyboard.press("Tab")
@@ -214,7 +214,7 @@ def test_chapters_show_their_errors_with_badges(page):
 
 
 def test_search_finds_a_word(open_page):
-    with open_page("search.html?q=rounding") as page:
+    with open_page("search.html?q=rounding", shared=True) as page:
         first = page.locator("#search-results li a").first
         first.wait_for(timeout=10_000)
         first.click()
@@ -270,7 +270,7 @@ def test_the_front_page_shows_claim_doors_and_figure_at_once(open_page):
 
 
 def test_what_was_collapsed_is_ready_once_opened(open_page):
-    with open_page("book/inversion.html", "phone") as page:
+    with open_page("book/inversion.html", "phone", shared=True) as page:
         part = page.locator("details.derivation").first
         assert part.locator("mjx-container").count() == 0
         part.locator("summary").click()
@@ -312,7 +312,7 @@ def test_a_narrow_window_shows_what_a_phone_does(open_page, look_at):
       const { left, top, width, height } = e.getBoundingClientRect();
       return [e.tagName, e.tabIndex, ...[left, top + scrollY, width, height].map(Math.round)].join(" ");
     })"""
-    with open_page(LONG_PAGES[0], "phone") as page:
+    with open_page(LONG_PAGES[0], "phone", shared=True) as page:
         assert look_at(LONG_PAGES[0], "phone").evaluate(boxes) == page.evaluate(boxes)
 
 
