@@ -8,26 +8,19 @@ VOID = frozenset(("area", "base", "br", "col", "hr", "img", "input", "link", "me
 
 
 class Elements(HTMLParser):
-    """Every element with its attributes, in order.
+    """Every element with its attributes, in order; each must be closed, in order, and no attribute may stand twice."""
 
-    Parameters
-    ----------
-    text : the HTML.
-    nested : require that every element is closed, in order, and that no attribute stands twice.
-    """
-
-    def __init__(self, text: str, nested: bool = True) -> None:
+    def __init__(self, text: str) -> None:
         super().__init__()
         self.found: list[tuple[str, dict[str, str | None]]] = []
         self.cells: list[str] = []
         self.open: list[str] = []
-        self.nested = nested
         self.feed(text)
         self.close()
-        assert not (nested and self.open)
+        assert not self.open
 
     def handle_starttag(self, tag, attrs):
-        assert not self.nested or len(dict(attrs)) == len(attrs)
+        assert len(dict(attrs)) == len(attrs)
         self.found.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
@@ -35,10 +28,7 @@ class Elements(HTMLParser):
             self.cells.append("")
 
     def handle_endtag(self, tag):
-        if self.nested:
-            assert self.open.pop() == tag
-        elif tag in self.open:
-            del self.open[len(self.open) - 1 - self.open[::-1].index(tag) :]
+        assert self.open.pop() == tag
 
     def handle_data(self, data):
         if {"td", "th"} & set(self.open):
@@ -46,7 +36,3 @@ class Elements(HTMLParser):
 
     def all(self, tag: str) -> list[dict[str, str | None]]:
         return [attributes for name, attributes in self.found if name == tag]
-
-    def values(self, *names: str) -> set[str]:
-        """The values of some attributes, wherever they occur."""
-        return {value for _, found in self.found for name in names if (value := found.get(name))}
