@@ -12,9 +12,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize_scalar
-from scipy.special import erf
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.search import smallest_precision
@@ -127,7 +126,7 @@ def _addition(spread: Floats, change: float, fmt: FloatFormat) -> Floats:
     # Sixteen octaves down from 8 standard deviations; smaller values add less than 2**-36 of the whole.
     e = top - np.arange(math.ceil(16 / math.log2(b)) + 1)[:, np.newaxis]
     spacing = b ** (e - fmt.precision)
-    within = erf(b**e / (spread * math.sqrt(2)))
+    within = scipy.special.erf(b**e / (spread * math.sqrt(2)))
     share = within - np.concatenate([within[1:], np.zeros((1, len(spread)))])
     return np.asarray(np.sum(share * spacing**2 / 12 * correlation_factor(change / spacing), axis=0))
 
@@ -165,7 +164,7 @@ def best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
         return two_errors(1.0, omega_bw, math.exp(log), duration, fmt).total
 
     low, high = max(guess / 100, 2.001 / duration), max(guess * 10, 100 / duration)
-    found: Any = minimize_scalar(
+    found: Any = scipy.optimize.minimize_scalar(
         total, bounds=(math.log(low), math.log(high)), method="bounded", options={"xatol": 1e-5}
     )
     if total(found.x) > math.sqrt(2 * duration / omega_bw) / 2:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import mpmath
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from gpbnb.integration.arguments import Floats, bandwidth_ratio, cycle_counts, positive_array, positive_number
 
@@ -128,7 +128,11 @@ def validity(excess: float) -> float:
     """
     if not 1e-9 <= excess <= 1e3:
         raise ValueError(f"got excess = {excess}; needed 1e-9 to 1e3, such as 0.01 for one percent")
-    return float(brentq(lambda mu: float(approximation_ratio(mu)) - 1 - excess, 1e-5, 1e8, xtol=1e-12, rtol=1e-12))
+
+    def surplus(mu: float) -> float:
+        return float(approximation_ratio(mu)) - 1 - excess
+
+    return float(scipy.optimize.brentq(surplus, 1e-5, 1e8, xtol=1e-12, rtol=1e-12))
 
 
 def exponents(mu: ArrayLike) -> tuple[Floats, Floats]:
@@ -167,7 +171,9 @@ def required_rate(sigma_x: float, omega_bw: float, limit: float) -> float:
     low = high
     while random_walk(sigma_x, omega_bw, low) <= limit:
         low /= 4
-    root = brentq(lambda log: math.log(random_walk(sigma_x, omega_bw, math.exp(log)) / limit), *np.log([low, high]))
+    root = scipy.optimize.brentq(
+        lambda log: math.log(random_walk(sigma_x, omega_bw, math.exp(log)) / limit), *np.log([low, high])
+    )
     return math.exp(root)
 
 
@@ -287,7 +293,7 @@ def settling_cycles(mu: float, share: float, rectangle: bool = False) -> float:
 
     if excess(1.0) <= 0:
         return 1.0
-    return float(brentq(excess, 1.0, offset / share * (1 + 1e-9) + 1))
+    return float(scipy.optimize.brentq(excess, 1.0, offset / share * (1 + 1e-9) + 1))
 
 
 class SavageRecursion(NamedTuple):

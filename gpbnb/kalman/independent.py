@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gpbnb import sweeps
 from gpbnb.arithmetic.formats import FloatFormat
@@ -53,7 +53,7 @@ def stored_shares(bound: str, form: Form) -> ModelShare:
     table = sweeps.read(ensembles.FILE, ensembles.COLUMNS, ensembles.COMMAND)
     rows = table.records(form=form.name.lower())
     each = np.array([int(row[f"violations_{bound}"]) / int(row["trials"]) for row in rows])
-    half = float(stats.t.ppf(0.975, len(each) - 1) * each.std(ddof=1) / math.sqrt(len(each)))
+    half = float(scipy.stats.t.ppf(0.975, len(each) - 1) * each.std(ddof=1) / math.sqrt(len(each)))
     mean = float(each.mean())
     return ModelShare(bound, form, len(each), mean, max(0.0, mean - half), min(1.0, mean + half), int((each > 0).sum()))
 

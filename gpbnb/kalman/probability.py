@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.sweeps import Table
@@ -63,8 +63,8 @@ def interval(within: int, records: int, confidence: float = CONFIDENCE) -> tuple
             f"got {within} of {records} records and a confidence of {confidence}; needed at least one record, and a "
             "confidence between 0 and 1"
         )
-    low = float(stats.beta.ppf(1 - confidence, within, records - within + 1)) if within else 0.0
-    high = float(stats.beta.ppf(confidence, within + 1, records - within)) if within < records else 1.0
+    low = float(scipy.stats.beta.ppf(1 - confidence, within, records - within + 1)) if within else 0.0
+    high = float(scipy.stats.beta.ppf(confidence, within + 1, records - within)) if within < records else 1.0
     return low, high
 
 
@@ -96,7 +96,7 @@ def quantile_limit(errors: NDArray[np.float64], probability: float = 0.99, confi
     if n < 2 or not np.isfinite(errors).all():
         return math.inf
     logs = np.log(errors)
-    factor = stats.nct.ppf(confidence, n - 1, stats.norm.ppf(probability) * math.sqrt(n)) / math.sqrt(n)
+    factor = scipy.stats.nct.ppf(confidence, n - 1, scipy.stats.norm.ppf(probability) * math.sqrt(n)) / math.sqrt(n)
     return float(np.exp(logs.mean() + factor * logs.std(ddof=1)))
 
 

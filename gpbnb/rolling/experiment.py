@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.kernels.compiling import compiled
@@ -278,7 +278,7 @@ def filter_study(
             derolled, truth = part(stages["derolled"]), part(stages["signal"])
             for i, weights in enumerate(filters):
                 if names[i] == "single pole":
-                    out = signal.lfilter([weights[0]], [1, weights[0] - 1], derolled)
+                    out = scipy.signal.lfilter([weights[0]], [1, weights[0] - 1], derolled)
                 else:
                     total = np.concatenate([np.zeros(len(weights)), np.cumsum(derolled)])
                     out = (total[len(weights) :] - total[: -len(weights)]) / len(weights)
@@ -303,7 +303,7 @@ def image_behind(
     turn = max(1, round(period / interval))
     if samples < len(weights) + turn:
         raise ValueError(f"got {samples} samples for a filter of {len(weights)}; needed {turn} more than the filter")
-    return np.asarray(signal.fftconvolve(image[-len(weights) - turn :], weights, mode="valid")[-turn:])
+    return np.asarray(scipy.signal.fftconvolve(image[-len(weights) - turn :], weights, mode="valid")[-turn:])
 
 
 # -- an uneven roll rate -------------------------------------------------------------------------

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
@@ -63,7 +63,7 @@ def welch(records: NDArray[np.float64], interval: float, segment: int) -> tuple[
     frequency, density : without frequency zero and the two frequencies next to it, into which the mean leaks.
     averages : equivalent number of independent periodograms.
     """
-    f, p = signal.welch(records, 1 / interval, "hann", segment, axis=0)
+    f, p = scipy.signal.welch(records, 1 / interval, "hann", segment, axis=0)
     count = 2 * (len(records) // segment) - 1
     # Periodograms of Hann-windowed segments that overlap by half have a correlation of 1/36 (Welch 1967), and
     # neighbouring frequencies are correlated too: a sum over a band is worth 18/35 of its number (see below).

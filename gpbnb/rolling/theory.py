@@ -16,8 +16,8 @@ from typing import Any
 
 import mpmath
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, special
 
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
@@ -35,8 +35,6 @@ INTERVAL = 10.0
 
 LEVEL = 200.0**2 / PERIOD_FLOWN
 """Example of a noise level in mas². It gives 200 mas/√Hz at the roll frequency flown. No document states a level."""
-
-_POINTS = np.polynomial.legendre.leggauss(400)
 
 
 # -- roll and deroll -----------------------------------------------------------------------------
@@ -99,10 +97,15 @@ def fitted_drift(
     ----------
     hung1984, ch. III, (11), for one dimension, where ½cos ψ replaces e^{iψ}.
     """
-    nodes, weights = _POINTS
+    nodes, weights = _points()
     x = (nodes + 1) / 2
     value = complex(*drift) * np.sum(weights * 6 * (x - 0.5) * x * np.exp(1j * np.asarray(phase(duration * x))))
     return np.array([value.real, value.imag])
+
+
+@lru_cache
+def _points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return np.polynomial.legendre.leggauss(400)
 
 
 def roll_rate(period: float) -> Fraction:
@@ -162,7 +165,7 @@ def ramp_density(drift: float, duration: float, frequency: Any) -> NDArray[np.fl
     frequency : (...), Hz; may be negative, as in an offset from the roll frequency.
     """
     z = np.abs(np.pi * np.asarray(frequency, dtype=np.float64) * duration)
-    size = special.spherical_jn(0, z) ** 2 + special.spherical_jn(1, z) ** 2
+    size = scipy.special.spherical_jn(0, z) ** 2 + scipy.special.spherical_jn(1, z) ** 2
     return np.asarray((drift / YEAR) ** 2 * duration**3 / 2 * size)
 
 
@@ -210,7 +213,7 @@ def impulse_response(samples: int) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=1)
 def _response_transform(samples: int, size: int) -> NDArray[np.complex128]:
-    return np.asarray(fft.rfft(impulse_response(samples), size))
+    return np.asarray(scipy.fft.rfft(impulse_response(samples), size))
 
 
 def variance_of_sum(weights: Any, level: float) -> float:
@@ -232,8 +235,8 @@ def variance_of_sum(weights: Any, level: float) -> float:
     a = np.asarray(weights, dtype=np.float64)
     if a.ndim != 1 or not len(a):
         raise ValueError(f"got weights of shape {a.shape}; needed (n,), one per sample")
-    size = fft.next_fast_len(2 * len(a), real=True)
-    on_white = fft.irfft(fft.rfft(a, size) * np.conj(_response_transform(len(a), size)), size)[: len(a)]
+    size = scipy.fft.next_fast_len(2 * len(a), real=True)
+    on_white = scipy.fft.irfft(scipy.fft.rfft(a, size) * np.conj(_response_transform(len(a), size)), size)[: len(a)]
     return float(np.pi * level * np.sum(on_white**2))
 
 

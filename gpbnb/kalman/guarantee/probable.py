@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_discrete_lyapunov
 
 from gpbnb.kalman.guarantee.bound import Guarantee, disturbances_of
 from gpbnb.kalman.guarantee.envelope import Disturbances
@@ -51,7 +51,7 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     whole, gathered = np.eye(given.program.n), np.zeros_like(noise[0])
     for loop, added in zip(F, noise, strict=True):
         whole, gathered = loop @ whole, loop @ gathered @ loop.T + added
-    covariance = np.asarray(solve_discrete_lyapunov(whole, gathered))
+    covariance = np.asarray(scipy.linalg.solve_discrete_lyapunov(whole, gathered))
     largest = np.diagonal(covariance).copy()
     for loop, added in zip(F, noise, strict=True):
         covariance = loop @ covariance @ loop.T + added

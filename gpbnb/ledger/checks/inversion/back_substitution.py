@@ -13,7 +13,7 @@ from gpbnb.arithmetic.rational import column_sum_norm, inverse_of
 from gpbnb.inversion import procedure, theory
 from gpbnb.ledger.checks.inversion.environments import Elimination, runs, substitutions, weights
 from gpbnb.ledger.checks.inversion.first_order import EPSILON
-from gpbnb.ledger.checks.inversion.judging import corrected, holds, says, slip
+from gpbnb.ledger.checks.inversion.judging import Names, corrected, holds, says, slip
 from gpbnb.ledger.checks.inversion.registry import CHECKS
 from gpbnb.ledger.checks.inversion.samples import of_example, samples
 from gpbnb.ledger.checks.inversion.triangularization import ONE_EPSILON
@@ -23,7 +23,10 @@ from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 
 COUNTED = "to first order; each coefficient is a number of roundings, and each rounding has its own error"
-GENERAL = (*substitutions(4), *substitutions(5))
+
+
+def general() -> tuple[Names, ...]:
+    return (*substitutions(4), *substitutions(5))
 
 
 def evaluable(printed: Statement) -> Statement:
@@ -49,7 +52,7 @@ def systems(printed: Statement) -> Finding:
 def before_68(printed: Statement) -> Finding:
     return slip(
         printed,
-        GENERAL,
+        general(),
         "(A_hat - DeltaA)*(x_hat - Deltax) == b_hat - Deltab",
         "$(\\hat A-\\Delta A)(\\hat x-\\Delta x)=\\hat b-\\Delta b$ is $Ax=b$ written with hats",
         "the parentheses around $\\hat x-\\Delta x$ are missing; hung1982 prints them",
@@ -59,7 +62,7 @@ def before_68(printed: Statement) -> Finding:
 @CHECKS.add(*both("eq68"))
 def perturbed_solution(printed: Statement) -> Finding:
     return compare(
-        holds(printed, GENERAL),
+        holds(printed, general()),
         "correct to first order; exact with $A^{-1}$ and $\\hat x$, or with $\\hat A^{-1}$ and $x$",
         note=(
             "the printed form mixes the two exact forms and so omits the second-order term $\\hat "
@@ -173,7 +176,7 @@ _LESS = {"<=": operator.le, "<": operator.lt}
 
 def _piecewise(diagonal: Relation | None, off: Relation, where: Relation) -> bool:
     """Whether a formula with index ranges gives every entry its true value exactly once, and names no other entries."""
-    for names in GENERAL:
+    for names in general():
         n = int(names["n"])
         for k, j in itertools.product(range(2 * n + 2), repeat=2):
             here = {**names, "k": Fraction(k), "j": Fraction(j)}
@@ -216,13 +219,13 @@ def weights_of_the_change(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1984.II.eq86", "hung1984.II.eq88")
 def weights_of_the_right_side(printed: Statement) -> Finding:
-    each = [{**names, "k": Fraction(k)} for names in GENERAL for k in range(1, int(names["n"]) + 1)]
+    each = [{**names, "k": Fraction(k)} for names in general() for k in range(1, int(names["n"]) + 1)]
     return compare(holds(printed, each), "the roundings were counted in rows of up to four products", note=COUNTED)
 
 
 @CHECKS.add("hung1982.III.eq86-88")
 def weights_1982(printed: Statement) -> Finding:
-    each = [{**names, "k": Fraction(k)} for names in GENERAL for k in range(1, int(names["n"]) + 1)]
+    each = [{**names, "k": Fraction(k)} for names in general() for k in range(1, int(names["n"]) + 1)]
     of_right = corrected(printed, f"{printed.relation(1).text}; {printed.relation(4).text}")
     return compare(
         holds(of_right, each) and _piecewise(None, printed.relation(2), printed.relation(3)),
@@ -263,7 +266,7 @@ def factored(printed: Statement) -> Finding:
     shown = evaluable(printed)
     return slip(
         shown,
-        GENERAL,
+        general(),
         shown.form.replace("A_D*M_A", "A_D*M_A*epsilon"),
         "the first form is (87); the second is $A_DM_A\\,\\epsilon$",
         "the second form lacks the factor $\\epsilon$ of the first; hung1982 has β there",
@@ -277,7 +280,7 @@ def first_form_1982(printed: Statement) -> Finding:
     four = theory.printed_weights_1982(4)[0, 1:].tolist()
     right = theory.back_substitution_weights(4)[0, 1:].tolist()
     return compare(
-        holds(shown, GENERAL),
+        holds(shown, general()),
         f"$2n-j$ {'is right for $n=3$ alone' if three else 'is wrong'}; for $n=4$ it gives "
         f"{', '.join(map(str, four))} in place of {', '.join(map(str, right))}",
         Verdict.INCONSISTENT,
@@ -290,7 +293,7 @@ def first_form_1982(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.eq89-factored-form")
 def factored_1982(printed: Statement) -> Finding:
-    positive = [names for names in GENERAL if names["epsilon"] == EPSILON]
+    positive = [names for names in general() if names["epsilon"] == EPSILON]
     return compare(
         holds(evaluable(printed), positive),
         "the weights are those of (87), with β in place of $\\epsilon$",
@@ -303,9 +306,9 @@ def right_side_inequality(printed: Statement) -> Finding:
     shown = evaluable(printed)
     meant = corrected(shown, shown.form.replace("Deltab <= M_b*b*beta", "abs(Deltab) <= M_b*abs(b)*beta"))
     return compare(
-        holds(shown, GENERAL),
+        holds(shown, general()),
         "the inequality fails where $\\epsilon$ or an entry of $b$ is negative; $|\\Delta b|\\le M_b|b|\\beta$ holds",
-        Verdict.WRONG if holds(meant, GENERAL) else Verdict.INCONSISTENT,
+        Verdict.WRONG if holds(meant, general()) else Verdict.INCONSISTENT,
         otherwise_note="the absolute-value bars are missing on both sides, and (95) subtracts $\\delta A\\,\\hat x$ "
         "from $\\Delta b$ as if the signs were known",
         root=ONE_EPSILON,

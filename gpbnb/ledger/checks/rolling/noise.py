@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 import sympy as sp
-from scipy import optimize
 
 from gpbnb.ledger.checks.rolling.material import expected_squares, filter_study, spectra
 from gpbnb.ledger.checks.rolling.process import LOST
@@ -65,7 +65,7 @@ def spread(printed: Statement) -> Finding:
     def excess(cycles: float) -> float:
         return float(theory.ramp_density(1.0, 1.0, cycles) / theory.ramp_density(1.0, 1.0, 1e-9)) - 0.5
 
-    half = optimize.brentq(excess, 0.01, 2.0)
+    half = scipy.optimize.brentq(excess, 0.01, 2.0)
     # At a distance of m cycles, a constant signal has no density, and a ramp has 1/(pi m)^2 of its peak.
     beside = excess(1.0) + 0.5
     found = "nonzero" if math.isclose(beside, math.pi**-2) else "zero"
@@ -113,7 +113,7 @@ def not_completely(printed: Statement) -> Finding:
 
 @CHECKS.add(entry("s5.optimum-bandwidth-claim"))
 def optimum_exists(printed: Statement) -> Finding:
-    found = optimize.minimize_scalar(
+    found = scipy.optimize.minimize_scalar(
         lambda log_b: float(theory.filtered_error(DRIFTS[0], FLOWN_DENSITY, math.exp(log_b))),
         bounds=(math.log(1e-7), math.log(1e-2)),
         method="bounded",
