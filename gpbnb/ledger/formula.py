@@ -99,6 +99,11 @@ def _tree(text: str) -> ast.expr:
     return tree
 
 
+@lru_cache(maxsize=4096)
+def _latex(relation: Relation) -> str:
+    return typeset(relation.tree, 0)
+
+
 @dataclass(frozen=True)
 class Relation:
     """A printed equation or inequality, as a chain of Python comparisons."""
@@ -164,7 +169,7 @@ class Relation:
 
     def latex(self) -> str:
         """Typeset the relation."""
-        return typeset(self.tree, 0)
+        return _latex(self)
 
     def markdown(self) -> str:
         """Typeset the relation as a formula in Markdown."""
@@ -259,7 +264,7 @@ def _part(text: str) -> Part:
         return Number(labelled[1], number[1], number[2] or "")
     try:
         relation = Relation(text)
-        typeset(relation.tree, 0)
+        relation.latex()
     except (SyntaxError, KeyError, TypeError) as error:
         raise ValueError(f"got {text!r}; needed a relation ({error})") from error
     return relation
