@@ -9,8 +9,11 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterable, Sequence
+from typing import Any
 
+import numpy as np
 import sympy as sp
+from numpy.typing import NDArray
 
 from gpbnb.display.derivation import Derivation, Step, over, unevaluated
 
@@ -62,10 +65,20 @@ def printed_small(angles: Sequence[sp.Expr]) -> sp.Matrix:
 
 
 def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Expr:
-    """Expand `expression` and keep products of at most `order` of the `small` symbols."""
-    scaled = expression.subs({symbol: H * symbol for symbol in small}, simultaneous=True)
-    terms = (sp.diff(scaled, H, k).subs(H, 0) / sp.factorial(k) for k in range(order + 1))
-    return sp.expand(sum(terms, start=sp.Integer(0)))
+    """Expand `expression` and keep products of at most `order` of the `small` symbols.
+
+    Raises
+    ------
+    PolynomialError : the expression is no polynomial of the symbols and of their sines and cosines.
+    """
+    small = tuple(small)
+    polynomial = expression.replace(
+        lambda part: isinstance(part, sp.sin | sp.cos) and part.args[0] in small,
+        lambda part: sum(part.taylor_term(k, part.args[0]) for k in range(order + 1)),
+    )
+    terms = sp.Poly(polynomial, *small).terms()
+    kept = (factor * sp.prod(map(sp.Pow, small, powers)) for powers, factor in terms if sum(powers) <= order)
+    return sp.expand(sum(kept, start=sp.Integer(0)))
 
 
 def orders_agree() -> bool:
@@ -203,8 +216,7 @@ def fewest_signs() -> tuple[tuple[int, ...], ...]:
             left3, left2, c1, s1, s2, c2 = (-1 if k in changed else 1 for k in range(6))
             third = left3 * (c1 * C * y + s1 * S * z)
             second = -left2 * (-s2 * S * y + c2 * C * z)
-            errors = (sp.expand(third - ALPHA[2]), sp.expand(second - ALPHA[1]))
-            if all(sp.expand(error.subs(S**2, 1 - C**2)) == 0 for error in errors):
+            if all(sp.expand(e).subs(S**2, 1 - C**2).expand() == 0 for e in (third - ALPHA[2], second - ALPHA[1])):
                 found.append(changed)
         if found:
             break
@@ -220,27 +232,27 @@ def drift_errors(order: int) -> tuple[sp.Expr, sp.Expr]:
     The gyro is rotated by φ (φ1 = 0) against the absolute frame, so the matrix of θ is the product of those of α and φ.
     """
     small = (*ALPHA, *BETA, *GAMMA, *PHI)
-    c, s = sp.symbols("c s")  # sympy is slow with sine and cosine
+    ring, *_, s, c = sp.ring((*small, S, C), sp.QQ)  # sympy expands polynomials much faster than expressions
 
-    def cut(entry: sp.Expr) -> sp.Expr:
+    def cut(vector: NDArray[Any]) -> NDArray[Any]:
         """Drop products of more than `order` small angles."""
-        terms = sp.Poly(entry, *small).terms()
-        kept = ((powers, factor) for powers, factor in terms if sum(powers) <= order)
-        return sum((f * sp.prod(map(sp.Pow, small, powers)) for powers, f in kept), start=sp.Integer(0))
+        kept = ({k: f for k, f in entry.items() if sum(k[: len(small)]) <= order} for entry in vector)
+        return np.array([ring.from_dict(terms) for terms in kept], dtype=object)
 
-    def matrix(angles: Sequence[sp.Expr]) -> sp.Matrix:
-        return exact(angles).applyfunc(lambda entry: up_to(order, entry, small))
+    def matrix(angles: Sequence[sp.Expr]) -> NDArray[Any]:
+        entries = exact(angles).applyfunc(lambda entry: up_to(order, entry, small))
+        return np.array([[ring.from_expr(entry) for entry in row] for row in entries.tolist()], dtype=object)
 
     A, B, G, F = map(matrix, (ALPHA, BETA, GAMMA, (sp.Integer(0), PHI[1], PHI[2])))
-    roll = sp.Matrix([[1, 0, 0], [0, c, s], [0, -s, c]])
-    telescope = (B * (roll * A[:, 0])).applyfunc(cut)
+    roll = np.array([[1, 0, 0], [0, c, s], [0, -s, c]], dtype=object) * ring.one
+    telescope = cut(B @ cut(roll @ A[:, 0]))
     readout = F[:, 0]
     for following in (A, roll, B, G):
-        readout = (following * readout).applyfunc(cut)
+        readout = cut(following @ readout)
     y, z = readout[1] - telescope[1], readout[2] - telescope[2]
-    errors = (c * y - s * z + PHI[2], s * y + c * z - PHI[1])
-    reduced = (sp.expand(sp.expand(error).subs(s**2, 1 - c**2)) for error in errors)
-    first, second = (error.subs({c: C, s: S}) for error in reduced)
+    phi2, phi3 = map(ring.from_expr, PHI[1:])
+    errors = (c * y - s * z + phi3, s * y + c * z - phi2)
+    first, second = (error.rem(s**2 + c**2 - 1).as_expr() for error in errors)
     return first, second
 
 
