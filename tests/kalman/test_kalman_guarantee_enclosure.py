@@ -10,14 +10,12 @@ from flint import arb
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.exact_step import exact_step
-from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee import derivation
-from gpbnb.kalman.guarantee.bound import guarantee, limits
+from gpbnb.kalman.guarantee.bound import Guarantee, Limits, guarantee, limits
 from gpbnb.kalman.guarantee.enclosure import FORMS, Enclosed, enclose, gain, predicted, updated
-from gpbnb.kalman.guarantee.gains import schedule
 from gpbnb.kalman.model import LinearModel
 from gpbnb.wordlength.examples import cyclic
 
@@ -151,11 +149,16 @@ def test_other_forms_and_gains_that_fall_for_ever_have_no_enclosure() -> None:
     assert enclose(constant, run, fmt, Form.INNOVATION) is None
 
 
-def test_a_filter_whose_gain_never_repeats_has_a_guarantee_for_ever() -> None:
-    """Ten states, a cycle of 31: no run with random or steady inputs leaves the bound."""
-    given, fmt = cyclic(10, 2, 31, 0.8), FloatFormat(2, 24)
-    within = limits(10, 2, measurement=50)
-    found = guarantee(given, fmt, within, most=1000)
+@pytest.fixture(scope="module")
+def never_repeating() -> tuple[LinearModel, FloatFormat, Limits, Guarantee]:
+    """Ten states, a cycle of 31."""
+    given, fmt, within = cyclic(10, 2, 31, 0.8), FloatFormat(2, 24), limits(10, 2, measurement=50)
+    return given, fmt, within, guarantee(given, fmt, within, most=1000)
+
+
+def test_a_filter_whose_gain_never_repeats_has_a_guarantee_for_ever(never_repeating) -> None:
+    """No run with random or steady inputs leaves the bound."""
+    given, fmt, within, found = never_repeating
     assert found.for_ever
     assert found.schedule.repeat is None
     assert found.schedule.enclosed == 186
@@ -164,17 +167,19 @@ def test_a_filter_whose_gain_never_repeats_has_a_guarantee_for_ever() -> None:
     assert repeating.schedule.enclosed is None
     # The gains may lie anywhere within their limits, which costs a factor of about forty.
     assert (found.bound < 100 * repeating.bound).all()
-    rng, steps = np.random.default_rng(11), 1500
+    stored, rng, steps = given.rounded(fmt), np.random.default_rng(11), 1500
     signs = np.sign(rng.standard_normal((steps // 50, 2)))
     for z in (rng.uniform(-50, 50, (steps, 2)), np.repeat(50 * signs, 50, axis=0)):
-        history = emulate(given, z, fmt, Form.INNOVATION, range(1, steps + 1))
-        ratios = np.abs(history.state) / found.bound
+        measured, run = fmt.array(z), Run(stored, fmt, Form.INNOVATION, range(1, steps + 1))
+        run.take(measured)
+        true = reference_states(stored, measured.to_fractions()).sum(axis=-1)
+        ratios = np.abs(run.exactly(run.X)[..., 0].astype(float) - true) / found.bound
         assert ratios.max() <= 1
         assert ratios.max() > 1e-3
 
 
-def test_limits_of_the_coefficients_begin_with_the_enclosure() -> None:
-    given = schedule(cyclic(10, 2, 31, 0.8), FloatFormat(2, 24), Form.INNOVATION, 1000)
+def test_limits_of_the_coefficients_begin_with_the_enclosure(never_repeating) -> None:
+    given = never_repeating[-1].schedule
     assert given.enclosed is not None
     assert given.settled
     assert given.first > given.enclosed
