@@ -36,6 +36,8 @@ INTERVAL = 10.0
 LEVEL = 200.0**2 / PERIOD_FLOWN
 """Example of a noise level in mas². It gives 200 mas/√Hz at the roll frequency flown. No document states a level."""
 
+_points_and_weights = lru_cache(np.polynomial.legendre.leggauss)
+
 
 # -- roll and deroll -----------------------------------------------------------------------------
 
@@ -97,15 +99,10 @@ def fitted_drift(
     ----------
     hung1984, ch. III, (11), for one dimension, where ½cos ψ replaces e^{iψ}.
     """
-    nodes, weights = _points()
+    nodes, weights = _points_and_weights(400)
     x = (nodes + 1) / 2
     value = complex(*drift) * np.sum(weights * 6 * (x - 0.5) * x * np.exp(1j * np.asarray(phase(duration * x))))
     return np.array([value.real, value.imag])
-
-
-@lru_cache
-def _points() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return np.polynomial.legendre.leggauss(400)
 
 
 def roll_rate(period: float) -> Fraction:
