@@ -120,23 +120,18 @@ class FloatArray(NumPyProtocols):
         if type(values) is np.ndarray and (components := fmt.backend.from_numbers(values, exactly)) is not None:
             return cls.from_components(fmt.backend, components, fmt)
         given = entries(values)
-        items, read = given.ravel().tolist(), []
+        read = []
         # Large cycles of matrices have few different entries. Random roundings differ for equal ones, too.
         known: dict[Any, Any] = {}
-        same: dict[int, Any] = {}
         random = fmt.rounding is Rounding.STOCHASTIC
-        for i, value in enumerate(items):
-            if (pair := same.get(id(value))) is None:
-                try:
-                    ratio = exact_ratio(value)
-                    if random or ratio not in known:
-                        known[ratio] = cls._rounded(value, ratio, fmt, exactly)
-                except (TypeError, ValueError, OverflowError) as error:
-                    raise type(error)(f"{_entry(np.unravel_index(i, given.shape))}{error}") from None
-                pair = known[ratio]
-                if not random:
-                    same[id(value)] = pair
-            read.append(pair)
+        for i, value in enumerate(given.ravel().tolist()):
+            try:
+                ratio = exact_ratio(value)
+                if random or ratio not in known:
+                    known[ratio] = cls._rounded(value, ratio, fmt, exactly)
+            except (TypeError, ValueError, OverflowError) as error:
+                raise type(error)(f"{_entry(np.unravel_index(i, given.shape))}{error}") from None
+            read.append(known[ratio])
         found = np.array(read, object).reshape(-1, 2).T
         m, e = (np.ascontiguousarray(part).reshape(given.shape) for part in found)
         return cls.from_pairs(m, e, fmt)
