@@ -119,16 +119,18 @@ def forgotten() -> Derivation:
     )
 
 
-CORRECTED: tuple[tuple[str, sp.Expr, sp.Expr], ...] = tuple(
-    (name, sp.factor(kalman.count_start(c, g)), sp.factor(kalman.second_coefficient(c, d, g, sign)))
-    for name, (c, d), g, sign in (
-        ("as printed", kalman.TWICE, sp.S.Zero, -1),
-        ("roundings counted once", kalman.ONCE, sp.S.Zero, -1),
-        ("and errors of either sign", kalman.ONCE, sp.S.Zero, 1),
-        ("and covariance errors carried on", kalman.ONCE, kalman.GROWTH, 1),
+@cache
+def corrected() -> tuple[tuple[str, sp.Expr, sp.Expr], ...]:
+    """Return each name in ``gpbnb.kalman.report_bounds.CORRECTIONS``, with the coefficients of ‖x‖ and of B."""
+    return tuple(
+        (name, sp.factor(kalman.count_start(c, g)), sp.factor(kalman.second_coefficient(c, d, g, sign)))
+        for name, (c, d), g, sign in (
+            ("as printed", kalman.TWICE, sp.S.Zero, -1),
+            ("roundings counted once", kalman.ONCE, sp.S.Zero, -1),
+            ("and errors of either sign", kalman.ONCE, sp.S.Zero, 1),
+            ("and covariance errors carried on", kalman.ONCE, kalman.GROWTH, 1),
+        )
     )
-)
-"""The name in ``gpbnb.kalman.report_bounds.CORRECTIONS``, then the coefficients of ‖x‖ and of B."""
 
 
 @cache
@@ -136,7 +138,7 @@ def kalman_bound() -> Definitions:
     """Define (125) as printed, corrected, and with forgotten inputs: coefficients, bound, digits for a tolerance."""
     f, k, x, u, beta, digits = map(symbol, ("f", "k", "x", "u", "beta", "digits"))
     result = [Definition("beta", unit())]
-    pairs = [(named(a, k="k", n="n", m="m"), named(b, k="k", n="n", m="m")) for _, a, b in CORRECTED]
+    pairs = [(named(a, k="k", n="n", m="m"), named(b, k="k", n="n", m="m")) for _, a, b in corrected()]
     memory = sp.Piecewise((-expm1(k * sp.log(f)) / (1 - f), f < 1), (k, True))
     result.append(Definition("memory", memory, shown=(1 - f**k) / (1 - f)))
     pairs.append((pairs[-1][0], sp.Min(symbol("b4"), 2 * symbol("a5") * symbol("memory"))))

@@ -168,9 +168,9 @@ def test_a_loop_that_does_not_forget_takes_nothing_off():
 
 
 def test_mended_coefficients_have_the_names_of_the_chapter():
-    assert [name for name, *_ in derivation.CORRECTED] == list(report_bounds.CORRECTIONS)
+    assert [name for name, *_ in derivation.corrected()] == list(report_bounds.CORRECTIONS)
     numbers = {"k": 7, "n": 5, "m": 3}
-    for (_, first, second), faults in zip(derivation.CORRECTED, report_bounds.CORRECTIONS.values(), strict=True):
+    for (_, first, second), faults in zip(derivation.corrected(), report_bounds.CORRECTIONS.values(), strict=True):
         found = tuple(int(each.subs({s: numbers[s.name] for s in each.free_symbols})) for each in (first, second))
         assert found == tuple(report_bounds.coefficients(*numbers.values(), **faults))
 
