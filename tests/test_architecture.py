@@ -38,9 +38,9 @@ def imports():
 
 
 @cache
-def trees():
-    """The syntax tree of each module."""
-    return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in FILES.items()}
+def syntax():
+    """The nodes of the syntax tree of each module."""
+    return {name: tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8")))) for name, path in FILES.items()}
 
 
 def test_every_room_has_its_level():
@@ -79,18 +79,18 @@ def test_theory_does_not_know_the_experiment(imports):
     assert [m for m, found in imports.items() if m.endswith(".theory") and any("experiment" in i for i in found)] == []
 
 
-def names_used(tree):
+def names_used(nodes):
     """Private names that a module takes from somewhere: attributes and imports."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute):
             yield node.attr
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gpbnb"):
             yield from (alias.name for alias in node.names)
 
 
-def names_defined(tree):
+def names_defined(nodes):
     """Names that a module defines, at its top, in its classes, or on ``self``."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             yield node.name
         elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Store):
@@ -118,10 +118,10 @@ EXTERNAL = {
 def test_private_names_stay_in_their_module():
     outside = {
         module: found
-        for module, tree in trees().items()
+        for module, nodes in syntax().items()
         if (
-            found := {name for name in names_used(tree) if name.startswith("_") and not name.endswith("__")}
-            - set(names_defined(tree))
+            found := {name for name in names_used(nodes) if name.startswith("_") and not name.endswith("__")}
+            - set(names_defined(nodes))
             - EXTERNAL
         )
     }
@@ -130,8 +130,8 @@ def test_private_names_stay_in_their_module():
 
 def test_nothing_is_imported_by_string():
     called = {
-        module: {ast.unparse(node.func).split(".")[-1] for node in ast.walk(tree) if isinstance(node, ast.Call)}
-        for module, tree in trees().items()
+        module: {ast.unparse(node.func).split(".")[-1] for node in nodes if isinstance(node, ast.Call)}
+        for module, nodes in syntax().items()
     }
     forbidden = {"import_module", "__import__", "exec", "eval"}
     assert [module for module, names in called.items() if names & forbidden] == ["gpbnb.__init__"]
