@@ -18,24 +18,55 @@ from numba.core.registry import CPUDispatcher
 from gpbnb import caching
 from gpbnb.arithmetic.kernels import compiling
 
+# Loads the libraries once, and compiles a function, which takes longest the first time. For each line of input, so many
+# processes at a time load the package of a folder as it is then, and say what they compiled.
 PROGRAM = """
-import json, sys
-from gpbnb.alone import alone
-from gpbnb.outer import outer
+import io, json, os, sys
+import numba, numpy as np
 
-values = {"outer": outer(1.0), "alone": alone(1.0)}
-functions = [outer, alone]
-if len(sys.argv) > 1:
-    import numpy as np
-    from gpbnb.arithmetic.kernels.elementwise import product
-    from gpbnb.arithmetic.kernels.tags import Binary
+numba.njit(lambda x: x + 1.0)(1.0)
 
-    c = np.empty((1, 1))
-    product(Binary(24, True), np.array([[3.0]]), np.array([[5.0]]), c)
-    values["product"] = c[0, 0]
-    functions.append(product)
-json.dump({"values": values, "compiled": [f.__name__ for f in functions if f.stats.cache_misses]}, sys.stdout)
+def answer(folder, cache, with_product):
+    os.environ["GPBNB_CACHE_DIR"] = cache
+    sys.path.insert(0, folder)
+    sys.stderr = io.StringIO()
+    from gpbnb.alone import alone
+    from gpbnb.outer import outer
+
+    values = {"outer": outer(1.0), "alone": alone(1.0)}
+    functions = [outer, alone]
+    if with_product:
+        from gpbnb.arithmetic.kernels.elementwise import product
+        from gpbnb.arithmetic.kernels.tags import Binary
+
+        c = np.empty((1, 1))
+        product(Binary(24, True), np.array([[3.0]]), np.array([[5.0]]), c)
+        values["product"] = c[0, 0]
+        functions.append(product)
+    names = [f.__name__ for f in functions if f.stats.cache_misses]
+    found = {"values": values, "compiled": names, "stderr": sys.stderr.getvalue()}
+    os.write(1, (json.dumps(found) + "\\n").encode())
+
+def start(arguments):
+    child = os.fork()
+    if not child:
+        status = 1
+        try:
+            answer(*arguments)
+            status = 0
+        finally:
+            if status:
+                sys.stderr = sys.__stderr__
+                sys.excepthook(*sys.exc_info())
+            os._exit(status)
+    return child
+
+for line in sys.stdin:
+    count, *arguments = json.loads(line)
+    if any([os.waitpid(child, 0)[1] for child in [start(arguments) for _ in range(count)]]):
+        sys.exit(1)
 """
+ALONE = "from gpbnb.alone import alone\nfrom gpbnb.outer import outer\n\nprint(outer(1.0), alone(1.0))\n"
 VALUES = {"outer": 3.0, "alone": 2.0}
 HEADER = "from gpbnb.arithmetic.kernels.compiling import compiled\n"
 ADDED = {
@@ -45,9 +76,21 @@ ADDED = {
 }
 
 
+ENVIRONMENT = {key: value for key, value in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "GPBNB_QUIET")}
+# Python would take old bytecode for a source that changes within a second and keeps its size.
+ENVIRONMENT["PYTHONDONTWRITEBYTECODE"] = "1"
+
+
+@pytest.fixture(scope="module")
+def server():
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, "-c", PROGRAM], env=ENVIRONMENT, cwd="/", **pipes) as process:
+        yield process
+
+
 @pytest.fixture
-def copy(tmp_path):
-    """A copy of the arithmetic, with three small modules beside it; `copy.run()` says what was compiled."""
+def copy(tmp_path, server):
+    """A copy of the arithmetic, with three small modules beside it; `copy.run()` says what a process compiled."""
     package = tmp_path / "gpbnb"
     package.mkdir()
     for name in ("__init__.py", "caching.py"):
@@ -61,17 +104,19 @@ def copy(tmp_path):
     class Copy:
         folder = package
         cache = tmp_path / "cache" / "compiled"
-        command = (sys.executable, "-c", PROGRAM)
-        environment = os.environ | {"PYTHONPATH": str(tmp_path), "GPBNB_CACHE_DIR": str(tmp_path / "cache")}
+        with_product = False
+        told = ""
 
         def run(self) -> dict:
-            return json.loads(self.result().stdout)
+            (found,) = self.run_at_once(1)
+            return found
 
-        def result(self) -> subprocess.CompletedProcess:
-            command = self.command
-            return subprocess.run(
-                command, cwd=tmp_path, env=self.environment, capture_output=True, text=True, check=True
-            )
+        def run_at_once(self, count: int) -> list[dict]:
+            server.stdin.write(json.dumps([count, str(tmp_path), str(self.cache.parent), self.with_product]) + "\n")
+            server.stdin.flush()
+            found = [json.loads(server.stdout.readline()) for _ in range(count)]
+            self.told = "".join(each.pop("stderr") for each in found)
+            return found
 
         def change(self, name: str, old: str, new: str) -> None:
             path = package / name
@@ -79,24 +124,18 @@ def copy(tmp_path):
             assert old in text
             path.write_text(text.replace(old, new), encoding="utf-8")
 
-    for key in ("NUMBA_CACHE_DIR", "GPBNB_QUIET"):
-        Copy.environment.pop(key, None)
-    # Python would take old bytecode for a source that changes within a second and keeps its size.
-    Copy.environment["PYTHONDONTWRITEBYTECODE"] = "1"
     return Copy()
 
 
 def test_what_changed_is_compiled_again_and_nothing_else(copy):
-    copy.command += ("with a product",)
+    copy.with_product = True
     values = VALUES | {"product": 15.0}
-    first = copy.result()
-    assert json.loads(first.stdout) == {"values": values, "compiled": ["outer", "alone", "product"]}
-    assert first.stderr.startswith("gpbnb: compiling for this processor.")
-    assert str(copy.cache) in first.stderr
-    assert len(first.stderr.splitlines()) == 1
-    again = copy.result()
-    assert json.loads(again.stdout) == {"values": values, "compiled": []}
-    assert again.stderr == ""
+    assert copy.run() == {"values": values, "compiled": ["outer", "alone", "product"]}
+    assert copy.told.startswith("gpbnb: compiling for this processor.")
+    assert str(copy.cache) in copy.told
+    assert len(copy.told.splitlines()) == 1
+    assert copy.run() == {"values": values, "compiled": []}
+    assert copy.told == ""
     # A constant of another file, compiled in two calls away, then the file's own body.
     copy.change("inner.py", "FACTOR = 2.0", "FACTOR = 1000.0")
     assert copy.run() == {"values": values | {"outer": 1001.0}, "compiled": ["outer"]}
@@ -115,9 +154,7 @@ def test_what_was_compiled_before_a_change_is_there_when_the_change_is_undone(co
 
 
 def test_two_processes_compile_nothing_twice(copy):
-    settings = {"cwd": copy.folder.parent, "env": copy.environment, "stdout": subprocess.PIPE}
-    running = [subprocess.Popen(copy.command, **settings) for _ in range(2)]
-    found = [json.loads(process.communicate()[0]) for process in running]
+    found = copy.run_at_once(2)
     assert found[0]["values"] == found[1]["values"] == VALUES
     assert sorted(found[0]["compiled"] + found[1]["compiled"]) == ["alone", "outer"]
     assert not list(copy.cache.glob("*.lock"))
@@ -136,9 +173,11 @@ def test_a_damaged_file_is_compiled_again(copy):
 def test_a_folder_that_cannot_be_written_to_is_left_out(copy, tmp_path):
     blocked = tmp_path / "blocked"
     blocked.touch()
-    copy.environment |= dict.fromkeys(("NUMBA_CACHE_DIR", "GPBNB_CACHE_DIR", "XDG_CACHE_HOME", "HOME"), str(blocked))
-    copy.environment["TMPDIR"] = str(tmp_path)
-    assert copy.run()["values"] == VALUES
+    no_folders = dict.fromkeys(("NUMBA_CACHE_DIR", "GPBNB_CACHE_DIR", "XDG_CACHE_HOME", "HOME"), str(blocked))
+    environment = ENVIRONMENT | no_folders | {"TMPDIR": str(tmp_path), "PYTHONPATH": str(tmp_path)}
+    command = [sys.executable, "-c", ALONE]
+    found = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout == "3.0 2.0\n"
     (own,) = tmp_path.glob("gpbnb-*")
     assert len(list(own.glob("compiled/*.compiled"))) == 2
 
