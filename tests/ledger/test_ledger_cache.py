@@ -20,7 +20,7 @@ from gpbnb.ledger.statements import load_statements
 # entries that the line names, and says which checks were run.
 PROGRAM = """
 import json, os, sys
-import flint, mpmath, numba, numpy, scipy.linalg, scipy.optimize, scipy.signal, sympy
+import flint, gmpy2, mpmath, numba, numpy, sympy, sympy.combinatorics.polyhedron, sympy.tensor.tensor, tqdm
 
 def answer(ids):
     from gpbnb.ledger import checking
