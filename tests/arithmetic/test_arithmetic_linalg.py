@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 import oracles
@@ -29,12 +29,15 @@ def exact(x: FloatArray) -> list:
     return x.to_fractions().tolist()
 
 
-def samples(fmt: FloatFormat, n: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+@cache  # for all operations
+def samples(fmt: FloatFormat, n: int) -> list[tuple[FloatArray, FloatArray]]:
     """Matrices whose entries differ in size, and right-hand sides; no zero, one or identity among them."""
     rng = np.random.default_rng([fmt.base, n])
+    found = []
     for _ in range(20):
         scale = 10.0 ** rng.integers(-2, 3, size=(n, n))
-        yield fmt.array(rng.normal(size=(n, n)) * scale), fmt.array(rng.normal(size=(n, 2)))
+        found.append((fmt.array(rng.normal(size=(n, n)) * scale), fmt.array(rng.normal(size=(n, 2)))))
+    return found
 
 
 @each_format
