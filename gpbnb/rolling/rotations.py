@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any
 
 import mpmath
@@ -66,6 +67,7 @@ def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
         store(fmt, out, (k, 1), s)
 
 
+@cache
 def _exact_turn(n: int, period: float, interval: float) -> tuple[Fraction, Fraction]:
     """Return cosine and sine of n steps, to 60 digits."""
     turns = n * Fraction(interval) / Fraction(period) % 1
@@ -157,14 +159,23 @@ def digits_needed_observed(
     ------
     ValueError : the precision that is proved to be enough cannot be emulated, and none below it is enough.
     """
+    return _digits_needed_observed(method, base, drift, period, tuple(map(int, steps)), error)
+
+
+@cache
+def _digits_needed_observed(
+    method: str, base: int, drift: float, period: float, steps: tuple[int, ...], error: float
+) -> int:
     bound = theory.rotation_bound(method, period, steps[-1])
     rotate = {"recursion": recursion, "direct": direct}[method]
     enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
     most = min(LARGEST_PRECISION[base], enough)
+    first = steps[: len(steps) // 2]
 
     def within(fmt: FloatFormat) -> bool:
         try:
-            return rotate(fmt, period, steps).drift_error(drift) <= error
+            # With too few digits, the first half of the steps is usually enough to see it.
+            return all(rotate(fmt, period, some).drift_error(drift) <= error for some in (first, steps) if some)
         except OverflowError:  # with few digits, the rotation grows without limit
             return False
 
