@@ -101,15 +101,17 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
     sums: NDArray[Any] = np.zeros((2, 2))
     standing: Floats = np.zeros(2)
     centre = (count - 1) / 2
+    # compute the phase modulo a block, exactly: a float64 phase of 3e5 rolls, a year, has lost seven digits
+    phase = rate * step * np.arange(block)
     for start, stop in tqdm(_chunks(count, block), desc="a year", disable=not progress, ncols=80):
         index = np.arange(start, stop)
-        # compute the phase modulo a block, exactly: a float64 phase of 3e5 rolls, a year, has lost seven digits
-        phase = rate * step * (index % block)
-        samples = difference(case, index * (step / YEAR), phase)
-        means.append(samples.reshape(-1, block, 2).mean(axis=1))
+        blocks = difference(case, index.reshape(-1, block) * (step / YEAR), phase)
+        mean, samples = blocks.mean(axis=1, keepdims=True), blocks.reshape(-1, 2)
+        means.append(mean[:, 0])
         sums += np.stack([samples.sum(axis=0), ((index - centre)[:, None] * samples).sum(axis=0)])
-        yz = np.stack([-samples[:, 1], samples[:, 0]], axis=-1)
-        standing += deroll(yz - yz.reshape(-1, block, 2).mean(axis=1).repeat(block, axis=0), -phase).sum(axis=0)
+        line = blocks - mean
+        yz = np.stack([-line[..., 1], line[..., 0]], axis=-1)
+        standing += deroll(yz, -phase).reshape(-1, 2).sum(axis=0)
         if not start:
             opening = samples[:first]
     phi: NDArray[Any] = np.concatenate(means)
