@@ -20,7 +20,7 @@ from gpbnb.arithmetic.bounded import BoundedError
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, integers
 from gpbnb.rounding import theory
-from gpbnb.rounding.paths import best_path, exact_terms, sum_table
+from gpbnb.rounding.paths import best_path, partial_sums, product_table
 
 Bounds = Mapping[str, Callable[[], Fraction]]
 
@@ -375,9 +375,7 @@ def worst_product(fmt: FloatFormat, factors: int) -> Trial:
     if base**t - base ** (t - 1) > 1000:
         raise ValueError(f"got {fmt}; needed a format with at most 1000 numbers between two powers of the base")
     start = np.arange(base ** (t - 1), base**t)
-    products = np.frompyfunc(lambda i, j: fmt.kernel.multiply(int(i), 0, int(j), 0), 2, 2)
-    significand, exponent = (a.astype(np.int64) for a in products.outer(start, start))
-    log_error = np.log(significand * float(base) ** exponent / np.multiply.outer(start, start))
+    significand, log_error = product_table(fmt)
     # State 0 is the number one; the first factor leads to its own significand without error.
     states = len(start)
     end = np.concatenate([[np.arange(1, states + 1)], significand - start[0] + 1])
@@ -408,12 +406,12 @@ def worst_sum(fmt: FloatFormat, terms: int, exponents: Sequence[int], products: 
     """
     if terms < 2 or not len(exponents):
         raise ValueError(f"got {terms} terms, {len(exponents)} exponents; needed at least 2 terms and 1 exponent")
-    factors = exact_terms(fmt, exponents, products)
+    factors, sums = partial_sums(fmt, tuple(exponents), products)
     exact = np.array(list(factors), dtype=object)
     choices = fmt.array(exact)
     size = abs(exact).astype(np.float64)
     own_error = (choices.to_fractions() - exact).astype(np.float64)
-    end, error = sum_table(choices, terms)
+    end, error = sums.table(terms)
     weights = theory.dot_weights(terms) if products else theory.sum_weights(terms)
     bound = "(26)" if products else "weights"
     best: Trial | None = None

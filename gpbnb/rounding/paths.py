@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,24 +26,54 @@ def exact_terms(fmt: FloatFormat, exponents: Sequence[int], products: bool) -> d
     return terms
 
 
-def sum_table(choices: FloatArray, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Tabulate the result and the error of each addition to a partial sum.
+class PartialSums:
+    """All partial sums of some terms, and the error of each addition."""
 
-    Row 0 is the empty sum. Partial sums that are reached only by the last addition have no row.
-    """
-    index = {Fraction(0): 0}
-    ends, errors, fresh = [], [], choices.format.array([0])
-    for _ in range(terms):
-        if not len(fresh):
-            break
+    def __init__(self, choices: FloatArray) -> None:
+        self._choices = choices
+        self._index = {Fraction(0): 0}
+        self._ends: list[NDArray[np.intp]] = []
+        self._errors: list[NDArray[np.float64]] = []
+        self._fresh = choices.format.array([0])
+
+    def table(self, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Tabulate the result and the error of each addition to a partial sum, for sums of so many terms.
+
+        Row 0 is the empty sum. Partial sums that are reached only by the last addition have no row.
+        """
+        while len(self._ends) < terms and len(self._fresh):
+            self._add()
+        return np.concatenate(self._ends[:terms]), np.concatenate(self._errors[:terms])
+
+    def _add(self) -> None:
+        """Add each term to each of the partial sums that are new."""
+        choices, fresh, index = self._choices, self._fresh, self._index
         values = (fresh[:, np.newaxis] + choices).to_fractions()
         exact = np.add.outer(fresh.to_fractions(), choices.to_fractions())
-        errors.append((values - exact).astype(np.float64))
+        self._errors.append((values - exact).astype(np.float64))
         new = list(dict.fromkeys(value for value in values.ravel() if value not in index))
         index |= {value: i for i, value in enumerate(new, start=len(index))}
-        ends.append(np.frompyfunc(index.__getitem__, 1, 1)(values).astype(np.intp))
-        fresh = choices.format.array(new)
-    return np.concatenate(ends), np.concatenate(errors)
+        self._ends.append(np.frompyfunc(index.__getitem__, 1, 1)(values).astype(np.intp))
+        self._fresh = choices.format.array(new)
+
+
+@lru_cache(maxsize=4)  # a curve of worst cases asks for every number of terms
+def partial_sums(
+    fmt: FloatFormat, exponents: tuple[int, ...], products: bool
+) -> tuple[dict[Fraction, tuple[Fraction, int]], PartialSums]:
+    """Return the terms of :func:`exact_terms`, and the partial sums of these, rounded."""
+    terms = exact_terms(fmt, exponents, products)
+    return terms, PartialSums(fmt.array(np.array(list(terms), dtype=object)))
+
+
+@lru_cache(maxsize=4)
+def product_table(fmt: FloatFormat) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Tabulate the significand of the product of any two significands, and the logarithm of 1 + its relative error."""
+    base, t = fmt.base, fmt.precision
+    start = np.arange(base ** (t - 1), base**t)
+    products = np.frompyfunc(lambda i, j: fmt.kernel.multiply(int(i), 0, int(j), 0), 2, 2)
+    significand, exponent = (a.astype(np.int64) for a in products.outer(start, start))
+    return significand, np.log(significand * float(base) ** exponent / np.multiply.outer(start, start))
 
 
 def best_path(rewards: Sequence[NDArray[np.float64]], end: NDArray[np.intp]) -> list[int]:
