@@ -59,16 +59,24 @@ def exponentials(accuracy: float = ACCURACY, longest: int = LONGEST) -> tuple[ND
 
 @compiled
 def _filter(poles, weights, states, white, out):  # type: ignore[no-untyped-def]
-    channels = white.shape[1]
-    for i in range(white.shape[0]):
-        for c in range(channels):
-            out[i, c] = white[i, c]
-        for j in range(len(poles)):
-            p, w = poles[j], weights[j]
-            for c in range(channels):
-                s = states[j, c]
+    out[:] = white
+    four = len(poles) // 4 * 4
+    for c in range(white.shape[1]):
+        for j in range(0, four, 4):  # four at a time, because each waits for its previous state
+            p0, p1, p2, p3 = poles[j], poles[j + 1], poles[j + 2], poles[j + 3]
+            w0, w1, w2, w3 = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
+            s0, s1, s2, s3 = states[j, c], states[j + 1, c], states[j + 2, c], states[j + 3, c]
+            for i in range(len(white)):
+                x = white[i, c]
+                out[i, c] = (((out[i, c] + w0 * s0) + w1 * s1) + w2 * s2) + w3 * s3
+                s0, s1, s2, s3 = p0 * (s0 + x), p1 * (s1 + x), p2 * (s2 + x), p3 * (s3 + x)
+            states[j, c], states[j + 1, c], states[j + 2, c], states[j + 3, c] = s0, s1, s2, s3
+        for j in range(four, len(poles)):
+            p, w, s = poles[j], weights[j], states[j, c]
+            for i in range(len(white)):
                 out[i, c] += w * s
-                states[j, c] = p * (s + white[i, c])
+                s = p * (s + white[i, c])
+            states[j, c] = s
 
 
 def flicker(
