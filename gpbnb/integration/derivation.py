@@ -77,7 +77,16 @@ def noise(kernel: str = "right") -> sp.ImmutableMatrix:
         raise ValueError(f"got kernel {kernel!r}; needed one of {', '.join(arguments)}")
     column = printed_transition()[:, 0].subs(T, arguments[kernel])
     density = 2 * OMEGA * P * column * column.T
-    return sp.ImmutableMatrix(density.applyfunc(lambda entry: sp.expand(sp.integrate(sp.expand(entry), (TAU, 0, T)))))
+    return sp.ImmutableMatrix(density.applyfunc(_over_cycle))
+
+
+def _over_cycle(entry: sp.Expr) -> sp.Expr:
+    """Integrate a sum of exponentials of τ over a cycle."""
+    total = sp.S.Zero
+    for term in sp.Add.make_args(sp.expand(entry)):
+        rate = sp.expand(sp.diff(term, TAU) / term)
+        total += term * T if rate == 0 else (term.subs(TAU, T) - term.subs(TAU, 0)) / rate
+    return sp.expand(total)
 
 
 def discretization() -> Derivation:
@@ -360,6 +369,7 @@ def small_mu() -> Derivation:
 # -- what the misprints would have led to -------------------------------------------------------------
 
 
+@cache
 def misprints() -> dict[str, sp.Expr]:
     """Return, as a function of μ, the steady-state rate over P T that each misprint would give.
 
