@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -93,6 +94,11 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
     ------
     ValueError : a period or step is not positive, or fewer than three samples fill whole rolls.
     """
+    return _year(case, roll_period, step, progress)
+
+
+@lru_cache(maxsize=64)  # a chapter shows some years several times
+def _year(case: Case, roll_period: float | None, step: float, progress: bool) -> Year:
     block = _block(roll_period, step)
     count = int(YEAR / step) // block * block
     rate = 0.0 if roll_period is None else 2 * math.pi / roll_period
