@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.kalman.contraction import (
     Contraction,
-    contraction_steps,
+    contraction_step,
     covariance_error_bound,
+    evaluation_errors,
     gain_error_bound,
     state_error_bound,
 )
@@ -75,22 +76,16 @@ def advance_bound(
         diagonal = np.diagonal(size, axis1=1, axis2=2)
         size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
     bounds_x, bounds_K, bounds_P = bounds
-    run, exact, left = (before, size, measured), (K, S), (y, q, T)
-    model = tuple(np.ascontiguousarray(each) for each in plain)
-    start = 0
-    while start < steps:
-        saved = at < len(checkpoint_steps) and checkpoint_steps[at] <= first + steps
-        stop = int(checkpoint_steps[at]) - first if saved else steps
-        given = (tuple(each[start:stop] for each in arrays) for arrays in (run, exact, left))
-        bound, dK = contraction_steps(bound, model, first + start, *given, _UNIT)
-        if saved:
-            i, k = stop - 1, first + stop - 1
+    for i, k in enumerate(range(first, first + steps)):
+        phi, h, Q, R = (each[k % len(each)] for each in plain)
+        dq, dT, dK, dy = evaluation_errors(phi, h, Q, R, before[i], size[i], measured[i], K[i], S[i], _UNIT)
+        bound = contraction_step(bound, phi, h, Q, R, K[i], S[i], y[i], q[i], T[i], dq, dT, dK, dy)
+        if at < len(checkpoint_steps) and checkpoint_steps[at] == k + 1:
             used = np.empty_like(gains[i])
             whole_gain(int(form), gains[i], exact_model[2][k % len(exact_model[2])], UR[k % len(UR)], used)
             bounds_x[at], bounds_P[at] = state_error_bound(bound), covariance_error_bound(bound)
             bounds_K[at] = gain_error_bound(bound, K[i], np.ascontiguousarray(used[..., 0]), dK)
             at += 1
-        start = stop
     if steps < len(z):
         raise OverflowError(f"got a step {first + steps + 1} beyond double-double; needed one within it")
     return bound

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_terms import Distance, fractions, plain, same
+from exact_terms import Distance, fractions, same
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
@@ -22,7 +22,6 @@ from gpbnb.kalman.guarantee.bound import from_schedule, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits, units
 from gpbnb.kalman.guarantee.linear import LinearFilter, _peak_gain, state_space
 from gpbnb.kalman.guarantee.program import Builder, Program, steps_in_python
-from gpbnb.kalman.kernels import contraction
 from gpbnb.kalman.model import LinearModel
 
 FMT = FloatFormat(2, 24)
@@ -504,20 +503,15 @@ def test_factors_of_the_first_covariance_may_be_off(monkeypatch: pytest.MonkeyPa
 def test_each_step_has_the_errors_of_its_evaluation(form: Form, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of the repeated step, in units of double-double; the bound and the gain's bound contain them."""
     errors, steps, used = [], [], []
-    monkeypatch.setattr(bounded_steps, "contraction_steps", plain(contraction.contraction_steps))
-    for module, name, seen in (
-        (contraction, "evaluation_errors", errors),
-        (contraction, "contraction_step", steps),
-        (bounded_steps, "gain_error_bound", used),
-    ):
-        function = getattr(module, name)
+    for name, seen in (("evaluation_errors", errors), ("contraction_step", steps), ("gain_error_bound", used)):
+        function = getattr(bounded_steps, name)
 
         def noted(*given: Any, function: Any = function, seen: list[Any] = seen) -> Any:
             found = function(*given)
             seen.append((given, found))
             return found
 
-        monkeypatch.setattr(module, name, noted)
+        monkeypatch.setattr(bounded_steps, name, noted)
     run = BoundedRun(correlated(), FMT, form, [1, 2, 3])
     first = covariance_of_factors(run.exactly(run.P)) * (1 + F(1, 2**51)) if form is Form.UD else run.exactly(run.P)
     z = np.array([[1.0, 0.5], [-2.0, 4.0], [3.0, -0.25]])

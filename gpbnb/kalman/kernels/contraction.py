@@ -176,40 +176,6 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
 
 
 @compiled
-def contraction_steps(
-    bound: Any,
-    model: Any,
-    first: int,
-    run: Any,
-    exact: Any,
-    residuals: Any,
-    unit: float,
-) -> Any:
-    r"""Propagate the bound through several steps; the arguments as in :func:`contraction_step`, for each step.
-
-    Parameters
-    ----------
-    bound : Contraction, before these steps.
-    model : Phi, H, Q, R, each repeated periodically. first : how many steps were taken before these.
-    run : state and covariance before each step, and the measurements. exact : gains K and innovation covariances S.
-    residuals : of innovation, state and covariance.
-    unit : as in :func:`evaluation_errors`.
-
-    Returns
-    -------
-    bound : Contraction, after these steps. dK : bounds the error of the last gain in `exact`.
-    """
-    (Phi, H, Q, R), (x, P, z), (K, S), (y, q, T) = model, run, exact, residuals
-    dK = np.zeros(K.shape[1:])
-    for i in range(len(K)):
-        k = first + i
-        phi, h, noise, spread = Phi[k % len(Phi)], H[k % len(H)], Q[k % len(Q)], R[k % len(R)]
-        dq, dT, dK, dy = evaluation_errors(phi, h, noise, spread, x[i], P[i], z[i], K[i], S[i], unit)
-        bound = contraction_step(bound, phi, h, noise, spread, K[i], S[i], y[i], q[i], T[i], dq, dT, dK, dy)
-    return bound, dK
-
-
-@compiled
 def state_error_bound(bound: Any) -> Any:
     r"""Bound each entry of the error of the state, :math:`|e_i| \le \eta\,\sqrt{(LL^T)_{ii}}`; (n,)."""
     rows = np.sqrt((bound.L * bound.L).sum(axis=1)) * (1 + _many(len(bound.L), 0))
