@@ -11,6 +11,7 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -221,3 +222,13 @@ def test_operands_do_not_change() -> None:
     found = linalg.lu(a, pivot=True)
     found.permutation[:] = 0
     assert (repr(a), repr(b)) == before
+
+
+def test_sums_kept_in_wider_fixed_point_are_rounded_once() -> None:
+    """As in the accumulator of a signal processor, whose digits hold products and their sums exactly."""
+    fmt, wide = FixedFormat(3, 12), FixedFormat(7, 24)
+    rng = np.random.default_rng(12)
+    a, b = (fmt.array(rng.uniform(-0.7, 0.7, shape)) for shape in ((4, 30), (30, 3)))
+    expected = np.vectorize(fmt.round, otypes=[object])(a.to_fractions() @ b.to_fractions())
+    assert np.array_equal(linalg.matmul(a, b, sums=wide).to_fractions(), expected)
+    assert not np.array_equal(linalg.matmul(a, b).to_fractions(), expected)
