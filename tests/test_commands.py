@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import json
-import select
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from forks import answering
 
 import gpbnb
 
@@ -33,14 +30,6 @@ def answer(command):
     except SystemExit as end:
         status = end.code
     print(json.dumps([status, sys.stdout.getvalue(), sys.stderr.getvalue()]), file=sys.__stdout__, flush=True)
-
-for line in sys.stdin:
-    child = os.fork()
-    if not child:
-        answer(line.strip())
-        os._exit(0)
-    if os.waitpid(child, 0)[1]:
-        sys.exit(1)
 """
 
 
@@ -52,20 +41,9 @@ def stored():
 @pytest.fixture(scope="module")
 def helped():
     """`helped(command)` asks a command for help in a new process: its exit status, what it prints, and its errors."""
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with subprocess.Popen([sys.executable, "-c", PROGRAM], **pipes) as server:
-
-        def ask(command):
-            server.stdin.write(command + "\n")
-            server.stdin.flush()
-            # A command that computes instead takes 40 s and more.
-            assert select.select([server.stdout], [], [], 30)[0], f"{command} --help takes too long"
-            return json.loads(server.stdout.readline())
-
-        try:
-            yield ask
-        finally:
-            server.kill()
+    # A command that computes instead takes 40 s and more.
+    with answering(PROGRAM, timeout=30) as ask:
+        yield ask
 
 
 def test_the_commands_are_found():

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import pytest
+from forks import answering
 
 from gpbnb import caching, ledger
 from gpbnb.ledger import cache, checking
@@ -22,7 +20,7 @@ PROGRAM = """
 import json, os, sys
 import flint, gmpy2, mpmath, numba, numpy, sympy, sympy.combinatorics.polyhedron, sympy.tensor.tensor, tqdm
 
-def answer(ids):
+def answer(line):
     from gpbnb.ledger import checking
     from gpbnb.ledger.statements import load_statements
 
@@ -34,16 +32,8 @@ def answer(ids):
         return examine(statements, *others)
 
     checking.examine = noted
-    rows = checking.examine_once([each for each in load_statements() if each.id in ids])
+    rows = checking.examine_once([each for each in load_statements() if each.id in line.split()])
     print(json.dumps({"ran": ran, "outcomes": {row.statement.id: row.outcome for row in rows}}), flush=True)
-
-for line in sys.stdin:
-    child = os.fork()
-    if not child:
-        answer(line.split())
-        os._exit(0)
-    if os.waitpid(child, 0)[1]:
-        sys.exit(1)
 """
 # One statement each of three topics. All of them rest on the compiled kernels, which round numbers to printed digits.
 GEOMETRY, INTEGRATION, ROUNDING = "hung1982.IV.eq1", "savage2016.main.stitle.date", "hung1984.II.eq8"
@@ -57,14 +47,10 @@ def copy(tmp_path):
     package = tmp_path / "gpbnb"
     shutil.copytree(caching.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "GPBNB_CACHE_DIR": str(tmp_path / "cache")}
-    command = [sys.executable, "-c", PROGRAM]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, cwd=tmp_path, env=environment, **pipes) as server:
+    with answering(PROGRAM, cwd=tmp_path, env=environment) as ask:
 
         def run(*ids: str) -> dict:
-            server.stdin.write(" ".join(ids) + "\n")
-            server.stdin.flush()
-            return json.loads(server.stdout.readline())
+            return ask(" ".join(ids))
 
         run.package = package
         yield run
