@@ -57,7 +57,7 @@ def change(path: Path, old: str, new: str) -> None:
 
 def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     book, package = copy.root / "book", copy.root / "gpbnb"
-    # A notebook that fails changes nothing and says where; the outputs of the other are kept.
+    # A notebook that fails stays as it is, and the message says where it failed; the other's outputs are kept.
     change(book / "data.ipynb", "print(theory.__name__)", "print(1 / 0)")
     before = [path.read_bytes() for path in sorted(book.iterdir())]
     failed = copy(status=1)

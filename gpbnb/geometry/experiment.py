@@ -107,7 +107,7 @@ def _year(case: Case, roll_period: float | None, step: float, progress: bool) ->
     sums: NDArray[Any] = np.zeros((2, 2))
     standing: Floats = np.zeros(2)
     centre = (count - 1) / 2
-    # compute the phase modulo a block, exactly: a float64 phase of 3e5 rolls, a year, has lost seven digits
+    # Each block begins at phase zero. In a phase that grows for a year, by 3e5 rolls, float64 loses seven digits.
     phase = rate * step * np.arange(block)
     for start, stop in tqdm(_chunks(count, block), desc="a year", disable=not progress, ncols=80):
         index = np.arange(start, stop)

@@ -37,7 +37,7 @@ class PartialSums:
         self._fresh = choices.format.array([0])
 
     def table(self, terms: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """Tabulate the result and the error of each addition to a partial sum, for sums of so many terms.
+        """Tabulate the result and the error of each addition to a partial sum, in sums of up to `terms` terms.
 
         Row 0 is the empty sum. Partial sums that are reached only by the last addition have no row.
         """

@@ -280,7 +280,7 @@ def test_what_a_simulation_refuses():
 # -- the bound beside a run -----------------------------------------------------------------------
 
 
-# Factors and inverses take long to compile, and their loops are the same in each arithmetic.
+# Factors and inverses take long to compile. Their loops are the same in each format, so that five formats are enough.
 @pytest.mark.parametrize(
     ("fmt", "form"),
     [(f, form) for f in FORMATS for form in Form if form not in (Form.UD, Form.HUNG_SECOND_GAIN) or f in FORMATS[:5]],

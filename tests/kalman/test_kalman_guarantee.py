@@ -65,7 +65,7 @@ def rolling() -> LinearModel:
 # -- the program ------------------------------------------------------------------------------------------------------
 
 
-# The loops take long to compile, and differ only in how many numbers an entry of an array consists of.
+# The loops take long to compile. All formats share them, except that base 10 stores an entry as two numbers.
 @pytest.mark.parametrize("form", Form)
 @pytest.mark.parametrize("fmt", FORMATS[:3], ids=str)
 def test_the_program_gives_the_digits_of_the_filter(form: Form, fmt: FloatFormat) -> None:

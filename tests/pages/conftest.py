@@ -59,9 +59,9 @@ def open_page():
 
 @pytest.fixture(scope="session")
 def look_at(open_page):
-    """A function that shows an address as on a desktop, a phone or paper; it keeps the last address open.
+    """A function that shows a page as on a desktop, on a phone or on paper; the last page stays open.
 
-    A narrow window shows what a phone does, as a test finds; nothing makes a page whole again that has been printed.
+    A narrow window stands for a phone, and one of the tests compares the two. A printed page is opened anew.
     """
     with ExitStack() as opened:
         shown = None

@@ -18,8 +18,8 @@ from numba.core.registry import CPUDispatcher
 from gpbnb import caching
 from gpbnb.arithmetic.kernels import compiling
 
-# Loads the libraries once, and compiles a function, which takes longest the first time. For each line of input, so many
-# processes at a time load the package of a folder as it is then, and say what they compiled.
+# The program loads the libraries once, and compiles a first function, which takes longest. Each line of input names a
+# folder and a number of processes: these load the package from the folder at the same time and say what they compiled.
 PROGRAM = """
 import io, json, os, sys
 import numba, numpy as np
