@@ -26,6 +26,7 @@ import numpy as np
 from numba import njit
 from numba.core import caching
 
+from gpbnb.arithmetic.kernels.machine_code import generate_on_demand
 from gpbnb.caching import cache_folder, changed_since_import, digest, imported, lock, remove_unused, unlock, writable
 
 _VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
@@ -139,6 +140,7 @@ class _Files:
                 self._locks[path] = lock(path, _LONGEST_WAIT)
             found = self._read(path, key)
             if found is None:
+                generate_on_demand()
                 _tell(self._folder)
             else:
                 self.release()

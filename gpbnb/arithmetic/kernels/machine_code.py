@@ -1,0 +1,46 @@
+"""Machine code only for functions that Python calls.
+
+numba makes machine code for each function that it compiles, also for those that are only compiled into others. Leaving
+this out takes a sixth off the time that a long loop takes to compile.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.registry import cpu_target
+
+
+class _Library(JITCodeLibrary):  # type: ignore[misc]
+    """The compiled form of a function, with machine code once its address is asked for."""
+
+    def _finalize_final_module(self) -> None:
+        if self._object_caching_enabled and self._compiled_object:  # loaded from the cache
+            super()._finalize_final_module()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        self._ensure_finalized()
+        defined = {function.name for function in self._final_module.functions if not function.is_declaration}
+        if name in defined and not self._codegen._engine.is_symbol_defined(name):
+            super()._finalize_final_module()
+        return int(super().get_pointer_to_function(name))
+
+
+@lru_cache(maxsize=1)
+def generate_on_demand() -> None:
+    """Let numba make machine code for functions that are compiled from now on when their addresses are asked for."""
+    codegen = cpu_target.target_context.codegen()
+    codegen._library_class = _Library
+    set_now = codegen.set_env
+    waiting: dict[str, Any] = {}
+
+    def set_env(name: str, environment: Any) -> None:
+        """Set a function's environment in all machine code that contains the function, now or later."""
+        waiting[name] = environment
+        for each in [each for each in waiting if codegen._engine.is_symbol_defined(each)]:
+            set_now(each, waiting.pop(each))
+
+    codegen.set_env = set_env

@@ -1,0 +1,43 @@
+"""Machine code is made for functions that Python calls, and for no others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit
+from numba.core.registry import cpu_target
+
+from gpbnb.arithmetic.kernels.compiling import inner
+from gpbnb.arithmetic.kernels.machine_code import generate_on_demand
+
+
+def has_machine_code(function):
+    (compiled,) = function.overloads.values()
+    return cpu_target.target_context.codegen()._engine.is_symbol_defined(compiled.fndesc.llvm_func_name)
+
+
+def test_a_function_that_is_only_compiled_into_others_has_none():
+    generate_on_demand()
+
+    @inner
+    def root(x):
+        if x[0] < 0.0:  # the array is packed for Python in the environment of this function
+            raise ValueError("got a negative number", x)
+        return np.sqrt(x[0])
+
+    @njit
+    def half_root(x):
+        return 0.5 * root(x)
+
+    @njit
+    def twice_half_root(x):
+        return 2.0 * half_root(x)
+
+    assert twice_half_root(np.array([9.0])) == 3.0
+    with pytest.raises(ValueError, match="negative") as caught:
+        twice_half_root(np.array([-9.0]))
+    assert caught.value.args[1].tolist() == [-9.0]
+    assert has_machine_code(twice_half_root)
+    assert has_machine_code(half_root)
+    assert not has_machine_code(root)
+    assert half_root(np.array([4.0])) == 1.0
