@@ -11,6 +11,7 @@ from pybtex.style.formatting.plain import Style as PlainStyle
 from pybtex.style.labels import BaseLabelStyle
 from sphinx.addnodes import start_of_file
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 from sphinx.util.fileutil import copy_asset
 
 from gpbnb.display.tables import POWER
@@ -157,12 +158,40 @@ def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         node.rawsource = mended
 
 
+def list_listings(app: Sphinx, env: BuildEnvironment) -> None:
+    """Leave modules without a listing, such as those in C, out of the list of listings."""
+    env._viewcode_modules = {name: found for name, found in getattr(env, "_viewcode_modules", {}).items() if found}
+
+
+def lead_back(app: Sphinx, pagename: str, templatename: str, context: dict, doctree: nodes.document | None) -> None:
+    """Lead the links of a listing to where its names are described; viewcode takes one module to describe them all."""
+    if not pagename.startswith("_modules/"):
+        return
+    described = app.env.get_domain("py").objects
+
+    def mended(match: re.Match[str]) -> str:
+        name, page = match[2], match[4]
+        for place, found in described.items():
+            named = place.endswith(f".{name}") and found.objtype != "module"
+            if named and app.builder.get_relative_uri(pagename, found.docname) == page:
+                return f"{match[1]}{name}{match[3]}{page}#{place}"
+        return match[0]
+
+    context["body"] = re.sub(
+        r'(<div class="viewcode-block" id=")([^"]+)(">\n<a class="viewcode-back" href=")([^"#]+)#[^"]+',
+        mended,
+        context["body"],
+    )
+
+
 def setup(app: Sphinx) -> dict:
     pybtex.plugin.register_plugin("pybtex.style.formatting", "short_names", ShortNames)
     app.connect("autodoc-process-docstring", unfold_fields, priority=400)
     app.connect("autodoc-process-signature", hide_enum_arguments)
     app.connect("doctree-resolved", write_powers)
     app.connect("doctree-resolved", mend_links)
+    app.connect("env-updated", list_listings)
+    app.connect("html-page-context", lead_back)
     app.connect("build-finished", copy_mathjax)
     app.connect("build-finished", write_first_page, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

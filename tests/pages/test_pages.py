@@ -261,9 +261,7 @@ def dead_links(root, pages):
 
 
 def test_every_link_within_the_book_leads_somewhere():
-    """Save those that viewcode writes into a listing: it takes one module to describe all names of the listing."""
-    dead = dead_links(tools.HTML, ["index.html", *PAGES])
-    assert [each for each in dead if not each.startswith("_modules/")] == []
+    assert list(dead_links(tools.HTML, ["index.html", *PAGES])) == []
 
 
 def test_a_link_to_nothing_is_dead(tmp_path):
