@@ -51,21 +51,34 @@ def still_true():
 STILL_TRUE = still_true()
 
 
+def sameness(statement):
+    """What a verdict depends on: checks see no difference between the documents that print a statement alike."""
+    return CHECKED[statement.id][statement.id], statement.id.split(".", 2)[2], statement.form
+
+
 def in_order(statement):
     """All alterations: the exceptions listed, then the others in an order that depends on the id alone.
 
-    Lower indices come last, where the others are too few.
+    Of a statement that two documents print alike, it is the order for the first of them. Lower indices come last, where
+    the others are too few.
     """
     every = dict(altered(statement))
     others = [name for name in every if (statement.id, name) not in STILL_TRUE]
-    random.Random(statement.id).shuffle(others)
+    random.Random(FIRST[sameness(statement)]).shuffle(others)
     others.sort(key=lambda name: "lower index" in name)
     listed = [name for name in every if (statement.id, name) in STILL_TRUE]
     return {name: every[name] for name in (*listed, *others)}
 
 
+FINDINGS = {}
+
+
 def judged(statement):
-    return CHECKED[statement.id].run(statement)
+    """The finding on a statement, which is the same for documents that print it alike."""
+    key = sameness(statement)
+    if key not in FINDINGS:
+        FINDINGS[key] = CHECKED[statement.id].run(statement)
+    return FINDINGS[key]
 
 
 @dataclass
@@ -103,6 +116,9 @@ def needed(statement):
 
 TAKEN = [each for each in STATEMENTS if each.form and takes_statement(CHECKED[each.id][each.id])]
 """Statements with a form that their checks judge."""
+FIRST = {sameness(each): each.id for each in reversed(TAKEN)}
+PLACE = {each.id: place for place, each in enumerate(TAKEN)}
+TAKEN.sort(key=lambda each: PLACE[FIRST[sameness(each)]])  # those printed alike one after the other
 
 
 def each_of(statements):
