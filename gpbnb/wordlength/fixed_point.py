@@ -327,19 +327,17 @@ def _shifted(n: int, shift: int, rounding: Rounding) -> int:
     """Return ``n / 2**shift``, rounded."""
     if shift <= 0:
         return n << -shift
-    unit = 1 << shift
-    m, rest = divmod(abs(n), unit)
-    negative = n < 0
-    up = {
-        Rounding.NEAREST: 2 * rest >= unit,
-        Rounding.EVEN: 2 * rest > unit or (2 * rest == unit and m % 2 == 1),
-        Rounding.CHOP: False,
-        Rounding.UP: rest > 0 and not negative,
-        Rounding.DOWN: rest > 0 and negative,
-        Rounding.ODD: rest > 0 and m % 2 == 0,
-    }[rounding]
-    m += up
-    return -m if negative else m
+    m = n >> shift
+    rest, unit = n - (m << shift), 1 << shift
+    if rest == 0 or rounding is Rounding.DOWN:
+        return m
+    if rounding is Rounding.NEAREST:
+        return m + (2 * rest > unit or (2 * rest == unit and n > 0))
+    if rounding is Rounding.EVEN:
+        return m + (2 * rest > unit or (2 * rest == unit and m % 2 == 1))
+    if rounding is Rounding.ODD:
+        return m | 1
+    return m + (rounding is Rounding.UP or n < 0)
 
 
 def _state_space(program: Program, coefficients: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
