@@ -85,7 +85,7 @@ def test_a_run_names_what_overflows() -> None:
     run = Run(model(H=exact([["300", "0"]])), named.BINARY16, Form.INNOVATION, ())
     run.take(MEASURED)
     assert run.reason == "overflow in the innovation covariance at step 1"
-    run = Run(model(H=exact([["1.9", "0"]])), FixedFormat(1, 14), Form.INNOVATION, ())
+    run = Run(model(H=exact([["1.9", "0"]])), FixedFormat(1, 14, Rounding.EVEN), Form.INNOVATION, ())
     run.take(MEASURED / 8)
     assert run.reason == "overflow in the innovation covariance at step 1"
     with pytest.raises(OverflowError):

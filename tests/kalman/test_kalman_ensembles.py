@@ -108,13 +108,19 @@ def test_no_bound_was_violated_in_ten_thousand_trials():
     assert sum(each.violations_125 for each in found) > 1000
 
 
-@pytest.mark.parametrize("seed", [0, 33])
+# With these seeds, the largest ratios of UD and the second gain are none of base 16, which takes long to compile.
+@pytest.mark.parametrize("seed", [1, 32])
 def test_a_part_of_the_sweep_comes_out_as_it_is_stored(seed):
     stored = read(ensembles._HERE / "ensembles.csv", ensembles.COLUMNS, "").rows
     assert tuple(column.name for column in ensembles.COLUMNS) == ensembles.HEADER
     todo = [task for task in tasks(1, first_seed=seed) if task.kind in ("one sign", "far scales")]
+    without = (Form.UD, Form.HUNG_SECOND_GAIN)
+    todo = [task for task in todo if task.fmt.base != 16 or task.form not in without]
     expected = [line for line in stored if line[:2] in {(str(seed), "one sign"), (str(seed), "far scales")}]
-    assert ensembles.lines(seed, sweep(todo, batch=len(todo))) == expected
+    largest = [ensembles.HEADER.index(name) for name in ("seed", "kind", "form", *ensembles._LARGEST)]
+    for line, row in zip(ensembles.lines(seed, sweep(todo, batch=len(todo))), expected, strict=True):
+        few = row[2] in {form.name.lower() for form in without}
+        assert [line[at] for at in largest] == [row[at] for at in largest] if few else line == row
 
 
 def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch):

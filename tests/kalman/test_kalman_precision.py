@@ -13,7 +13,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import precision
 from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import reference
+from gpbnb.kalman.filter_run import Run, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.inputs import simulated_measurements
@@ -201,11 +201,12 @@ def test_a_bar_for_those_who_wait(capsys):
     assert f"{len(found.tried)}run" in capsys.readouterr().err.replace(" ", "")
 
 
-def test_no_precision_may_be_enough():
-    found = required_precision(MODEL, 3, 1e-30, 16, z=Z[:3])
+@pytest.mark.parametrize(("model", "base", "most"), [(MODEL, 2, 53), (LinearSystem([["0.9"]], [["0.1"]]), 16, 13)])
+def test_no_precision_may_be_enough(model, base, most):
+    found = required_precision(model, 3, 1e-30, base, z=Z[:3])
     assert found.fmt is None
-    assert found.tried[-1][0] == 13
-    assert str(found) == "no precision up to 13 digits meets the tolerance (emulation, 3 steps)"
+    assert found.tried[-1][0] == most
+    assert str(found) == f"no precision up to {most} digits meets the tolerance (emulation, 3 steps)"
 
 
 def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
@@ -248,14 +249,27 @@ def test_stochastic_rounding_is_searched_as_far_as_it_has_loops():
     assert "no precision up to 29 digits" in str(found)
 
 
-@pytest.mark.parametrize("form", ["innovation", "symmetrized"])
-def test_a_seed_selects_the_random_roundings_of_a_run(form):
+def test_a_seed_selects_the_random_roundings_of_a_run():
     """The model and the measurements are rounded at random, too."""
-    first, again, other = (
-        emulate(MODEL, Z, FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed), form).state for seed in (1, 1, 2)
-    )
+    formats = [FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed) for seed in (1, 1, 2)]
+    first, again, other = (emulate(MODEL, Z, fmt, "symmetrized").state for fmt in formats)
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
+
+
+def test_a_seed_selects_the_random_roundings_of_a_compiled_run():
+    """The inverse of R is computed in compiled loops; those of a step take long to compile with random rounding."""
+    two = LinearModel(MODEL.Phi, np.eye(2), MODEL.Q, [["0.7", "0.3"], ["0.3", "1.1"]], MODEL.x0, MODEL.P0)
+    seen = []
+    for seed in (1, 1, 2):
+        run = Run(two, FloatFormat(2, 9, Rounding.STOCHASTIC, seed=seed), Form.HUNG_SECOND_GAIN, ())
+        drawn = int(run.tag.mode.state[1])
+        inverse, measured = run.exactly(run.matrices[6]), run.exactly(run.pack_measurements(Z[:30].reshape(-1, 2)))
+        seen.append((drawn, inverse.tolist(), measured.tolist()))
+        assert drawn > 0
+    assert seen[0] == seen[1]
+    assert seen[0][1] != seen[2][1]
+    assert seen[0][2] != seen[2][2]
 
 
 def squares(fmt, z):

@@ -30,7 +30,7 @@ MEASURED = examples.tilt_measurements(STEPS)
         Processor("wide", BFLOAT16, sums=BINARY32),
         Processor("fused", BFLOAT16, fused=True),
         Processor("compensated", BFLOAT16, compensated=True),
-        Processor("in pairs", BINARY32, order="pairwise"),
+        Processor("in pairs", BFLOAT16, order="pairwise"),
     ],
     ids=lambda each: each.name,
 )
