@@ -15,7 +15,7 @@ from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.envelope import units
+from gpbnb.kalman.guarantee.envelope import ROUNDING, units
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.precision import required_precision, survey
 from gpbnb.kalman.system import LinearSystem
@@ -170,6 +170,7 @@ def test_in_fixed_point_only_products_are_rounded():
     half, gain = 2.0**-13, schedule.coefficients[-1, -1, 0]
     off = abs(gain - schedule.exact[-1, 0, 0, 0]) * 10
     assert found.bound[0] == pytest.approx((half + off) / gain, rel=0.02)
+    assert found.parts[0, ROUNDING] == pytest.approx(half / gain, rel=0.01)
     table = units(fmt)
     assert (table.powers.tolist(), table.errors.tolist()) == ([256 - 2.0**-12], [half])
     assert table.sums_exact
