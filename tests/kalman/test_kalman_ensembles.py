@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
 from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -227,36 +227,33 @@ def test_nothing_to_do_is_done():
 
 @pytest.fixture
 def cluster():
-    """Two worker processes, each under a nanny that starts it again when it dies."""
-    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    """A worker process, under a nanny that starts it again when it dies."""
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         yield cluster
 
 
 @pytest.mark.filterwarnings("default")  # of a worker that is killed while it speaks
-def test_none_is_lost_on_a_cluster_whose_workers_are_killed(cluster):
-    todo = some(120)
+def test_none_is_lost_on_a_cluster_whose_worker_is_killed(cluster):
+    todo = some(40)
     with Client(cluster) as client:
-        pids = set(client.run(os.getpid).values())
-        assert len(pids) == 2
-        finished, killed_pids = threading.Event(), []
+        executor = client.get_executor()
+        (pid,) = client.run(os.getpid).values()
+        sent, waiting = [], []
 
-        def kill():
-            """Each worker once, while they work."""
-            for pid in pids:
-                if finished.wait(1.0):
-                    return
+        def kill(_):
+            """Once, after a batch and before the others."""
+            if not waiting:
+                waiting.extend(future for future in sent if not future.done())
                 os.kill(pid, signal.SIGKILL)
-                killed_pids.append(pid)
 
-        assassin = threading.Thread(target=kill)
-        assassin.start()
-        try:
-            found = sweep(todo, client.get_executor(), batch=4)
-        finally:
-            finished.set()
-            assassin.join()
-        assert set(killed_pids) == pids
-        assert not pids & set(client.run(os.getpid).values())
+        def submit(*call):
+            sent.append(executor.submit(*call))
+            sent[-1].add_done_callback(kill)
+            return sent[-1]
+
+        found = sweep(todo, SimpleNamespace(submit=submit), batch=4)
+        assert waiting
+        assert pid not in client.run(os.getpid).values()
     assert found == sweep(todo, batch=len(todo))
 
 
