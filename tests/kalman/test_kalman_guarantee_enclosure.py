@@ -151,8 +151,8 @@ def test_other_forms_and_gains_that_fall_for_ever_have_no_enclosure() -> None:
 
 @pytest.fixture(scope="module")
 def never_repeating() -> tuple[LinearModel, FloatFormat, Limits, Guarantee]:
-    """Ten states, a cycle of 31."""
-    given, fmt, within = cyclic(10, 2, 31, 0.8), FloatFormat(2, 24), limits(10, 2, measurement=50)
+    """Ten states, a cycle of 13."""
+    given, fmt, within = cyclic(10, 2, 13, 0.8), FloatFormat(2, 24), limits(10, 2, measurement=50)
     return given, fmt, within, guarantee(given, fmt, within, most=1000)
 
 
@@ -161,8 +161,8 @@ def test_a_filter_whose_gain_never_repeats_has_a_guarantee_for_ever(never_repeat
     given, fmt, within, found = never_repeating
     assert found.for_ever
     assert found.schedule.repeat is None
-    assert found.schedule.enclosed == 186
-    assert "its gain is enclosed from step 186" in str(found)
+    assert found.schedule.enclosed == 130
+    assert "its gain is enclosed from step 130" in str(found)
     repeating = guarantee(given, fmt, within, Form.UD)
     assert repeating.schedule.enclosed is None
     # The gains may lie anywhere within their limits, which costs a factor of about forty.

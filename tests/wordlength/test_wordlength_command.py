@@ -86,7 +86,8 @@ def test_the_command_answers_and_writes_page_and_json(files, capsys):
 
 def test_a_report_shows_the_arguments_of_the_process(files, monkeypatch, capsys):
     folder, _ = files
-    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--report", str(folder / "out.html")]
+    given = [str(folder / "model.toml"), "--tolerance", "0.01,inf", "--steps", "20"]
+    given += ["--report", str(folder / "out.html")]
     monkeypatch.setattr(sys, "argv", ["program", *given])
     assert main() == 0
     shown = f"python -m gpbnb.wordlength {shlex.join(given)}"
@@ -309,15 +310,15 @@ def test_the_curve_of_two_precisions_spans_the_figure():
 
 
 def test_the_command_takes_known_inputs(files, capsys):
-    folder, z = files[0], files[1][:20]
-    (folder / "z.csv").write_text("\n".join((folder / "z.csv").read_text(encoding="utf-8").split("\n")[:21]))
-    u = np.round(np.sin(np.arange(20) / 7), 3).reshape(-1, 1)
+    folder, z = files[0], files[1][:9]
+    (folder / "z.csv").write_text("\n".join((folder / "z.csv").read_text(encoding="utf-8").split("\n")[:10]))
+    u = np.round(np.sin(np.arange(9) / 7), 3).reshape(-1, 1)
     (folder / "u.csv").write_text("push\n" + "\n".join(map(repr, u[:, 0].tolist())), encoding="utf-8")
     (folder / "model.toml").write_text(MODEL + "B = [[0.005], [0.1]]\nd = [0.5]\n", encoding="utf-8")
     given = [str(folder / "model.toml"), "--measurements", str(folder / "z.csv"), "--tolerance", "0.01,inf"]
     assert main([*given, "--inputs", str(folder / "u.csv"), "--basis", "emulation", "--form", "Cholesky"]) == 0
     model = read_model(folder / "model.toml", u)
-    expected = required_precision(model, 20, (0.01, math.inf), z=z, form="Cholesky")
+    expected = required_precision(model, 9, (0.01, math.inf), z=z, form="Cholesky")
     shown = capsys.readouterr()
     assert shown.out.strip() == str(expected)
     assert "Carlson, emulation: " in shown.err
