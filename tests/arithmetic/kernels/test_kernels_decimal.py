@@ -11,7 +11,6 @@ from numba import njit
 from gpbnb.arithmetic.kernels import elementwise, scalar
 from gpbnb.arithmetic.kernels.backends import backend
 from gpbnb.arithmetic.kernels.exact import kernel
-from gpbnb.arithmetic.kernels.scalar import load
 from gpbnb.arithmetic.kernels.tags import LARGEST_SHORT, Decimal, ShortDecimal
 
 TAGS = [Decimal, ShortDecimal]
@@ -84,10 +83,16 @@ def test_the_kernel_of_a_precision() -> None:
 
 
 @njit
-def dots(fmt: Any, x: Any, y: Any) -> Any:
-    c = x[:1].copy().reshape(1, 1, 2)
-    scalar.matmul(fmt, x.reshape(1, len(x), 2), y.reshape(len(x), 1, 2), c)
-    return scalar.dot(fmt, x, y), load(fmt, c, (0, 0))
+def dot(fmt: Any, x: Any, y: Any) -> Any:
+    return scalar.dot(fmt, x, y)
+
+
+def matmul(fmt: Any, x: Any, y: Any) -> Any:
+    """The product of a row and a column."""
+    a, b, c = x.reshape(1, -1, 2), y.reshape(-1, 1, 2), np.empty((1, 1, 2), np.int64)
+    a.flags.writeable = b.flags.writeable = False  # as what arrays give
+    elementwise.product(fmt, a, b, c)
+    return tuple(c[0, 0])
 
 
 HIGH, ONE, LOW, ZERO = (10, 2**60), (10, -1), (10, -(2**60)), (0, 0)
@@ -110,13 +115,15 @@ HIGH, ONE, LOW, ZERO = (10, 2**60), (10, -1), (10, -(2**60)), (0, 0)
 def test_products_out_of_range_in_sums(tag: Any, x: Any, y: Any, expected: Any) -> None:
     arrays = np.array(x, np.int64), np.array(y, np.int64)
     if expected is None:
-        with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
-            dots(tag(2, True), *arrays)
+        for sum_of_products in (dot, matmul):
+            with pytest.raises(OverflowError, match=r"beyond 2\*\*60"):
+                sum_of_products(tag(2, True), *arrays)
     else:
-        assert dots(tag(2, True), *arrays) == (expected, expected)
+        assert dot(tag(2, True), *arrays) == matmul(tag(2, True), *arrays) == expected
 
 
 def test_a_product_too_small_to_hold_only_tells_its_sign_in_a_sum() -> None:
     x, y = np.array([[10, -1], [10, -(2**60)]]), np.array([[10, -1], [-10, -(2**60)]])
-    assert dots(ShortDecimal(2, True), x, y) == ((10, -1), (10, -1))
-    assert dots(ShortDecimal(2, False), x, y) == ((99, -2), (99, -2))
+    for sum_of_products in (dot, matmul):
+        assert sum_of_products(ShortDecimal(2, True), x, y) == (10, -1)
+        assert sum_of_products(ShortDecimal(2, False), x, y) == (99, -2)

@@ -18,6 +18,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels import scalar
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.elementwise import product
 from gpbnb.arithmetic.kernels.scalar import (
     absolute,
     add,
@@ -43,7 +44,7 @@ FORMATS = [
 ]
 
 
-@njit
+@njit(nogil=True)
 def recursion(fmt: Any, x: Any, y: Any) -> None:
     """Some of every operation; x has two numbers, y as many as steps."""
     a, b = load(fmt, x, 0), load(fmt, x, 1)
@@ -121,11 +122,6 @@ def compared_beyond(fmt: Any, x: Any) -> Any:
     return compare(fmt, multiply(fmt, a, a), one(fmt))
 
 
-@njit
-def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    scalar.matmul(fmt, a, b, c)
-
-
 @pytest.mark.parametrize("tag", [Binary(24, True), Binary(53, False), Hexadecimal(6, True)], ids=str)
 @pytest.mark.parametrize("factor", [2.0**100, 2.0**-100])
 def test_float64_out_of_range_raises(tag: Any, factor: float) -> None:
@@ -137,6 +133,7 @@ def test_float64_out_of_range_raises(tag: Any, factor: float) -> None:
     with pytest.raises(OverflowError, match="beyond the range of float64"):
         compared_beyond(tag, np.array([factor**7]))
     square = np.full((2, 2), factor**7)
+    square.flags.writeable = False  # as what arrays give
     with pytest.raises(OverflowError, match="beyond the range of float64"):
         product(tag, square, square, np.empty((2, 2)))
 
@@ -194,22 +191,17 @@ def test_python_cannot_call_them(name: str) -> None:
         function(*[None] * count)
 
 
-@njit(nogil=True)
-def long_loop(fmt: Any, x: Any, y: Any, count: int) -> None:
-    for _ in range(count):
-        scalar.matmul(fmt, x, x, y)
-
-
 def test_the_gil_is_released() -> None:
-    tag, x = Binary(24, True), np.full((10, 10), 0.5)
-    long_loop(tag, x, np.empty((10, 10)), 1)
+    fmt = FloatFormat(2, 24)
+    backend, x = fmt.backend, fmt.array(["0.7310586", "2.7182818284590452"]).components
+    recursion(backend.tag, backend.pack(x), np.empty(1))
     running = threading.Event()
     seconds = []
 
     def work() -> None:
         running.set()
         start = time.perf_counter()
-        long_loop(tag, x, np.empty((10, 10)), 200_000)
+        recursion(backend.tag, backend.pack(x), np.empty(6_000_000))
         seconds.append(time.perf_counter() - start)
 
     thread = threading.Thread(target=work)
