@@ -158,30 +158,28 @@ def mend_links(app: Sphinx, doctree: nodes.document, docname: str) -> None:
         node.rawsource = mended
 
 
-def list_listings(app: Sphinx, env: BuildEnvironment) -> None:
-    """Leave modules without a listing, such as those in C, out of the list of listings."""
+def omit_modules_without_listing(app: Sphinx, env: BuildEnvironment) -> None:
+    """Leave modules without Python source out of the index of source listings."""
     env._viewcode_modules = {name: found for name, found in getattr(env, "_viewcode_modules", {}).items() if found}
 
 
-def lead_back(app: Sphinx, pagename: str, templatename: str, context: dict, doctree: nodes.document | None) -> None:
-    """Lead the links of a listing to where its names are described; viewcode takes one module to describe them all."""
+def mend_listing_links(
+    app: Sphinx, pagename: str, templatename: str, context: dict, doctree: nodes.document | None
+) -> None:
+    """Lead each link of a source listing to the module whose page describes the name.
+
+    Viewcode names the same module in all links of a listing.
+    """
     if not pagename.startswith("_modules/"):
         return
     described = app.env.get_domain("py").objects
 
     def mended(match: re.Match[str]) -> str:
-        name, page = match[2], match[4]
-        for place, found in described.items():
-            named = place.endswith(f".{name}") and found.objtype != "module"
-            if named and app.builder.get_relative_uri(pagename, found.docname) == page:
-                return f"{match[1]}{name}{match[3]}{page}#{place}"
-        return match[0]
+        place = f"{match['module']}.{match['name']}"
+        return match["before"] + place if place in described else match[0]
 
-    context["body"] = re.sub(
-        r'(<div class="viewcode-block" id=")([^"]+)(">\n<a class="viewcode-back" href=")([^"#]+)#[^"]+',
-        mended,
-        context["body"],
-    )
+    link = r'<div class="viewcode-block" id="(?P<name>[^"]+)">\n<a class="viewcode-back" href="[^"#]*?'
+    context["body"] = re.sub(rf'(?P<before>{link}(?P<module>[^"#/]+)\.html#)[^"]+', mended, context["body"])
 
 
 def setup(app: Sphinx) -> dict:
@@ -190,8 +188,8 @@ def setup(app: Sphinx) -> dict:
     app.connect("autodoc-process-signature", hide_enum_arguments)
     app.connect("doctree-resolved", write_powers)
     app.connect("doctree-resolved", mend_links)
-    app.connect("env-updated", list_listings)
-    app.connect("html-page-context", lead_back)
+    app.connect("env-updated", omit_modules_without_listing)
+    app.connect("html-page-context", mend_listing_links)
     app.connect("build-finished", copy_mathjax)
     app.connect("build-finished", write_first_page, priority=100)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
