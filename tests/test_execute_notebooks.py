@@ -82,7 +82,7 @@ def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     assert executed(wrong) == {"kernels"}
     assert "kernels.ipynb, cell 1:" in wrong
     assert "+stdout: another kernel" in wrong
-    # Each for a reason of its own.
+    # One notebook depends on the new data, the other has new code.
     with next((package / "budget").glob("*.csv")).open("a") as data:
         data.write("\n")
     change(book / "kernels.ipynb", "print(exact.__name__)", "print(6 * 7)")

@@ -81,7 +81,7 @@ def test_the_reference_with_inputs_is_the_exact_filter(seed):
     assert np.abs((found - true).astype(float)).max() < 2.0**-85 * np.abs(true.astype(float)).max()
 
 
-# Factors and inverses take long to compile; two formats are enough for their loops.
+# UD and the second gain take long to compile. Their loops are the same for all formats, so two formats are enough.
 @pytest.mark.parametrize(
     ("fmt", "form"),
     [

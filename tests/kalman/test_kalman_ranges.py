@@ -23,9 +23,9 @@ from gpbnb.wordlength.records import survey_records
 
 HALF = {"emin": -14, "emax": 15, "rounding": "even"}
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])
-# Loops for other modes take long to compile; the tests of the arithmetic compare each mode with Fractions.
-EVEN = Rounding.EVEN
 WITHIN = limits(1, 1, state=100, innovation=10)
+# Filters in other rounding modes take long to compile; tests/arithmetic compares every mode with Fractions.
+EVEN = Rounding.EVEN
 
 
 def uncertain(variance, h=1):

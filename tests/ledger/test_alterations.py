@@ -52,15 +52,15 @@ STILL_TRUE = still_true()
 
 
 def sameness(statement):
-    """What a verdict depends on: checks see no difference between the documents that print a statement alike."""
+    """All that the verdict on a statement depends on; which of two documents prints it does not matter."""
     return CHECKED[statement.id][statement.id], statement.id.split(".", 2)[2], statement.form
 
 
 def in_order(statement):
-    """All alterations: the exceptions listed, then the others in an order that depends on the id alone.
+    """All alterations: the exceptions listed, then the others in an order that depends on the first copy's id alone.
 
-    Of a statement that two documents print alike, it is the order for the first of them. Lower indices come last, where
-    the others are too few.
+    Two copies of a statement, in different documents, have the same order. Lower indices come last, where the others
+    are too few.
     """
     every = dict(altered(statement))
     others = [name for name in every if (statement.id, name) not in STILL_TRUE]
@@ -74,7 +74,7 @@ FINDINGS = {}
 
 
 def judged(statement):
-    """The finding on a statement, which is the same for documents that print it alike."""
+    """The finding on a statement; a copy of it in another document is not judged again."""
     key = sameness(statement)
     if key not in FINDINGS:
         FINDINGS[key] = CHECKED[statement.id].run(statement)
@@ -117,8 +117,7 @@ def needed(statement):
 TAKEN = [each for each in STATEMENTS if each.form and takes_statement(CHECKED[each.id][each.id])]
 """Statements with a form that their checks judge."""
 FIRST = {sameness(each): each.id for each in reversed(TAKEN)}
-PLACE = {each.id: place for place, each in enumerate(TAKEN)}
-TAKEN.sort(key=lambda each: PLACE[FIRST[sameness(each)]])  # those printed alike one after the other
+TAKEN.sort(key=lambda each: FIRST[sameness(each)])  # copies side by side, so that one process judges both
 
 
 def each_of(statements):

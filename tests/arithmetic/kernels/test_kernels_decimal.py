@@ -90,7 +90,7 @@ def dot(fmt: Any, x: Any, y: Any) -> Any:
 def matmul(fmt: Any, x: Any, y: Any) -> Any:
     """The product of a row and a column."""
     a, b, c = x.reshape(1, -1, 2), y.reshape(-1, 1, 2), np.empty((1, 1, 2), np.int64)
-    a.flags.writeable = b.flags.writeable = False  # as what arrays give
+    a.flags.writeable = b.flags.writeable = False  # as arrays pass them
     elementwise.product(fmt, a, b, c)
     return tuple(c[0, 0])
 

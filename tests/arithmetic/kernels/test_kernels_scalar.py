@@ -133,7 +133,7 @@ def test_float64_out_of_range_raises(tag: Any, factor: float) -> None:
     with pytest.raises(OverflowError, match="beyond the range of float64"):
         compared_beyond(tag, np.array([factor**7]))
     square = np.full((2, 2), factor**7)
-    square.flags.writeable = False  # as what arrays give
+    square.flags.writeable = False  # as arrays pass it
     with pytest.raises(OverflowError, match="beyond the range of float64"):
         product(tag, square, square, np.empty((2, 2)))
 
