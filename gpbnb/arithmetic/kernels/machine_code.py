@@ -1,7 +1,7 @@
-"""Machine code only for functions that Python calls.
+"""Make machine code only for functions that Python calls.
 
-numba makes machine code for each function that it compiles, also for those that are only compiled into others. Leaving
-this out takes a sixth off the time that a long loop takes to compile.
+By default, numba also makes machine code for functions that are only compiled into others, and never uses it. Without
+this work, a long loop compiles in about five sixths of the time.
 """
 
 from __future__ import annotations
