@@ -54,7 +54,7 @@ def test_a_journal_resumes_where_it_ended(tmp_path: Path) -> None:
     assert processors.Journal(file).parts == {}
 
 
-def test_the_machine_converts_to_float16_as_numpy_does() -> None:
+def test_float16_is_rounded_as_numpy_rounds_it() -> None:
     patterns = np.arange(2**16, dtype=np.uint32) << 16
     x = np.concatenate([(patterns | low).view(np.float32) for low in (0, 0x1000, 0x1001, 0x0FFF)])
     x = x[np.isfinite(x)]
