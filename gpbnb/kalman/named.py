@@ -29,14 +29,18 @@ def form_named(form: AnyForm | str) -> AnyForm:
     if isinstance(form, (Form, ArrayForm)):
         return form
     if isinstance(form, str):
-        wanted = form.strip().upper().replace(" ", "_").replace("-", "_")
+        wanted = _plain(form)
         if wanted in ALIASES:
             return ALIASES[wanted]
         for each in (*Form, *ArrayForm):
-            if wanted in (each.name, str(each).upper()):
+            if wanted in (each.name, _plain(str(each))):
                 return each
     names = ", ".join(repr(each.name.lower()) for each in (*Form, *ArrayForm))
     raise ValueError(f"got form {form!r}; needed one of {names}, or a member of Form or ArrayForm")
+
+
+def _plain(name: str) -> str:
+    return name.strip().upper().replace(" ", "_").replace("-", "_")
 
 
 def compiled_form(form: AnyForm | str) -> Form:

@@ -20,6 +20,8 @@ NAMES = {
     "Cholesky": ArrayForm.CARLSON,
     "square root": ArrayForm.CARLSON,
     "square-root": ArrayForm.CARLSON,
+    "hung": Form.HUNG,
+    "Hung second gain": Form.HUNG_SECOND_GAIN,
 }
 
 
@@ -27,3 +29,8 @@ NAMES = {
 def test_a_form_has_its_usual_names(name, form):
     assert form_named(name) is form
     assert form_named(f" {name.upper()} ") is form
+
+
+@pytest.mark.parametrize("form", [*Form, *ArrayForm], ids=str)
+def test_a_form_is_found_by_the_name_that_is_shown(form):
+    assert form_named(str(form)) is form
