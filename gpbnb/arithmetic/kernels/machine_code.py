@@ -16,16 +16,24 @@ from numba.core.registry import cpu_target
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """The compiled form of a function, with machine code once its address is asked for."""
 
+    _has_machine_code = False
+
     def _finalize_final_module(self) -> None:
         if self._object_caching_enabled and self._compiled_object:  # loaded from the cache
-            super()._finalize_final_module()
+            self._generate()
         self._finalized = True
+
+    def _generate(self) -> None:
+        super()._finalize_final_module()
+        self._has_machine_code = True
 
     def get_pointer_to_function(self, name: str) -> int:
         self._ensure_finalized()
-        defined = {function.name for function in self._final_module.functions if not function.is_declaration}
-        if name in defined and not self._codegen._engine.is_symbol_defined(name):
-            super()._finalize_final_module()
+        # The engine may already know this name from another function: one that a different process numbered and cached.
+        if not self._has_machine_code and name in {
+            function.name for function in self._final_module.functions if not function.is_declaration
+        }:
+            self._generate()
         return int(super().get_pointer_to_function(name))
 
 

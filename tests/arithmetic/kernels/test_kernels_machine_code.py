@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from numba import njit
+from numba.core.bytecode import FunctionIdentity
 from numba.core.registry import cpu_target
 
 from gpbnb.arithmetic.kernels.compiling import inner
@@ -41,3 +44,21 @@ def test_a_function_that_is_only_compiled_into_others_has_none():
     assert has_machine_code(half_root)
     assert not has_machine_code(root)
     assert half_root(np.array([4.0])) == 1.0
+
+
+def test_functions_of_the_same_name_stay_apart(monkeypatch):
+    """numba numbers functions in each process: one from the cache may have the name of one compiled now."""
+    generate_on_demand()
+    monkeypatch.setattr(FunctionIdentity, "_unique_ids", itertools.repeat(10**9))
+
+    def plus(a):
+        @njit
+        def added(x):
+            return x + a
+
+        return added
+
+    first, second = plus(1.0), plus(2.0)
+    assert (first(0.5), second(0.5), first(0.25)) == (1.5, 2.5, 1.25)
+    names = {each.fndesc.llvm_func_name for f in (first, second) for each in f.overloads.values()}
+    assert len(names) == 1
