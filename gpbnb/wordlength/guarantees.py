@@ -219,7 +219,7 @@ def _bits(
 
     # Errors are nearly proportional to the unit roundoff, so first try near the precision that this predicts.
     near = FORMAT.precision + math.ceil(math.log2((known / tolerance).max()))
-    least, largest = max(near - 2, 2), min(near + 3, LARGEST_PRECISION[2])
+    least, largest = (min(max(near + more, 2), LARGEST_PRECISION[2]) for more in (-2, 3))
     fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=least, largest=largest)
     if fmt is None or fmt.precision == least:
         fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=2, largest=LARGEST_PRECISION[2])
