@@ -258,6 +258,10 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
                 return found
 
     found, outcome = with_the_fault(how), "caught"
+    if codes is not None and not found.stuck and not found.failed:
+        # What was computed, and kept, while the tests were imported does not have the fault.
+        codes, files = None, list(dict.fromkeys(each.partition("::")[0] for each in files))
+        found = with_the_fault(how)
     if not found.stuck and not found.failed:
         count = len(found.seconds)
         found, outcome = with_the_fault(how._replace(pictures=True)), "caught by a stored picture"
