@@ -142,6 +142,7 @@ class TestText:
     def test_digits_are_the_nearest_or_chop_to_the_number(self) -> None:
         # 171 / 512 = 0.333984375 in five digits
         assert str(B8.array("1/3")) == "0.33398"
+        assert str(B8.array("2/3")) == "0.66797"  # 171 / 256 = 0.66796875
         assert str(FloatFormat(2, 8, CHOP).array(Fraction(171, 512))) == "0.33399"
 
     def test_a_value_too_far_for_decimal_digits_has_a_repr_too(self) -> None:

@@ -141,6 +141,7 @@ def test_probabilistic_gamma_grows_like_the_root():
     # expm1 leaves the linear term; the others are of size u n below 1e-6.
     assert gamma_probabilistic(10**4, u) / gamma_probabilistic(100, u) == pytest.approx(10, rel=1e-5)
     assert gamma_probabilistic(0, u) == 0
+    assert failure_of(100, float(u), gamma_probabilistic(100, u)) == pytest.approx(0.01, rel=1e-9)  # unless told
     assert gamma_probabilistic(100, u) < gamma(100, u)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import decimal
+import itertools
 import math
 import operator
 import pickle
@@ -193,6 +194,31 @@ def test_fused_multiply_add_with_cancellation(fmt: FloatFormat, mode: Rounding) 
     near = fmt.array(-(a * b).to_float() * rng.choice([1, 1, 1 + 2.0**-20, 2.0**-30, 2.0**30], 300))
     exact = [expected(p * q + r, fmt) for p, q, r in zip(*(u.to_fractions() for u in (a, b, near)), strict=True)]
     assert a.multiply_add(b, near).to_fractions().tolist() == exact
+
+
+@pytest.mark.parametrize("shapes", [((3,), (3,), (2, 3)), ((3,), (2, 1), (3,)), ((2, 3), (), (3,)), ((), (), (2,))])
+def test_fused_multiply_add_of_shapes_that_differ(shapes: tuple[tuple[int, ...], ...]) -> None:
+    fmt, rng = named.BINARY32, np.random.default_rng(12)
+    x, y, z = (fmt.array(rng.normal(size=shape)) for shape in shapes)
+    exact = np.asarray(x.to_fractions() * y.to_fractions() + z.to_fractions())
+    found = x.multiply_add(y, z)
+    assert found.shape == exact.shape == np.broadcast_shapes(*shapes)
+    assert found.to_fractions().ravel().tolist() == [expected(each, fmt) for each in exact.ravel()]
+
+
+@pytest.mark.parametrize("mode", DETERMINISTIC)
+@pytest.mark.parametrize("subnormal", [True, False])
+@pytest.mark.parametrize("base", [2, 3, 10])
+def test_numbers_far_below_the_smallest(base: int, subnormal: bool, mode: Rounding) -> None:
+    """They become zero or the smallest number, as texts, quotients and integers times a power of the base."""
+    fmt = FloatFormat(base, 3, mode, emin=-3, emax=3, subnormal=subnormal)
+    for digits, power in itertools.product((-3, 2, 11), (5, 12, 25, 26, 27, 28, 29, 31, 40, 400)):
+        exact = digits * Fraction(1, base) ** power
+        assert fmt.round(exact) == expected(exact, fmt)
+        pair = fmt.kernel.from_ratio(digits, 1, -power)
+        assert fmt.kernel.to_fraction(*pair) == expected(exact, fmt)
+        if base == 10:
+            assert fmt.array(f"{digits}e-{power}").to_fractions() == expected(exact, fmt)
 
 
 @pytest.mark.parametrize("mode", DETERMINISTIC)
@@ -430,6 +456,22 @@ class TestSums:
                     assert c[i, j] == linalg.dot(a[i], b[:, j], **options)
         assert not np.array_equal(linalg.matmul(a, b, "pairwise"), a @ b)
 
+    @pytest.mark.parametrize(
+        "shapes", [((4, 2, 3), (4, 3, 2)), ((2, 3), (3, 3, 2)), ((3,), (2, 3, 2)), ((4, 2, 3), (3,))]
+    )
+    def test_stacks_are_summed_in_the_same_order(self, shapes: Any) -> None:
+        rng = np.random.default_rng(3)
+        a, b = (named.BFLOAT16.array(rng.normal(size=shape)) for shape in shapes)
+        differ = []
+        for options in ({"order": "pairwise"}, {"order": "blocked", "block": 2}, {"fused": True}):
+            found = linalg.matmul(a, b, **options)
+            assert found.shape == (a @ b).shape
+            for k in range(max(shapes)[0] if len(shapes[0]) == len(shapes[1]) else len(found)):
+                one = linalg.matmul(a[k] if a.ndim == 3 else a, b[k] if b.ndim == 3 else b, **options)
+                assert np.array_equal(found[k], one)
+            differ.append(not np.array_equal(found, a @ b))
+        assert any(differ)
+
     def test_misuse(self) -> None:
         x = FloatFormat(2, 8).array([1, 2])
         for options, match in (
@@ -510,6 +552,16 @@ def test_misuse_is_explained() -> None:
             FloatFormat(2, 4, **arguments)
     with pytest.raises(ValueError, match="needed one of 'raise', 'saturate', 'wrap'"):
         FixedFormat(1, 2, overflow="clip")
+
+
+def test_sums_need_as_many_digits_as_numbers() -> None:
+    """The machine's formats have 24 and 53."""
+    for fmt, digits in ((named.BINARY32, 24), (named.BINARY64, 53), (FloatFormat(2, 40), 40)):
+        as_many, fewer = FloatFormat(2, digits), FloatFormat(2, digits - 1)
+        for stored, sums in ((fmt, as_many), (as_many, fmt), (fewer, fmt)):
+            assert stored.run_tag(sums=sums).sums == sums.run_tag()
+        with pytest.raises(ValueError, match="needed at least as many digits for sums"):
+            fmt.run_tag(sums=fewer)
 
 
 def test_the_largest_number_has_the_largest_exponent() -> None:

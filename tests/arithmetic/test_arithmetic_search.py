@@ -7,7 +7,7 @@ from fractions import Fraction
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.arithmetic.search import smallest_precision
+from gpbnb.arithmetic.search import Search, smallest_precision
 
 
 def among(good, calls=None):
@@ -38,6 +38,37 @@ def test_a_precision_qualifies_only_if_the_next_one_does_too():
     assert smallest_precision(among({7, *range(9, 20)}), largest=19).precision == 9
     assert smallest_precision(among({19}), largest=19).precision == 19  # there is no higher one to try
     assert smallest_precision(among({10}), largest=19) is None
+
+
+def test_whatever_meets_the_requirement_the_answer_qualifies_and_the_next_lower_one_does_not():
+    """All requirements on eight precisions."""
+    for bits in range(2**8):
+        good, calls = {k + 1 for k in range(8) if bits >> k & 1}, []
+        found = smallest_precision(among(good, calls), largest=8)
+        if found is None:
+            assert 8 not in good
+            continue
+        answer = found.precision
+        assert {answer, min(answer + 1, 8)} <= good & set(calls)
+        assert answer == 1 or answer - 1 in set(calls) - good
+
+
+@pytest.mark.parametrize(
+    ("missed", "answer", "irregular"),
+    [
+        ({16}, 17, range(6, 16)),
+        ({7, 16}, 17, (6, *range(8, 16))),
+        ({16, 17}, None, range(6, 16)),  # 18 alone could be chance
+        ({16, 18}, None, (*range(6, 16), 17)),
+        ({17, 18}, 6, ()),  # 16 refutes nothing, and those above are not tried
+    ],
+)
+def test_above_an_answer_that_is_refuted_every_precision_is_tried(missed, answer, irregular):
+    """In base 10, up to 18 digits, of which 5 and fewer miss the tolerance."""
+    found = Search(lambda fmt: (1 + (fmt.precision < 6 or fmt.precision in missed), ""), FloatFormat(10, 5), (7, 16))
+    assert found.fmt == (None if answer is None else FloatFormat(10, answer))
+    assert found.irregular == tuple(irregular)
+    assert not found.undecided
 
 
 def test_the_neighbours_of_the_answer_are_tried():

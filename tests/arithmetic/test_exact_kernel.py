@@ -106,6 +106,13 @@ class TestSmallFormats:
                     assert k.compare(m1, e1, m2, e2) == (x1 > x2) - (x1 < x2)
 
 
+def test_a_value_too_long_to_write_out_is_refused(nearest: bool) -> None:
+    k = kernel(10, 4, nearest)
+    for e in (-3_010_300, 3_010_300, -(10**8), 10**8):  # ten million bits are 3010299 digits
+        with pytest.raises(OverflowError, match="to write it as a Fraction"):
+            k.to_fraction(1234, e)
+
+
 def lowest(p: int, q: int) -> tuple[int, int]:
     divisor = math.gcd(p, q) if q > 0 else -math.gcd(p, q)
     return p // divisor, q // divisor

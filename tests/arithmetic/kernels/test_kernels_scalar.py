@@ -15,9 +15,11 @@ from numba import njit
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels import scalar
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.elementwise import product
 from gpbnb.arithmetic.kernels.scalar import (
     absolute,
@@ -44,7 +46,7 @@ FORMATS = [
 ]
 
 
-@njit(nogil=True)
+@compiled
 def recursion(fmt: Any, x: Any, y: Any) -> None:
     """Some of every operation; x has two numbers, y as many as steps."""
     a, b = load(fmt, x, 0), load(fmt, x, 1)
@@ -94,6 +96,22 @@ def test_the_recursion_in_the_reference_and_in_float64() -> None:
     z = np.empty(12)
     recursion(Double(), exact.astype(float), z)
     assert max(abs(Fraction(v) - e) for v, e in zip(z.tolist(), expected, strict=True)) < Fraction(1, 2**40)
+
+
+@njit
+def opposite(fmt: Any, a: Any) -> Any:
+    return negative(fmt, a)
+
+
+def test_only_the_lowest_fixed_point_number_has_no_opposite() -> None:
+    """NaN marks an overflow."""
+    for overflow, beyond in (("raise", np.nan), ("saturate", 0.875)):
+        tag = FixedFormat(0, 3, overflow=overflow).run_tag()
+        found = [opposite(tag, k / 8) for k in range(-8, 8)]
+        assert np.array_equal(found, [beyond, *(-k / 8 for k in range(-7, 8))], equal_nan=True)
+    tag = FloatFormat(2, 4, emin=-3, emax=3).run_tag()
+    for x in (15.0, -15.0, 0.0, 2.0**-6):
+        assert opposite(tag, x) == -x
 
 
 @pytest.mark.parametrize("fmt", FORMATS, ids=str)
