@@ -267,6 +267,19 @@ def test_an_inverse_of_three_rows(kernel, monkeypatch):
             assert abs(F(Y[i, j]) - exact[i][j]) <= F(error[i, j]) < 1e-12
 
 
+@pytest.mark.parametrize("S", [[[6, 1], [9, 2]], [[9, 2], [6, 1]], [[3, 1], [9, 4]], [[7, 10], [7, 11]]])
+def test_the_inverse_counts_as_one_from_the_left(kernel, monkeypatch, S):
+    """Here SY is the identity in float64 although Y is not the inverse, so that only YS tells of the error."""
+    monkeypatch.setattr(kernel, "_many", lambda n, m: 0.0)
+    (a, b), (c, d) = S
+    Y, error = kernel._inverse_general(np.array(S, dtype=float))
+    assert np.array_equal(np.array(S) @ Y, np.eye(2))
+    exact = [[F(d, a * d - b * c), F(-b, a * d - b * c)], [F(-c, a * d - b * c), F(a, a * d - b * c)]]
+    off = [[abs(F(Y[i, j]) - exact[i][j]) for j in range(2)] for i in range(2)]
+    assert max(max(row) for row in off) > 0
+    assert all(off[i][j] <= F(error[i, j]) for i in range(2) for j in range(2))
+
+
 def test_only_a_positive_matrix_counts_as_one(kernel):
     """The eigenvalues of B are 3.5 and 0.5, its diagonal is 2."""
     B = np.array([[2.0, 1.5], [1.5, 2.0]])

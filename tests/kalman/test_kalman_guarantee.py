@@ -298,6 +298,11 @@ def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
     found = guarantee(model, FloatFormat(2, 11), limits(2, 1, state=10, innovation=10))
     assert not found.for_ever
     assert "lost definiteness" in found.why or "singular" in found.why
+    stored = model.rounded(FloatFormat(2, 11))
+    run = Run(stored, FloatFormat(2, 11), Form.INNOVATION, range(1, 9))
+    run.take(run.fmt.array(np.zeros((8, 1))))
+    assert found.schedule.steps == run.indefinite == 2
+    assert not run.stopped
 
 
 def test_an_integrator_has_no_bound_for_all_time() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from tabulated import by_header
 
 from gpbnb import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import YEAR
 from gpbnb.kalman.guarantee import horizon
@@ -52,6 +54,17 @@ def test_a_bound_above_the_assumed_error_ends_it() -> None:
     fmt, within = FloatFormat(2, 24), limits(2, 1, state=[10, 20], innovation=5)
     with pytest.raises(ArithmeticError, match="exceeds the assumed"):
         list(bounds_in_blocks(constants(), fmt, [within], [[1e-9, 1e-9]], STEPS))
+
+
+def test_a_covariance_that_loses_definiteness_ends_it() -> None:
+    model = replace(constants(), R=exact([["1e-12"]]), P0=exact([["1e4", "0"], ["0", "1e4"]]))
+    fmt, within = FloatFormat(2, 11), limits(2, 1, state=[10, 20], innovation=5)
+    run = Run(model.rounded(fmt), fmt, Form.INNOVATION, range(1, 4))
+    run.take(fmt.array(np.zeros((3, 1))))
+    assert run.indefinite
+    assert not run.stopped
+    with pytest.raises(ArithmeticError, match="the filter stopped or its covariance lost definiteness by step 3"):
+        next(bounds_in_blocks(model, fmt, [within], [[9, 9]], 3))
 
 
 def test_stored_bounds_of_gravity_probe_b() -> None:

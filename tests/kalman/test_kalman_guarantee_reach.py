@@ -23,6 +23,7 @@ def disturbed(seed: int, rows: int = STEPS) -> tuple[Any, ...]:
     T = rng.standard_normal((N, N))
     F = np.array([T @ turn @ np.linalg.inv(T) * rng.uniform(0.98, 1.0) for _ in range(rows)])
     G, bounds = rng.standard_normal((rows, N, COLUMNS)), rng.uniform(0, 1, (rows, COLUMNS))
+    bounds[::2, 1], bounds[1::2, 1], bounds[::3, 2] = 1, 0, 0
     return F, np.zeros((rows, N, N)), G, bounds, rng.uniform(0, 0.1, (rows, N)), np.array([0, 1, 2, 0])
 
 

@@ -38,9 +38,10 @@ def test_a_row_comes_out_again(seed: int) -> None:
 
 
 def test_the_command_computes_rows_again_into_the_same_folder(tmp_path) -> None:
+    folder = tmp_path / "of" / "results"
     for _ in range(2):
-        assert survey.main(["--rows", "1", "--output", str(tmp_path)]) == 0
-    lines = (tmp_path / survey.FILE.name).read_text(encoding="utf-8").splitlines()
+        assert survey.main(["--rows", "1", "--output", str(folder)]) == 0
+    lines = (folder / survey.FILE.name).read_text(encoding="utf-8").splitlines()
     assert lines[-1].split(",")[:6] == ["0", "3", "1", "10", str(survey.load()[0].precision), survey.load()[0].rounding]
 
 

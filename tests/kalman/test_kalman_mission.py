@@ -64,6 +64,20 @@ def test_the_scale_factor_and_the_roll_phase_multiply_the_rolled_signal():
     assert H[:, 7] == pytest.approx((east * c - north * s) * mission.roll_phase, abs=52 * 2.0**-13)
 
 
+def test_the_telescope_measures_pointing_and_the_gyro_the_drift_as_well():
+    """With the cosine and sine of the roll phase, and a bias each; the telescope knows nothing of drift and signal."""
+    mission = Mission(occultation=False)
+    H = mission.matrices(5, 2)
+    turn, _ = mission.phases(5 * BLOCK + 1 + np.arange(BLOCK))
+    states = [state for state, _ in STATES]
+    c, s, one = np.cos(turn), np.sin(turn), np.ones(BLOCK)
+    gyro = {0: c, 1: s, 4: c, 5: s, 8: one, 9: one}
+    telescope = {4: c, 5: s, 9: one}
+    for row, columns in ((0, gyro), (1, telescope)):
+        for at in [*range(6), 8, 9, *(range(6, len(states)) if row else ())]:
+            assert H[:, row, at] == pytest.approx(columns.get(at, 0 * one), abs=2.0**-13), (row, states[at])
+
+
 @pytest.mark.parametrize("base", [2, 10])
 def test_matrices_are_held_exactly_by_every_format_of_the_sweep(base):
     H = Mission().matrices(300, base)
@@ -124,6 +138,15 @@ def test_the_sweep_changes_one_choice_at_a_time():
     found = mission_runs.rows(cell, mission_runs.compute(replace(cell, count=2), steps=500))
     assert next(row[:7] for row in found) == cell.key
     assert len(found) == 2 * len(cell.precisions)
+
+
+def test_every_cell_of_the_sweep_can_be_computed():
+    heads = [(*head, cell.first) for cell in mission_runs.CELLS for head in cell.heads()]
+    assert len(set(heads)) == len(heads)
+    for cell in mission_runs.CELLS:
+        found = mission_runs.lockstep(replace(cell, count=1), 1)
+        assert str(found.runs[0].form) == {"hung": "Hung (1984)", "innovation": "innovation"}[cell.form]
+        assert [run.fmt.precision for run in found.runs] == list(cell.precisions)
 
 
 def test_the_filter_learns_the_roll_phase():

@@ -20,6 +20,11 @@ def both(fmt, a, b, c, d):
 
 
 @compiled
+def by_columns(fmt, a, b, c):
+    product_by_columns(fmt, a, b, c)
+
+
+@compiled
 def add_into(fmt, a, c):
     add_transposed(fmt, a, c)
 
@@ -68,6 +73,9 @@ def test_what_leaves_the_range_is_reported():
     for sizes in ((2.0**-900, 2.0**-900), (2.0**900, 2.0**900)):
         with pytest.raises(OverflowError):
             products(fmt, np.full((2, 2), sizes[0]), np.full((2, 2), sizes[1]))
+        run = run_of(fmt)
+        with pytest.raises(OverflowError):
+            by_columns(run.tag, *(run.as_packed(np.full((2, 2), size)) for size in (*sizes, 1.0)))
 
 
 def test_a_sparse_matrix_is_added_transposed():

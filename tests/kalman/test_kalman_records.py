@@ -14,7 +14,7 @@ from gpbnb.kalman import threshold
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.records import pairs_as_floats, update_largest
-from gpbnb.kalman.lockstep import REFERENCE, error_rows
+from gpbnb.kalman.lockstep import REFERENCE, error_rows, run_lockstep
 from gpbnb.kalman.records import Records
 from gpbnb.kalman.threshold import CELLS, FORMS, STATES, Cell, SimpleYear, compute, lockstep, rows, sample
 from gpbnb.kalman.year_cases import MODELS, model
@@ -150,6 +150,16 @@ def test_an_interrupted_cell_goes_on(tmp_path):
     other.restore(tmp_path / "some.npz")
     other.restore(tmp_path / "none.npz")
     assert other.block == 0
+
+
+@pytest.mark.parametrize(("blocks", "saved"), [(1, [1, 2, 3]), (2, [2]), (3, [3]), (4, [])])
+def test_a_cell_is_saved_after_every_so_many_blocks(blocks, saved, tmp_path, monkeypatch):
+    whole, seen = lockstep(SMALL, 10_000), []  # three blocks
+    monkeypatch.setattr(whole, "advance", lambda: setattr(whole, "block", whole.block + 1))
+    monkeypatch.setattr(whole, "save", lambda file: seen.append(whole.block))
+    run_lockstep(whole, tmp_path, blocks)
+    assert seen == saved
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_sample_is_one_record_computed_alone(monkeypatch):

@@ -142,6 +142,22 @@ def test_factors_are_those_of_the_raised_covariance():
     raise AssertionError("no factors were raised")
 
 
+@pytest.mark.parametrize("letter", ["Q", "R", "P0"])
+def test_each_covariance_is_raised_by_itself(letter):
+    """This one is definite in 24 bits, but its computed factors are not."""
+    fmt, one = FloatFormat(2, 24), np.eye(3, dtype=int)
+    given = exact([["4058.0002", "-176", "430"], ["-176", "4264.00001", "7812"], ["430", "7812", "14452.00002"]])
+    units = {"Phi": one, "H": one, "Q": one, "R": one, "x0": [0, 0, 0], "P0": one}
+    model = LinearModel(**(units | {letter: given}), repair=True)
+    assert model.rounded(fmt).repairs == ()
+    run = Run(model, fmt, Form.UD, ())
+    assert [each.letter for each in run.repairs] == [letter]
+    sizes = np.sqrt(np.diagonal(given).astype(float))
+    for name, factors in (("Q", run.UQ[0]), ("R", run.UR[0]), ("P0", run.P)):
+        off = covariance_of_factors(run.exactly(factors)) - (given if name == letter else one)
+        assert np.abs(off / np.multiply.outer(sizes, sizes)).max() <= 2 * run.repairs[0].shift + 24 * 2.0**-24
+
+
 def test_the_search_for_the_least_change():
     found = raised_until(exact([[1, 2], [2, 1]]), is_definite, 0.125, 4)
     assert found is not None

@@ -15,6 +15,7 @@ from gpbnb.kalman.filter_run import Run, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
 from gpbnb.kalman.simulation import BLOCK
+from gpbnb.kalman.stored import same_errors
 from gpbnb.kalman.year import HEADER
 from gpbnb.kalman.year_cases import BOUNDED_CASES, CASES, MODELS, Case
 from gpbnb.kalman.year_runs import ResumableRun, run_cases
@@ -258,6 +259,19 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
     assert ResumableRun(SINGLE, parts, STEPS).run.steps == 0
 
 
+def test_progress_reaches_the_end(tmp_path, capsys):
+    for _ in range(2):  # the second time, nothing is left to do
+        run_cases([SINGLE], tmp_path, 100)
+        assert "year: 100%" in capsys.readouterr().err
+
+
+def test_rows_of_a_year_agree_in_all_but_the_last_digits_of_an_eigenvalue():
+    row = ("hung", "24", "1.5", "0.001")
+    assert same_errors(row, ("hung", "24", "1.5", "0.00100001"))
+    assert not same_errors(row, ("hung", "24", "1.5", "0.00101"))
+    assert not same_errors(row, ("hung", "24", "1.6", "0.001"))
+
+
 def test_progress_counts_the_steps_of_a_run(tmp_path):
     shown = []
     ResumableRun(SINGLE, tmp_path, STEPS).advance(3, SimpleNamespace(update=shown.append))
@@ -303,4 +317,5 @@ def test_a_year_that_lost_its_variance_says_when():
 
 def test_a_case_is_bounded_only_where_the_others_rest_on_it(tmp_path):
     assert isinstance(ResumableRun(SINGLE.reference, tmp_path, 10).run, BoundedRun)
+    assert ResumableRun(SINGLE, tmp_path, 10).seconds == 0
     assert not isinstance(ResumableRun(SINGLE, tmp_path, 10).run, BoundedRun)
