@@ -103,6 +103,21 @@ def test_precessions_are_perpendicular(axes):
     assert {"geodetic", "frame dragging", "Earth's axis"} <= set(names)
 
 
+def test_the_earth_is_a_sphere_within_a_circular_orbit(axes, monkeypatch):
+    (solid, _) = figures.in_space(axes[0].figure, axes)
+    drawn = []
+    monkeypatch.setattr(solid, "plot_surface", lambda *surface, **_: drawn.append(surface))
+    _, orbit, *_ = figures.precessions(solid, -0.14)
+    ((x, y, z),) = drawn
+    assert np.allclose(np.hypot(np.hypot(x, y), z), 0.45)
+    assert (z.min(), z.max()) == pytest.approx((-0.45, 0.45))
+    x, y, z = orbit.get_data_3d()
+    assert np.allclose(np.hypot(x, z), 1)
+    assert not y.any()
+    angle = np.unwrap(np.arctan2(z, x))
+    assert angle[-1] - angle[0] == pytest.approx(2 * np.pi)
+
+
 def test_table_of_misalignments(both):
     table = tables.misalignments({"gamma1 and gamma2": both})
     (row,) = table.body

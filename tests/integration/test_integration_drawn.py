@@ -425,6 +425,9 @@ def test_best_rates(ax):
     heights = {text: names[text][1][1] for text in DURATIONS}
     ends = {text: ax.lines[2 * i].get_ydata()[2] for i, text in enumerate(DURATIONS)}
     assert sorted(heights, key=heights.__getitem__) == sorted(ends, key=ends.__getitem__)
+    bottom, top = ax.get_ylim()
+    assert 10 * max(heights.values()) == pytest.approx(top)  # room for half a name
+    assert bottom == 100
     for text in sorted(heights, key=heights.__getitem__):
         expected = max(math.log10(ends[text]), last + 1.2)
         assert math.log10(heights[text]) == pytest.approx(expected)

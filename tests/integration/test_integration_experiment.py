@@ -94,6 +94,14 @@ def test_pieces_carry_the_samples_before():
     assert chunks[0].d.shape == (20, 2)
 
 
+def test_a_piece_has_a_cycle_at_least(monkeypatch):
+    monkeypatch.setattr(experiment, "CHUNK", 24)
+    for paths in (11, 12, 13, 100):  # two numbers for each path and cycle
+        chunks = list(experiment.chunks(FIRST, 2.0, 3, rng(4), paths))
+        assert [chunk.first for chunk in chunks] == [1, 2, 3]
+        assert {chunk.d.shape for chunk in chunks} == {(1, paths)}
+
+
 def test_pieces_follow_each_other(monkeypatch):
     monkeypatch.setattr(experiment, "CHUNK", 24)
     chunks = list(experiment.chunks(FIRST, 2.0, 20, rng(4), 2, memory=3))

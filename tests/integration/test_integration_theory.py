@@ -399,6 +399,7 @@ BAD = [
     (lambda: theory.series(0), "got terms = 0; needed at least 1"),
     (lambda: theory.error_variance(-1, 1.0), "needed cycles, at least 0"),
     (lambda: theory.error_variance(1, 1.0, start=-0.1), "got start = -0.1"),
+    (lambda: theory.error_variance(1, 1.0, start=math.inf), "got start = inf"),
     (lambda: theory.settling_cycles(1.0, 0.0), "got share = 0.0"),
     (lambda: theory.resonant(1.0, 1.0, 1.0), "got zeta = 1.0; needed 0 < zeta < 1; use first_order"),
     (lambda: theory.first_order(1.0, NAN), "got omega_bw = nan"),

@@ -11,7 +11,7 @@ from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.ledger.checks.rolling import material
-from gpbnb.rolling import experiment, theory
+from gpbnb.rolling import experiment, stored, theory
 from gpbnb.rolling.flicker import record
 from gpbnb.rolling.stored import SWEEP
 from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
@@ -172,6 +172,12 @@ def test_the_stored_survey_agrees_with_theory():
     gain = study.standard_error()[0] / study.standard_error()[-1]
     expected = theory.rolling_gain(77.5) * (8 / 9) ** 0.5
     assert gain == pytest.approx(expected, rel=4 * 2**0.5 * study.uncertainty())
+
+
+def test_a_sample_of_the_survey_has_one_to_three_gyros(monkeypatch):
+    monkeypatch.setattr(stored, "compute", lambda gyros: gyros)
+    rng = np.random.default_rng(1)
+    assert {stored.sample(20, rng) for _ in range(30)} == {1, 2, 3}
 
 
 def test_the_stored_survey_is_computed_again_for_one_gyro_to_the_last_digit():

@@ -46,6 +46,11 @@ def test_a_sum_of_exponentials_is_the_response_to_the_accuracy_asked_for(accurac
     assert len(poles) < 150
 
 
+def test_the_accuracy_has_limits():
+    few, many = (len(exponentials(accuracy, 1000)[0]) for accuracy in (0.1, 1e-12))
+    assert 2 < few < many / 8
+
+
 def test_it_is_accurate_for_three_thousand_years():
     poles, weights = exponentials()
     for k in (1e7, 1e8, 1e9, 1e10):

@@ -117,6 +117,19 @@ def test_a_rotation_that_is_chopped_away_is_no_wrong_digit():
         experiment.recursion(FloatFormat(2, 5, CHOP), 600.0, [20000])
 
 
+def test_before_the_first_sample_nothing_has_been_rounded():
+    found = experiment.recursion(FloatFormat(10, 8), 77.5, [0, 10])
+    assert found.size[0] == 0
+    assert found.size[1] == experiment.recursion(FloatFormat(10, 8), 77.5, [10]).size[0]
+
+
+@pytest.mark.parametrize("marks", [[1000], [10, 1000]])
+def test_the_last_sample_decides_on_the_digits_that_are_tried(marks):
+    digits = experiment.digits_needed_observed("direct", 10, 6600.0, 77.5, marks, 1e-6)
+    errors = [experiment.direct(FloatFormat(10, digits + k), 77.5, marks).drift_error(6600.0) for k in (-1, 0)]
+    assert errors[1] <= 1e-6 < errors[0]
+
+
 def test_what_a_rotation_costs_a_drift():
     found = experiment.recursion(FloatFormat(10, 8), 77.5, [10, 100, 1000])
     errors = found.size * np.array([100, 1000, 10000]) * 6600.0 / theory.YEAR

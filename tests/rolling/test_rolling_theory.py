@@ -304,6 +304,12 @@ def test_digits_needed_is_the_least(base):
     assert bound(betas[1]) <= 1 / 6600 < bound(betas[0])
 
 
+def test_two_bits_may_be_enough():
+    """With the unit roundoff 1/4, direct_bound is 3 for a phase of 1, and 1/4 more."""
+    for largest, digits in ((3.25, 2), (3.24, 3)):
+        assert theory.digits_needed(lambda beta: theory.direct_bound(1.0, beta), 2, largest) == digits
+
+
 REFUSED = [
     (theory.largest_phase, (DRIFTS, 0.0), "got an error of 0.0 for a drift of 6600.12; needed 0 < error <= 13200.2"),
     (theory.largest_phase, (DRIFTS, 1e5), "got an error of 100000.0"),
