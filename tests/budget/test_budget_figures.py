@@ -28,6 +28,9 @@ def test_budget_curve(ax):
     assert one.get_color() == other.get_color() == style.VALID
     assert "printed example" in [each.get_text() for each in names]
     assert ax.get_ylabel() == "error of each (mas/yr)"
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert left <= 1 < 50 < right
+    assert bottom <= 1 / 50 < 1.253 < top
 
 
 def test_shares(ax):

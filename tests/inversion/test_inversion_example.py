@@ -200,6 +200,13 @@ class TestSearch:
         assert (decreasing.holds, same.holds, above.holds) == (0, 1, 0)
         assert above.exception.endswith("x, column sum")
 
+    @pytest.mark.parametrize(("values", "holds"), [((1.0, 1.0, 1e-9), 0), ((1e-9, 1.0, 1.0), 0), ((1.0, 1.0, 1.0), 1)])
+    def test_a_bound_is_conservative_if_it_is_above_every_error(self, values, holds, monkeypatch):
+        first = example.bound_readings()[0]
+        one = example.Column(first.wordlength, first.wordlength, "x", "column sum", False, values)
+        monkeypatch.setattr(example, "bound_readings", lambda: (one,))
+        assert example.claims()[2].holds == holds
+
 
 def norm_of(error, norm):
     sizes = abs(error)

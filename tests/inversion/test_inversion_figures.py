@@ -71,6 +71,8 @@ def test_violations(ax):
     assert [label.get_text() for label in ax.get_yticklabels()] == ["random", "Kahan"]
     assert legend_of(ax) == ["x", "norm of (95), $A_T^{-1}$"]
     assert "(%)" in ax.get_xlabel()
+    (alone,) = figures.violations(Frozen({}, tuple(rows[::2])), ("x",), ax)
+    assert list(alone.get_xdata()) == [0, 5]
     with pytest.raises(ValueError, match="got 5 bounds; needed at most 4"):
         figures.violations(Frozen({}, tuple(rows)), ("x",) * 5, ax)
 

@@ -82,6 +82,9 @@ def test_growth(ax):
     named = {"like signs,\nnearest", "like signs,\nchop", "constant,\nnearest", "bound $n-1$", r"$\sqrt{n}$ law"}
     assert set(names_of(ax)) == named
     assert (colour(bound), colour(law)) == (style.VALID, style.REFUTED)
+    for curve, text in ((bound, "bound $n-1$"), (law, r"$\sqrt{n}$ law")):
+        (place,) = (each.xy for each in ax.texts if each.get_text() == text)
+        assert place in list(zip(curve.get_xdata(), curve.get_ydata(), strict=True))
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
     check_names(ax, "terms $n$", r"error of the sum / $\beta\sum|x_j|$")
 

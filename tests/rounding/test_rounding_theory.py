@@ -350,3 +350,16 @@ def test_a_strict_bound_of_many_terms_of_any_kind_is_the_exact_one_and_little_mo
     sizes = map(abs, exact(terms))
     true = sum(gamma(w, fmt.unit_roundoff) * size for w, size in zip(theory.sum_weights(1200), sizes, strict=True))
     assert true <= found <= true * (1 + Fraction(1, 2**45))
+
+
+@pytest.mark.parametrize("kind", [np.longdouble, object])
+def test_terms_that_float64_does_not_hold_are_not_rounded(kind):
+    tiny = Fraction(1, 2**60)
+    x = np.array([1 + tiny] * 1001, dtype=object)
+    if kind is np.longdouble:
+        x = np.full(1001, np.longdouble(1) + np.longdouble(2) ** -60)
+        tiny = x[0].as_integer_ratio()
+        tiny = Fraction(*tiny) - 1  # zero where a long double is a float64
+    beta = Fraction(1, 2**53)
+    one = sum(gamma(w, beta) for w in theory.sum_weights(1001))
+    assert theory.strict_sum_bound(x, beta) == one * (1 + tiny)
