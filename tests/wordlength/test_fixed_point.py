@@ -112,6 +112,15 @@ def test_answers_count_fraction_bits() -> None:
     assert named.tried == proved.tried
 
 
+def test_a_tolerance_that_no_format_meets_has_no_answer() -> None:
+    given, z = tracked()
+    answer = fixed_point.required_fraction_bits(given, z, 1e-30, "guarantee")
+    assert (answer.fmt, answer.basis) == (None, "guarantee")
+    assert answer.tried[-1][0] == 59
+    assert all(ratio > 1 for _, ratio in answer.tried)
+    assert str(answer).startswith("no format, by guarantee: 59 fraction bits give ")
+
+
 def test_overflow_names_operation_and_step() -> None:
     given, z = tracked()
     narrow = FixedFormat(fixed_point.integer_bits(given, z) - 2, 15)
@@ -126,5 +135,10 @@ def test_scaling_keeps_what_occurs_below_one() -> None:
     given, z = tracked()
     assert fixed_point.integer_bits(given, z) <= 0
     assert (np.abs(z).max(axis=0) * 2 < 2.0 ** given.measurement.astype(float)).all()
-    with pytest.raises(ValueError, match="needed errors above 0"):
-        fixed_point.required_fraction_bits(given, z, 0.0)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, [0.1, 0.0], [-0.1, 0.1], [0.1, math.nan], math.inf])
+def test_a_tolerance_is_above_zero_for_each_state_and_finite_for_one(tolerance: Any) -> None:
+    given, z = tracked()
+    with pytest.raises(ValueError, match="needed errors above 0, one of them finite"):
+        fixed_point.required_fraction_bits(given, z, tolerance)

@@ -52,6 +52,15 @@ def test_arrays_and_compiled_runs_give_the_same_digits(processor: Processor) -> 
     assert np.array_equal(estimates(model, MEASURED, processor.fmt, times, processor.compensated), run.checkpoints().x)
 
 
+def test_the_error_is_the_largest_distance_from_the_exact_filter() -> None:
+    model = examples.tilt()
+    rounded, precise = (estimates(model, MEASURED, fmt, linalg.matmul) for fmt in (BINARY16, FloatFormat(2, 90)))
+    expected = abs(rounded - precise).max(axis=0).astype(float)
+    found = processors.outcome(model, MEASURED, Processor("half", BINARY16))
+    assert found.error == pytest.approx(expected, rel=1e-9)
+    assert found.refused == ""
+
+
 def test_products_in_blocks_are_fused_in_the_wider_format() -> None:
     rng = np.random.default_rng(4)
     a, b = BFLOAT16.array(rng.normal(size=(2, 5))), BFLOAT16.array(rng.normal(size=(5, 3)))
@@ -115,6 +124,13 @@ def test_a_compensated_sum_is_better_and_a_stochastic_one_unbiased() -> None:
     assert abs(found["bfloat16 alone, compensated"] / exact - 1) < 0.01
     assert abs(found["bfloat16 alone, stochastic rounding"] / exact - 1) < 0.3
     assert found["Cortex-M4F, binary32"] == exact
+
+
+def test_a_compensated_sum_counts_each_term_once() -> None:
+    x = BFLOAT16.array([[1.0, 3.0], *[[2.0**-9, 2.0**-8]] * 512])  # each is below half a unit of the sum
+    assert processors.compensated_sum(x).tolist() == [2.0, 5.0]
+    assert processors.compensated_sum(x[:1]).tolist() == [1.0, 3.0]
+    assert processors.integrators()[2].add(x.to_float()).tolist() == [1.0, 3.0]
 
 
 def test_variants_differ_in_one_property_each() -> None:

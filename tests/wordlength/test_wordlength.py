@@ -275,6 +275,18 @@ def test_a_row_of_the_table_of_guarantees_is_as_stored():
     assert guarantees.compute(case)._replace(seconds=expected.seconds) == expected
 
 
+@pytest.mark.parametrize("halvings", [-9, 0, 13])
+def test_each_bit_of_a_guarantee_halves_its_bound(halvings):
+    case = next(case for case in guarantees.CASES if case.make().name == "a second-order section")
+    made = case.make()
+    bound = guarantees._found(case, made, guarantees.FORMAT).bound  # in 24 bits
+    for room, more in ((1.02, 0), (0.98, 1)):
+        tolerance = room * bound / 2.0**halvings
+        assert guarantees._bits(case, made, "guarantee", tolerance, bound) == str(24 + halvings + more)
+    assert guarantees._bits(case, made, "guarantee", bound * 2.0**40, bound) != ""
+    assert guarantees._bits(case, made, "guarantee", bound / 2.0**40, bound) == ""
+
+
 def test_inverse_knows_its_condition():
     matrix = examples.normal_matrix(2, range(11))
     found = study.inverse_precision("fit", matrix, 1e-3)
