@@ -8,13 +8,11 @@ import os
 from datetime import UTC, datetime
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import gpbnb
 from gpbnb.kalman import year
 from gpbnb.kalman.stored import YEAR, first_steps
-from gpbnb.rolling import stored as rolling
 from gpbnb.sweeps import DamagedFileError
 from gpbnb.sweeps.__main__ import SWEEPS
 
@@ -75,12 +73,6 @@ def test_the_first_steps_include_the_last_of_them():
     """Of the checkpoints, three a decade."""
     case = next(case for case in YEAR.cells() if case.fmt is not None)
     assert [row[5] for row in first_steps(case, steps=10)] == ["1", "2", "5", "10"]
-
-
-def test_a_sample_of_the_drift_rates_has_one_to_three_gyros(monkeypatch):
-    monkeypatch.setattr(rolling, "compute", lambda gyros: gyros)
-    rng = np.random.default_rng(1)
-    assert {rolling.sample(20, rng) for _ in range(30)} == {1, 2, 3}
 
 
 def test_a_year_is_verified_by_its_first_steps():

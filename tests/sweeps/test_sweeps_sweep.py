@@ -172,6 +172,14 @@ def test_a_sample_of_what_is_stored_is_verified(sweep):
         assert len(verify([sweep, sweep], 10, 1)) == 2
 
 
+def test_progress_of_a_verification_is_shown_if_asked_for(sweep, capsys):
+    sweep.store(EXPECTED)
+    sweep.verify(2, seed=1)
+    assert capsys.readouterr().err == ""
+    sweep.verify(2, seed=1, progress=True)
+    assert "2/2 [" in capsys.readouterr().err
+
+
 def test_a_part_of_the_cells_may_be_stored(sweep):
     sweep.store(EXPECTED[3:5])
     assert sweep.load().provenance["cells"] == "2 of 10"
