@@ -60,6 +60,15 @@ def test_examples_and_sliders_keep_within_what_is_taken(calculator):
 
 
 @CALCULATORS
+def test_counts_are_whole_and_sliders_over_a_thousandfold_are_logarithmic(calculator):
+    for each in calculator.inputs:
+        if not each.choices:
+            assert each.whole == (each.name in ("b", "t", "n", "m", "k")), each.name
+            low, high = each.slider
+            assert each.log == (high > 1000 * low > 0), each.name
+
+
+@CALCULATORS
 def test_sliders_move_by_whole_numbers_hundredths_of_a_decade_or_thousandths_of_their_range(calculator):
     shown = page.form(calculator)
     for each in calculator.inputs:
@@ -140,6 +149,7 @@ def test_nothing_is_fetched():
         (0.00012345678, "1.235\u00a0×\u00a010⁻⁴"),
         (Fraction(1, 3), "0.3333"),
         (12345.67, "12350"),
+        (-12.345, "-12.35"),
         (99999.9, "1.000\u00a0×\u00a010⁵"),
         (-2.5e-12, "-2.500\u00a0×\u00a010⁻¹²"),
         (math.nan, "—"),

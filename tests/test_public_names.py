@@ -1,0 +1,36 @@
+"""The names of the package itself lead to the modules that define them."""
+
+from importlib import import_module
+
+import pytest
+
+import gpbnb
+
+HOMES = {
+    "arithmetic.formats": "FloatFormat Rounding",
+    "arithmetic.fixed": "FixedFormat",
+    "arithmetic.array": "FloatArray",
+    "arithmetic.named": "BINARY16 BINARY32 BINARY64 BINARY128 BFLOAT16 TF32 FP8_E4M3 FP8_E5M2 DECIMAL32 DECIMAL64 "
+    "DECIMAL128 IBM_HEX32 IBM_HEX64 IBM_704",
+    "kalman.model": "LinearModel",
+    "kalman.system": "LinearSystem",
+    "kalman.precision": "required_precision",
+    "wordlength.models": "read_model",
+    "wordlength.records": "survey_records",
+}
+
+
+@pytest.mark.parametrize(("home", "names"), HOMES.items())
+def test_a_public_name_is_what_its_module_defines(home, names):
+    module = import_module(f"gpbnb.{home}")
+    for name in names.split():
+        assert getattr(gpbnb, name) is getattr(module, name)
+
+
+def test_the_public_names_are_these():
+    names = {name for some in HOMES.values() for name in some.split()} | {"linalg", "NAMED_FORMATS"}
+    assert dir(gpbnb) == sorted(gpbnb.__all__) == sorted(names)
+    assert gpbnb.linalg is import_module("gpbnb.arithmetic.linalg")
+    assert list(gpbnb.NAMED_FORMATS) == HOMES["arithmetic.named"].split()
+    with pytest.raises(AttributeError, match="no attribute 'BINARY8'; the public names are BFLOAT16, "):
+        _ = gpbnb.BINARY8
