@@ -56,8 +56,17 @@ def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
 
 
 def check_texts(rows: Iterable[Row]) -> None:
-    """What differs has a note, and what was compared a number."""
+    """What differs has a note, and what was compared a number; no note says seven words twice, or those of the result.
+
+    A text that is joined from other parts than was meant, or in another order, repeats some of them or ends in a space.
+    """
     for row in rows:
+        for text in (row.finding.note, row.finding.recomputed):
+            assert text == " ".join(text.split()), row.statement.id
+        words = row.finding.note.split()
+        runs = [" ".join(words[i : i + 7]) for i in range(len(words) - 6)]
+        assert len(set(runs)) == len(runs), row.statement.id
+        assert not any(run in row.finding.recomputed for run in runs), row.statement.id
         assert row.finding.note or row.finding.verdict is Verdict.VERIFIED, row.statement.id
         assert row.finding.recomputed or row.finding.agrees is None, row.statement.id
 

@@ -91,6 +91,9 @@ def test_sums_products_and_largest_values_run_over_their_index():
     assert Relation("Largest(x[j],(j,1,2))").value({"x": x}, exact) == 3
     n = sp.Symbol("n")
     assert sp.expand(Relation("Sum(j,(j,1,n))").value() - n * (n + 1) / 2) == 0
+    assert sp.simplify(Relation("Prod(2*j,(j,1,n))").value() - 2**n * sp.factorial(n)) == 0
+    assert Relation("Int(x**2,(x,0,n))").value() == n**3 / 3
+    assert Relation("Int(x,(x,1,3))").value() == 4
     with pytest.raises(ValueError, match="needed whole numbers"):
         Relation("Max(j,(j,1,n))").value()
     with pytest.raises(ValueError, match="index, first, last"):
@@ -225,3 +228,5 @@ def test_numbers_and_words_are_shown_as_printed():
     number, words = read("total: .1250e-3 mas; verb: $a$ grows | shrinks")
     assert number.markdown() == r"$.1250\times10^{-3}\ \text{mas}$"
     assert words.markdown() == "$a$ grows"
+    (share,) = read("share: 12.50 %")
+    assert share.markdown() == r"$12.50\ \text{\%}$"

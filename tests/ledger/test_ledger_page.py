@@ -9,7 +9,7 @@ from markup import Elements
 
 from gpbnb import ledger
 from gpbnb.ledger import Row, load_statements, page
-from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, unverifiable
+from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, given, unverifiable
 from gpbnb.ledger.statements import DOCUMENTS, Statement
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
@@ -123,6 +123,39 @@ def test_the_error_table_has_a_row_for_each_root_error_with_all_its_statements()
     assert all(page.address(row.statement) in lines[0] and f"note {i}" in lines[0] for i, row in enumerate(shared))
     assert "a note of its own" in lines[1]
     assert "<details>" not in lines[1]
+
+
+def test_of_equally_serious_errors_the_one_with_more_statements_comes_first():
+    notes = ["one", "three", "three", "two", "three", "two"]
+    rows = [Row(s, compare(False, "1", Verdict.WRONG, note)) for s, note in zip(STATEMENTS, notes, strict=False)]
+    rows.append(Row(STATEMENTS[6], compare(False, "1", Verdict.MISPRINT, "last")))
+    rows += [Row(s, compare(False, "1", Verdict.MISPRINT, "four")) for s in STATEMENTS[7:11]]
+    html = ledger.error_table(rows).html
+    assert re.findall(r'<tr><th scope="row">(\w+)</th>', html) == ["three", "two", "one", "four", "last"]
+
+
+def test_root_errors_begin_with_the_one_that_spoils_most():
+    first, second, third = list(ledger.load_roots())[:3]
+    roots = [first, second, second, second, third, third]
+    rows = [Row(s, compare(False, "1", Verdict.WRONG, root=r)) for s, r in zip(STATEMENTS, roots, strict=False)]
+    shown = [a["id"] for a in Elements(ledger.root_table(rows).html).all("tr") if "id" in a]
+    assert shown == [f"root-{each}" for each in (second, third, first)]
+
+
+@pytest.mark.parametrize(
+    ("finding", "shown", "collapsed"),
+    [
+        (compare(True, "1", note="n"), ["printed"], ["recomputed", "note"]),
+        (given("n"), ["printed"], ["note"]),
+        (compare(False, "1", Verdict.MISPRINT, "n"), ["printed", "recomputed"], ["note"]),
+        (compare(False, "1", Verdict.WRONG, "n"), ["printed", "recomputed", "note"], []),
+        (unverifiable("1", "n"), ["printed", "recomputed", "note"], []),
+    ],
+    ids=lambda each: each.verdict.value if isinstance(each, Finding) else None,
+)
+def test_what_most_readers_skip_is_collapsed(finding, shown, collapsed):
+    before, _, after = ledger.ledger_page([Row(STATEMENTS[0], finding)], ledger.PAGES[0]).html.partition("<details>")
+    assert [re.findall(r'<p class="(\w+)">', text) for text in (before, after)] == [shown, collapsed]
 
 
 def test_printed_statements_are_collapsed_under_their_title():

@@ -12,7 +12,7 @@ import faults
 import numpy as np
 import pytest
 
-from gpbnb.budget import experiment, theory
+from gpbnb.budget import derivation, experiment, theory
 from gpbnb.budget.theory import ErrorForm
 from gpbnb.ledger.checks import budget as checks
 from gpbnb.ledger.checks.budget import general, sources
@@ -77,7 +77,9 @@ def test_findings_have_their_notes_and_numbers(rows):
     previous = found["hung1982.I.previous-contract"].recomputed
     assert "10 months after the award and 4 months before the period" in previous
     assert "14 months and 8 days" in found["hung1982.I.report-period"].recomputed
-    assert found["hung1984.I.two-tasks"].recomputed.count("corrected") == 1
+    assert found["hung1984.I.two-tasks"].recomputed.endswith(
+        "is corrected; equation (20), right in 1982, is made wrong; bound (31), wrong in 1982, is kept"
+    )
 
 
 @pytest.mark.parametrize(
@@ -188,6 +190,18 @@ def test_products_and_quotients_are_counted():
     assert (x * x / x).count == 2
     assert (x * x * x / (x * x)).count == 4
     assert general.revised_product()
+
+
+def test_another_count_than_that_of_1982_shows_no_revision(patch):
+    patch.setattr(general.Roundings, "__truediv__", general.Roundings.__mul__)
+    assert general.revised_product()
+    patch.setattr(general.Roundings, "__truediv__", lambda one, other: general.Roundings(one.count + other.count))
+    assert not general.revised_product()
+
+
+def test_averages_that_remove_some_errors_keep_a_constant_that_does_not_roll(patch):
+    faults.breaks(derivation, "averages", 1)(patch)
+    assert judged("hung1982.II.bias-reduction").agrees is False
 
 
 def test_spans_of_dates():

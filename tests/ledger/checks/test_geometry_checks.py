@@ -152,6 +152,35 @@ def test_both_parts_of_the_statement_on_phi_count(patch):
     assert run("IV.phi-frame").agrees is True
 
 
+@pytest.mark.parametrize(
+    ("degrees", "right"),
+    [(8, "approximately parallel to"), (-12, "oblique to"), (78, "oblique to"), (-82, "perpendicular to")],
+)
+def test_the_direction_of_the_geodetic_drift_is_that_of_the_star(patch, degrees, right):
+    printed = statement("hung1982.I.approximately-parallel")
+    patch.setattr(precessions, "RIGEL", np.radians(degrees))
+    for word in ("approximately parallel to", "oblique to", "perpendicular to"):
+        found = checks.CHECKS.run(changed(printed, form=f"direction: {word} | along"))
+        assert found.agrees == (word == right)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3, 4])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("[[x_", "[[2*x_"),
+        ("[[1], [0], [0]]", "[[0], [1], [0]]"),
+        ("[[1], [0], [0]]", "2*[[1], [0], [0]]"),
+        ("[[1, 0, 0], [0, cos(omega*t), sin(omega*t)], [0, -sin(omega*t), cos(omega*t)]]*", ""),
+    ],
+    ids=["another reading", "another axis", "twice the axis", "no roll"],
+)
+def test_a_chain_leads_from_the_first_axis_to_the_reading(number, before, after):
+    printed = statement(f"hung1982.IV.eq{number}")
+    assert printed.form.count(before) == 1
+    assert checks.CHECKS.run(changed(printed, form=printed.form.replace(before, after))).agrees is False
+
+
 def test_a_frame_that_moves_is_a_slip_only_while_the_drift_is_right(patch):
     assert run("IV.intermediate-frame").verdict is Verdict.MISPRINT
     patch.setattr(frames, "theta_of", lambda phi, alpha: phi)

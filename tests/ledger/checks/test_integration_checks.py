@@ -67,6 +67,10 @@ def test_findings_quote_the_computed_numbers(rows):
     assert "1982 instead" in finding(rows, "eq34").note
     assert "1.10" in finding(rows, "sabstract.abstract-claim").note
     assert "0.01 and -0.51" in finding(rows, "sabstract.abstract-claim").recomputed
+    # Half the logarithmic derivative of coth(μ/2) - 2/μ by μ, at 1; the rate has this and the power -1/2, negative.
+    width = (2 - 0.5 / math.sinh(0.5) ** 2) / (1 / math.tanh(0.5) - 2) / 2
+    at_one = f"{width:.2f} and {-0.5 - width:.2f} at $\\mu=1$"
+    assert at_one in finding(rows, "sabstract.abstract-claim").recomputed
     assert "0.0102 °/√s" in finding(rows, "sanalysis.numerical-example").recomputed
     assert "9.6 times" in finding(rows, "sanalysis.complete-set").recomputed
     # (2/ω)[T - (1/ω)(1 - exp(-ωT))], and without 1/ω, from the first cycle on
@@ -161,6 +165,14 @@ def test_a_check_depends_on_the_computation(rows, patch, key, change):
 def test_the_verdict_of_a_misprint_depends_on_what_follows(patch):
     patch.setattr(result, "vanishes", lambda expression: False)
     assert checks.CHECKS.run(statement(MAIN + "eq34")).verdict is Verdict.WRONG
+
+
+def test_a_slip_between_sides_that_differ_is_wrong():
+    printed = statement(MAIN + "eq34")
+    before, after = "- 2/(omega_bw*T))*T", "- 3/(omega_bw*T))*T"
+    assert printed.form.endswith(f" {before}")
+    other = replaced(printed, form=printed.form.removesuffix(before) + after)
+    assert checks.CHECKS.run(other).verdict is Verdict.WRONG
 
 
 def test_the_abstract_is_right_if_the_exponents_are_those_of_small_mu(patch):

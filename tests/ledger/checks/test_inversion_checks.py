@@ -11,7 +11,7 @@ from statistics import median
 import faults
 import numpy as np
 import pytest
-from faults import finding
+from faults import breaks, finding
 
 from gpbnb import ledger
 from gpbnb.inversion import example, procedure, theory
@@ -218,6 +218,14 @@ def test_a_residue_that_is_hard_to_obtain_is_verified(monkeypatch, key):
     assert CHECKS.run(statement(key)).verdict is Verdict.WRONG
     monkeypatch.setattr(first_approach, "_residual_bound", lambda: ("it is hard", False))
     assert CHECKS.run(statement(key)).verdict is Verdict.VERIFIED
+
+
+@pytest.mark.parametrize("name", ["two_systems", "reductions"])
+def test_the_error_of_the_chart_is_derived_only_if_both_derivations_hold(monkeypatch, name):
+    printed = statement("hung1982.III.s11-3.figure-iii-1")
+    assert "by (91) it is an error in $A$, which the derivation confirms" in CHECKS.run(printed).recomputed
+    breaks(resultant.derivation, name)(monkeypatch)
+    assert "by (91) it is not derived" in CHECKS.run(printed).recomputed
 
 
 def test_without_rounding_no_error_is_compounded(monkeypatch):

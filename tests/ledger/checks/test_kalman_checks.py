@@ -115,6 +115,8 @@ def test_findings_quote_the_computed_numbers(rows):
     ):
         assert number in finding(rows, f"hung1984.II.{place}").recomputed
     assert r"\cdot84$" in finding(rows, "hung1984.II.s12.example-second-coefficient").note
+    in_double = finding(rows, "hung1984.II.s12.example-17-digits").note
+    assert in_double.endswith(f" {4.0775e14 / 2**53:.2g}")
     assert "7n+4m+6$ or $7n+3m+8" in finding(rows, "hung1984.II.s12.example-first-coefficient").note
 
 
@@ -237,9 +239,23 @@ def test_every_excess_is_of_the_arithmetic(patch, statement):
     assert (excess.excess(statement) > 1) == (statement not in ("(102)", "(106)"))
 
 
-@pytest.mark.parametrize("statement", ["(104)", "(107)"])
-def test_the_second_gain_exceeds_its_bounds_twofold(statement):
-    assert excess.excess(statement) == pytest.approx(2.141, abs=1e-3)
+BETA = 5e-4
+# With H = 7.5 and R = .004, 1/S is rounded to .01778, K to .1334, KH to 1.001, P to -.001 and its gain PH/R to -1.875.
+P, K = 0.004 / 56.254, 7.5 / 56.254
+
+
+@pytest.mark.parametrize(
+    ("statement", "by_hand"),
+    [
+        ("(104)", (0.001 + P) / (BETA * (6 * P + 1))),
+        ("(107)", (1.875 + K) / (BETA * (9 * K + 7.5 / 0.004))),
+        ("(106)", 1 / (3 * BETA)),  # 1.001² - 1.002 is rounded to 0
+        ("(112)", (1 - 1 / 100001) / (BETA * (12 / 100001 + 10))),  # 1 + 1e-5 to 1, so P and its gain to 0
+        ("(113)", 1 / (10 * BETA)),
+    ],
+)
+def test_excesses_worked_by_hand(statement, by_hand):
+    assert excess.excess(statement) == pytest.approx(by_hand, rel=1e-12)
 
 
 def test_an_unknown_statement_has_no_excess():

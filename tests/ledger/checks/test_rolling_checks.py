@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import replace as changed
+from types import SimpleNamespace
 
 import faults
 import numpy as np
@@ -104,6 +105,7 @@ def test_findings_quote_the_computed_results(rows):
     assert sources.count(": ") == 5
     for place, error, digits in (("s4.sample-1-4-years", 5e-8, 2), ("s4.sample-2-40-000-years", 5e-12, 0)):
         assert quoted(place) == f"{2 * math.pi / error / theory.YEAR:.{digits}f} years"
+    assert f"=0.{math.sin(math.pi / 180) ** 2 * 10**6:06.0f}$" in quoted("s3.one-degree")
     transform = quoted("s5.ramp-transform")
     assert transform == r"$-k/\omega^2+i\pi k\,\delta'(\omega)$"  # of kt
 
@@ -217,6 +219,39 @@ def test_a_check_that_disagrees_depends_on_the_computation(rows, monkeypatch, ke
 def test_a_misprint_is_harmless_only_if_what_follows_is_right(monkeypatch):
     monkeypatch.setattr(frequency, "YEAR", 2 * theory.YEAR)
     assert checks.CHECKS.run(statement(registry.entry("s4.sample-1-s-to-0"))).verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict"),
+    [
+        ("== m(t)*d(t)", "== 2*m(t)*d(t)", Verdict.MISPRINT),
+        ("1/2*s(t)*cos(theta)", "1/3*s(t)*cos(theta)", Verdict.WRONG),
+        ("1/2*s(t)*cos(theta)", "1/2*s(t)*cos(4/3)", Verdict.WRONG),  # the angle of one instant alone
+    ],
+)
+def test_a_slip_within_equation_3_is_harmless_only_between_equal_ends(before, after, verdict):
+    printed = statement(registry.entry("eq3"))
+    assert printed.form.count(before) == 1
+    assert checks.CHECKS.run(changed(printed, form=printed.form.replace(before, after))).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("filters", "walks", "agrees"),
+    [
+        ([1.0, 1.3], [1.0, 1.0], True),
+        ([1.0, 1.5], [1.0, 1.0], False),
+        ([1.0, 1.0], [1.0, 1.3], False),
+        ([1.0, 1.0], [1.3, 1.0], False),
+    ],
+)
+def test_a_study_answers_only_if_every_simulation_agrees_with_its_theory(monkeypatch, filters, walks, agrees):
+    """Within four standard errors, each a tenth of a filter's error and a twentieth of a walk's, from 200 pairs."""
+    study = SimpleNamespace(error=np.array(filters), uncertainty=np.full(2, 0.1))
+    expected = [theory.rate_walk_error(theory.DRIFTS[0], material.WALK, reset=reset) for reset in (None, 60000.0)]
+    monkeypatch.setattr(process, "filter_study", always(study))
+    monkeypatch.setattr(process, "expected_squares", always(np.ones(2)))
+    monkeypatch.setattr(process, "walk_errors", always(np.outer(np.multiply(expected, walks), np.ones(400))))
+    assert checks.CHECKS.run(statement(registry.entry("s2.error-sources-4-and-5"))).agrees is agrees
 
 
 def test_what_depends_on_the_noise_is_computed_from_it(monkeypatch):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace as changed
 from fractions import Fraction
 from functools import cache
 
@@ -135,10 +136,35 @@ def test_findings_quote_the_computed_numbers(rows):
     # 95 + 10 = 105 is rounded to 110
     assert f"at most {(5 / 105) / 0.05:.4f} β" in finding(rows, "hung1984.II.eq16").recomputed
     assert "of $D$ is 5, 5, 4, 3, 2, and" in finding(rows, "hung1982.III.s9-2.unnumbered-c").recomputed
+    # The relative error of a number just above 1 + β is nearly β/(1+β).
+    largest = f"{1 / 1.0005:.4f} β"
+    expected = f"relative error is {largest} for sums of matrices, and {largest} for single operations"
+    assert expected in finding(rows, "hung1984.II.s8.claim-same-as-16").recomputed
     signs = Counter(names["x"] > 0 for names in representation.all_numbers())
     nearest = finding(rows, "hung1984.II.s2.claim-conventional").recomputed
     assert f"{signs[True]} positive and {signs[False]} negative" in nearest
     assert "$u=0.7655$, $v=-0.433$" in finding(rows, "hung1984.II.s2.claim-u-v-same-sign").note
+
+
+@pytest.mark.parametrize(
+    ("example", "before", "after"),
+    [
+        ("3a", "e == 3", "e == 4"),
+        ("3a", "v >= 1/2", "v >= 1/3"),
+        ("3a", "== u*b**e + b**(e-t) ==", "== u*b**e =="),
+        ("3a", "10**(3-4)", "10**(3-3)"),
+        ("3b", "== u*b**e ==", "== u*b**e + b**(e-t) =="),
+        ("3b", "**e == .1234e3", "**e == .1235e3"),
+        ("3c", "v < -(1/2)", "v < 1/2"),
+    ],
+)
+def test_each_line_of_an_example_is_judged(example, before, after):
+    printed = statement(f"hung1984.II.s2.example-{example}")
+    assert printed.form.count(before) == 1
+    verdict = checks.CHECKS.run(printed).verdict
+    other = checks.CHECKS.run(changed(printed, form=printed.form.replace(before, after))).verdict
+    assert verdict in (Verdict.VERIFIED, Verdict.MISPRINT)
+    assert other is Verdict.WRONG
 
 
 # -- judging relations over instances -------------------------------------------------------------
@@ -192,6 +218,20 @@ def test_matrices_are_multiplied_and_compared_entry_by_entry():
 @pytest.mark.parametrize(("base", "precision"), [(10, 2), (2, 5), (16, 2)])
 def test_the_gap_above_one_is_a_unit_in_the_last_place(base, precision):
     assert instances.gap(base, precision) == Fraction(base) ** (1 - precision)
+
+
+@pytest.mark.parametrize(("base", "precision"), instances.FORMATS)
+def test_samples_lie_between_the_ends_of_a_power_of_the_base(base, precision):
+    smallest = base ** (precision - 1)
+    heads = set()
+    for x in instances.samples(base, precision):
+        size = abs(x)
+        while size < smallest:
+            size *= base
+        while size >= base * smallest:
+            size /= base
+        heads.add(int(size))
+    assert {smallest, smallest + 1, base * smallest - 1} <= heads
 
 
 @pytest.mark.parametrize("n", [2, 4, 50])
