@@ -6,40 +6,41 @@ this work, a long loop compiles in about five sixths of the time.
 
 from __future__ import annotations
 
+import random
 from functools import lru_cache
 from typing import Any
 
+from numba.core.bytecode import FunctionIdentity
 from numba.core.codegen import JITCodeLibrary
 from numba.core.registry import cpu_target
+
+_RANDOM, _BITS = random.SystemRandom(), 48
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """The compiled form of a function, with machine code once its address is asked for."""
 
-    _has_machine_code = False
-
     def _finalize_final_module(self) -> None:
         if self._object_caching_enabled and self._compiled_object:  # loaded from the cache
-            self._generate()
+            super()._finalize_final_module()
         self._finalized = True
-
-    def _generate(self) -> None:
-        super()._finalize_final_module()
-        self._has_machine_code = True
 
     def get_pointer_to_function(self, name: str) -> int:
         self._ensure_finalized()
-        # The engine may already know this name from another function: one that a different process numbered and cached.
-        if not self._has_machine_code and name in {
-            function.name for function in self._final_module.functions if not function.is_declaration
-        }:
-            self._generate()
+        defined = {function.name for function in self._final_module.functions if not function.is_declaration}
+        if name in defined and not self._codegen._engine.is_symbol_defined(name):
+            super()._finalize_final_module()
         return int(super().get_pointer_to_function(name))
 
 
 @lru_cache(maxsize=1)
 def generate_on_demand() -> None:
-    """Let numba make machine code for functions that are compiled from now on when their addresses are asked for."""
+    """Let numba make machine code for functions that are compiled from now on when their addresses are asked for.
+
+    Their names get random numbers, because the engine finds functions by name. numba counts from one in each process,
+    so that a function from the cache could have the name of another one.
+    """
+    FunctionIdentity._unique_ids = iter(lambda: _RANDOM.getrandbits(_BITS), -1)
     codegen = cpu_target.target_context.codegen()
     codegen._library_class = _Library
     set_now = codegen.set_env
