@@ -46,6 +46,8 @@ LIBRARIES = (
     "pytest_mpl.plugin",
 )
 
+NO_PICTURES = ("-o", "addopts=")
+"""Options of pytest without which figures are compared with their stored pictures."""
 QUICK = 1.0
 """Seconds. Tests that take longer run after all others."""
 
@@ -67,7 +69,7 @@ class How(NamedTuple):
     budget: float
     #: digest by source file: compiled functions of these files are taken from the cache although a source has changed.
     stamps: Mapping[str, str] | None = None
-    #: compare figures with their stored pictures, and run no other tests; otherwise leave these comparisons out.
+    #: compare figures with their stored pictures, and run no other tests; otherwise compare none.
     pictures: bool = False
     #: stop at the first failure.
     stop: bool = True
@@ -89,7 +91,7 @@ class _Recorder:
     def wants(self, item: Any) -> bool:
         if item.nodeid in self.how.left_out or item.nodeid in self.seconds:
             return False
-        if (item.get_closest_marker("mpl_image_compare") is not None) is not self.how.pictures:
+        if self.how.pictures and item.get_closest_marker("mpl_image_compare") is None:
             return False
         if self.slow or (self.how.seconds or {}).get(item.nodeid, 0.0) <= QUICK:
             return True
@@ -186,6 +188,7 @@ def _import_and_run(root: Path, tests: Sequence[str], recorder: _Recorder) -> No
         compiling._stamp = lambda path: known.get(str(path)) or stamps(path)
     options = ["-q", "-W", "ignore::pytest.PytestAssertRewriteWarning", "-o", f"cache_dir={recorder.now.parent}"]
     options += ["-x"] if how.stop else []
+    options += [] if how.pictures else NO_PICTURES
     for recorder.slow in (False, True):
         for test in tests:  # one after the other: those that are not needed are not imported
             if recorder.slow and test.partition("::")[0] not in recorder.deferred:
@@ -310,4 +313,4 @@ def with_collected(root: Path, tests: Sequence[str], serve: Callable[[Collected]
     sys.dont_write_bytecode = True
     sys.path[:] = [str(root), *(each for each in sys.path if Path(each or ".").resolve() not in (root, _CHECKOUT))]
     options = ["-qq", "-s", "--continue-on-collection-errors", "-W", "ignore::pytest.PytestAssertRewriteWarning"]
-    pytest.main([*options, *tests], plugins=[_Server(root, serve)])
+    pytest.main([*options, *NO_PICTURES, *tests], plugins=[_Server(root, serve)])
