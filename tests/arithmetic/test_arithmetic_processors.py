@@ -358,6 +358,15 @@ def test_named_formats_have_their_published_limits() -> None:
     assert limits(named.DECIMAL32) == (Fraction("9.999999e96"), Fraction("1e-95"))
 
 
+def test_only_ibms_formats_chop_and_have_no_subnormal_numbers() -> None:
+    chopped = {name for name, fmt in named.NAMED.items() if fmt.rounding is Rounding.CHOP and not fmt.subnormal}
+    assert chopped == {"IBM_HEX32", "IBM_HEX64", "IBM_704"}
+    assert {(fmt.rounding, fmt.subnormal) for fmt in named.NAMED.values()} == {
+        (Rounding.CHOP, False),
+        (Rounding.EVEN, True),
+    }
+
+
 def test_overflow_names_the_operation_and_the_entry() -> None:
     x = named.BINARY16.array([[1, 2], [60000, 4]])
     with pytest.raises(OverflowError, match=r"addition at \[1, 0\]: got a result .* needed at most 65504 in size"):

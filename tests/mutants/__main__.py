@@ -229,24 +229,25 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     if not tests and not files:
         return row | {"outcome": "no test"}
     way, how = judges.ways(name, mutant.line)
+    how = how._replace(budget=how.budget * (2 if tests else 1))
     begun = time.monotonic()
 
     codes: Codes = None
     if way == "valid":
         codes = judges.collected.changed(path, source, other)
-    if codes is not None:
-        files = [*tests, *files]
-        how = how._replace(budget=how.budget * (2 if tests else 1))
+    single = [*tests, *files]
+    whole = list(dict.fromkeys(each.partition("::")[0] for each in single))
+    chosen = whole if codes is None else single
 
     def with_the_fault(how: How) -> Outcome:
         while True:
             if codes is not None:
-                found = judges.run(files, way, how, codes)
+                found = judges.run(chosen, way, how, codes)
             else:
                 compiled, times = set(COMPILED.glob("*")), path.stat()
                 try:
                     path.write_text(other, encoding="utf-8")
-                    found = judges.run(files, way, how)
+                    found = judges.run(chosen, way, how)
                 finally:
                     path.write_text(source, encoding="utf-8")
                     # With a newer time of the file, tests that are already imported would compile again.
@@ -260,7 +261,7 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
     found, outcome = with_the_fault(how), "caught"
     if codes is not None and not found.stuck and not found.failed:
         # What was computed, and kept, while the tests were imported does not have the fault.
-        codes, files = None, list(dict.fromkeys(each.partition("::")[0] for each in files))
+        codes, chosen = None, whole
         found = with_the_fault(how)
     if not found.stuck and not found.failed:
         count = len(found.seconds)

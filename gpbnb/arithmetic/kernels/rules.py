@@ -46,9 +46,9 @@ def rounding_named(rounding: Rounding | str) -> Rounding:
     if isinstance(rounding, Rounding):
         return rounding
     if isinstance(rounding, str):
-        wanted = rounding.strip().lower().replace("_", " ")
+        wanted = rounding.strip().lower()
         for each in Rounding:
-            if wanted in (each.value.lower(), each.name.lower().replace("_", " ")):
+            if wanted == each.value:
                 return each
     names = ", ".join(repr(each.value) for each in Rounding)
     raise ValueError(f"got rounding {rounding!r}; needed a Rounding or one of {names}")
