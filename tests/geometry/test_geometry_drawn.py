@@ -113,6 +113,9 @@ def test_chain(ax):
         end = next(name for name, place in places.items() if place == tuple(link.xy))
         found[start, end] = link
         assert link.arrowprops["arrowstyle"] == "->"
+        # An arrow begins and ends outside the names of its frames, which are wide and flat.
+        upright = link.xyann[0] == link.xy[0]
+        assert (link.arrowprops["shrinkA"] == link.arrowprops["shrinkB"] == 22) == upright
     assert set(found) == set(LINKS)
     for ends, word in LINKS.items():
         text, (one, other) = words[word], (np.array(places[name]) for name in ends)

@@ -61,6 +61,7 @@ def test_block_diagram(ax):
     boxes = [each for each in artists if isinstance(each, Rectangle)]
     sums = sorted((each for each in artists if isinstance(each, Circle)), key=lambda each: each.center[0])
     assert len(boxes) == 4
+    assert not any(circle.get_fill() for circle in sums)
     areas = {}
     for name, text in BOXES.items():
         (box,) = [each for each in boxes if inside(each, texts[text])]

@@ -273,9 +273,10 @@ class TestCommand:
     def test_it_writes_what_is_read(self, tmp_path, monkeypatch, capsys):
         cells = [experiment.Cell("random", FMT, True, (2,), 5, (1, k)) for k in range(3)]
         monkeypatch.setattr(experiment, "SWEEPS", {"small": (lambda: cells, ("ball", "a posteriori"))})
-        given = ["small", "--folder", str(tmp_path), "--first", "2", "--directory", str(tmp_path / "saved")]
+        folder = tmp_path / "new" / "folder"
+        given = ["small", "--folder", str(folder), "--first", "2", "--directory", str(tmp_path / "saved")]
         assert command.main(given) == 0
-        text = (tmp_path / "small.csv").read_text(encoding="utf-8")
+        text = (folder / "small.csv").read_text(encoding="utf-8")
         assert "\n# command: python -m gpbnb.inversion small\n# seed: 1984\n# cells: 2 of 3\n" in text
         assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
         assert "small.csv: 10 inversions" in capsys.readouterr().out

@@ -152,6 +152,15 @@ def test_an_interrupted_cell_goes_on(tmp_path):
     assert other.block == 0
 
 
+def test_measurements_reference_and_formats_are_timed_apart(monkeypatch):
+    """A clock stands still except that it goes on by 1, 10, 100 and 1000 seconds during the four parts of a block."""
+    readings = iter([0, 1, 11, 111, 1111])
+    monkeypatch.setattr("gpbnb.kalman.lockstep.time.process_time", lambda: next(readings))
+    whole = lockstep(SMALL, 100)
+    whole.advance()
+    assert whole.seconds.tolist() == [1, 10, 100, 1000]
+
+
 @pytest.mark.parametrize(("blocks", "saved"), [(1, [1, 2, 3]), (2, [2]), (3, [3]), (4, [])])
 def test_a_cell_is_saved_after_every_so_many_blocks(blocks, saved, tmp_path, monkeypatch):
     whole, seen = lockstep(SMALL, 10_000), []  # three blocks
