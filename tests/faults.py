@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace as changed
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -19,10 +20,13 @@ from gpbnb.display.derivation import Derivation
 from gpbnb.ledger.checking import Row, examine_once
 from gpbnb.ledger.finding import Finding, Verdict
 from gpbnb.ledger.registry import Checks
+from gpbnb.ledger.render import to_text
 
 Change = Callable[[pytest.MonkeyPatch], None]
 
 INVENTORY = ledger.load_statements()
+#: A change of a finding is written with ``python -m gpbnb.ledger --format text --output tests/ledger/findings.txt``.
+RECORDED = set((Path(__file__).parent / "ledger" / "findings.txt").read_text(encoding="utf-8").splitlines())
 
 
 # -- what the checks found ------------------------------------------------------------------------
@@ -56,10 +60,13 @@ def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
 
 
 def check_texts(rows: Iterable[Row]) -> None:
-    """What differs has a note, and what was compared a number; no note says seven words twice, or those of the result.
+    """Results and notes are those on record. What differs has a note, and what was compared a number.
 
-    A text that is joined from other parts than was meant, or in another order, repeats some of them or ends in a space.
+    No note says seven words twice, or those of the result: a text that is joined from other parts than was meant, or in
+    another order, repeats some of them or ends in a space.
     """
+    rows = tuple(rows)
+    assert [line for line in to_text(rows).splitlines() if line not in RECORDED] == []
     for row in rows:
         for text in (row.finding.note, row.finding.recomputed):
             assert text == " ".join(text.split()), row.statement.id

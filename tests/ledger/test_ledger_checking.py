@@ -1,8 +1,10 @@
 """Entries meet checks: who checks what, rows, and their counts."""
 
 import importlib
+import re
 
 import pytest
+from faults import RECORDED
 
 from gpbnb.ledger import Row, counts, load_statements, rows
 from gpbnb.ledger.checking import TOPICS, in_reading_order, owners
@@ -29,6 +31,12 @@ def test_topics_check_entries_of_the_inventory_only():
 def test_each_topic_has_the_checks_of_its_own_module():
     for name, checks in TOPICS.items():
         assert checks is importlib.import_module(f"gpbnb.ledger.checks.{name}").CHECKS
+
+
+def test_every_entry_has_a_finding_on_record():
+    """Those of `faults.check_texts`."""
+    assert {re.search(r"  (\S+)", line)[1] for line in RECORDED} == {each.id for each in INVENTORY}
+    assert len(RECORDED) == len(INVENTORY)
 
 
 def test_one_row_an_entry_in_order(complete):
