@@ -131,10 +131,11 @@ def test_an_estimate_is_worth_what_its_windows_leave():
 # -- drift rates --------------------------------------------------------------------------------------------
 
 
-def test_drift_rates_are_those_of_whole_records():
+def test_drift_rates_are_those_of_whole_records(capsys):
     """The slow way: all in one array, fitted by np.polyfit."""
     n, interval = 3000, 10.0
     study = experiment.drift_rates([None, 77.5], 2, rng(4), LEVEL, n * interval, interval)
+    assert capsys.readouterr().err == ""  # progress is not shown unless asked for
     pairs = record(LEVEL, n, 4, rng(4))
     t = np.arange(n) * interval
     for g in range(2):

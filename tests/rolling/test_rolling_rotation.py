@@ -130,6 +130,10 @@ def test_the_last_sample_decides_on_the_digits_that_are_tried(marks):
     assert errors[1] <= 1e-6 < errors[0]
 
 
+def test_two_digits_are_tried():
+    assert experiment.digits_needed_observed("direct", 10, 6600.0, 600.0, [10], 1e3) == 2
+
+
 def test_what_a_rotation_costs_a_drift():
     found = experiment.recursion(FloatFormat(10, 8), 77.5, [10, 100, 1000])
     errors = found.size * np.array([100, 1000, 10000]) * 6600.0 / theory.YEAR

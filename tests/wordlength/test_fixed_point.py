@@ -26,6 +26,22 @@ def tracked() -> tuple[ScaledFilter, np.ndarray[Any, Any]]:
     return fixed_point.constant_gain(model, z), z
 
 
+def test_shifted_numbers_are_rounded_in_every_mode() -> None:
+    rounded = {
+        Rounding.DOWN: math.floor,
+        Rounding.UP: math.ceil,
+        Rounding.CHOP: int,
+        Rounding.EVEN: round,
+        Rounding.NEAREST: lambda x: math.floor(abs(x) + Fraction(1, 2)) * (-1 if x < 0 else 1),
+        Rounding.ODD: lambda x: math.floor(x) if math.floor(x) % 2 else math.ceil(x),
+    }
+    for mode in MODES:
+        for n in range(-40, 41):
+            assert fixed_point._shifted(n, -2, mode) == 4 * n
+            for shift in range(4):
+                assert fixed_point._shifted(n, shift, mode) == rounded[mode](Fraction(n, 2**shift)), (mode, n, shift)
+
+
 @pytest.mark.parametrize("mode", MODES)
 def test_every_step_is_that_of_the_fixed_point_kernel(mode: Rounding) -> None:
     """The integers against the correctly rounded scalar operations of the format."""

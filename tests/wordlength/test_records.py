@@ -83,7 +83,7 @@ def test_simulated_records_differ_and_have_the_model_s_inputs():
 
 def test_shares_and_what_is_enough():
     formats = tuple(FloatFormat(2, digits) for digits in (10, 11, 12, 13))
-    ratios = np.array([[0.5, 2.0, 0.5, 0.1], [3.0, 0.5, 0.5, 0.1]])
+    ratios = np.array([[0.5, 2.0, 1.0, 0.1], [3.0, 0.5, 0.5, 0.1]])
     found = RecordSurvey(formats, ratios, (("",) * 4,) * 2)
     assert found.shares == (0.5, 0.5, 1.0, 1.0)
     assert found.enough() == (formats[2],)

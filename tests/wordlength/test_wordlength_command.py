@@ -269,8 +269,9 @@ def test_systems_of_other_libraries_are_read():
     assert read_model(discrete.to_ss()).A.astype(float) == pytest.approx(discrete.to_ss().A)
     with pytest.raises(ValueError, match="continuous system"):
         read_model(signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]))
-    with pytest.raises(TypeError, match="got a int"):
-        read_model(3)
+    for given in (3, SimpleNamespace(A=[[1]], B=[[1]], C=[[1]], dt=0.1)):
+        with pytest.raises(TypeError, match=f"got a {type(given).__name__}; needed"):
+            read_model(given)
 
 
 def test_a_filter_of_filterpy_is_read():
