@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from distributed import Client, KilledWorker, LocalCluster
-from executors import Failing
+from distributed import Client, KilledWorker
+from executors import Failing, local_cluster
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.kalman import ensembles
@@ -228,7 +228,7 @@ def test_nothing_to_do_is_done():
 @pytest.fixture
 def cluster():
     """A worker process, under a nanny that starts it again when it dies."""
-    with LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with local_cluster(processes=True) as cluster:
         yield cluster
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from distributed import Client, KilledWorker, LocalCluster
-from executors import Failing
+from distributed import Client, KilledWorker
+from executors import Failing, local_cluster
 
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
 from gpbnb.sweeps.command import INTERRUPTED, run_command
@@ -66,7 +66,7 @@ def test_processes_give_the_same(sweep, tmp_path):
 
 
 def test_dask_gives_the_same(sweep, tmp_path):
-    with LocalCluster(n_workers=1, processes=False, dashboard_address=None) as cluster, Client(cluster) as client:
+    with local_cluster(processes=False) as cluster, Client(cluster) as client:
         assert sweep.run(tmp_path / "dask", client.get_executor(), chunk=4, progress=False) == EXPECTED
 
 
