@@ -226,6 +226,7 @@ def test_headline(ax):
     assert not names
     assert ax.get_ylabel() == "largest error in a year (mas, mas/yr)"
     assert list(ax.get_xticks()) == [4, 6, 8, 10, 12, 14, 16, 18, 20, 22]
+    assert list(ax.get_yticks()) == [1e-8, 1, 1e8, 1e16]
     return ax.figure
 
 

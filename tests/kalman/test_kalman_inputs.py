@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb import FloatFormat, LinearModel, Rounding, required_precision
+from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.array_forms import ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
@@ -297,8 +297,9 @@ def test_inputs_are_refused_where_they_would_be_ignored():
             emulate(cart, z, fmt, form)
     with pytest.raises(ValueError, match="got known inputs in the Hung"):
         emulate(cart, z, fmt, Form.HUNG)
-    with pytest.raises(ValueError, match="got fused, sums, compensated or order with known inputs"):
-        emulate(cart, z, fmt, fused=True)
+    for given in ({"fused": True}, {"sums": BINARY64}, {"compensated": True}, {"order": "pairwise"}):
+        with pytest.raises(ValueError, match="got fused, sums, compensated or order with known inputs"):
+            emulate(cart, z, fmt, **given)
 
 
 def test_a_run_is_not_longer_than_its_model():

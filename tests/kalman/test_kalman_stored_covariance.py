@@ -12,7 +12,8 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.array_forms import ArrayForm
-from gpbnb.kalman.array_run import ArrayRun
+from gpbnb.kalman.array_run import ArrayRun, _double_doubles
+from gpbnb.kalman.array_steps import predict_root
 from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.covariance import Repair, is_definite, raised_until
 from gpbnb.kalman.emulation import emulate
@@ -167,3 +168,19 @@ def test_the_search_for_the_least_change():
     assert str(Repair("P0", 0, 0.0, 0.25)) == (
         "P0 was made semidefinite (its variances were raised by 0.2 of themselves)"
     )
+
+
+@pytest.mark.parametrize("fmt", [FloatFormat(2, 53), FloatFormat(2, 80), FloatFormat(10, 18)], ids=str)
+def test_bounds_start_from_all_digits_of_an_array(fmt):
+    a = fmt.array([["1/3", "-2/7"], ["1e5", "1/1234567"]])
+    for found, true in zip(_double_doubles(a).reshape(-1, 2), a.to_fractions().ravel(), strict=True):
+        assert abs(sum(map(Fraction, found.tolist())) / true - 1) < Fraction(1, 2**100)
+
+
+def test_a_predicted_root_with_a_zero_on_the_diagonal_is_not_definite():
+    fmt = FloatFormat(2, 24)
+    S, zero = fmt.array([[2, 1], [0, 0]]), fmt.array([[0, 0], [0, 0]])
+    root, definite = predict_root(fmt.array([[1, 0], [0, 1]]), S, zero)
+    assert not definite
+    assert (root @ root.T).tolist() == (S @ S.T).tolist()
+    assert predict_root(fmt.array([[1, 0], [0, 1]]), fmt.array([[2, 1], [0, 1]]), zero)[1]

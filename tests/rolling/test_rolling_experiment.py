@@ -280,6 +280,7 @@ REFUSED = [
     (experiment.derolled_record, ((0.0, math.inf), 1.0, 600.0, rng(), 10), "got drifts .*; needed finite numbers"),
     (experiment.derolled_record, ((0.0, 0.0), 1.0, 0.0, rng(), 10), "got a roll period of 0.0 s, a sample every 10"),
     (experiment.filter_study, (1.0, [], 1, rng()), r"got bandwidths \(\) Hz; needed at least one, and each above 0"),
+    (experiment.filter_study, (1.0, [1e-9, 1.0], 1, rng()), r"needed each above 1.59e-07 Hz; take a longer record"),
     (experiment.filter_study, (1.0, [1.0, -1.0], 1, rng()), r"got bandwidths \(1.0, -1.0\) Hz; needed at least one"),
     (experiment.filter_study, (1.0, [1e-9], 1, rng()), "needed each above .* Hz; take a longer record"),
     (experiment.spectra, (1.0, rng(), 1, 1.0, 600.0, 100), "got 1.66667 turns; needed a whole number above 25"),

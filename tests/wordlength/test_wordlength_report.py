@@ -49,6 +49,18 @@ def tables_of(page: str) -> dict[str, list[list[str]]]:
     }
 
 
+def test_each_power_stands_beside_its_grid_line():
+    """The tolerance is the power zero. Logarithms from -1 to 2 take 250 pixels."""
+    drawn = REPORT.to_html()
+    names = re.findall(r'<text x="52" y="([^"]*)" text-anchor="end">10([^<]*)</text>', drawn)
+    assert [(float(y) - 4, power) for y, power in names] == [
+        (pytest.approx(30 + 250 * (2 - k) / 3, abs=0.06), power)
+        for k, power in ((-1, "⁻¹"), (0, "⁰"), (1, "¹"), (2, "²"))
+    ]
+    lines = re.findall(r'<line x1="60" x2="620" y1="([^"]*)" y2="([^"]*)" stroke="var\(--grid\)"/>', drawn)
+    assert [float(y) for pair in lines for y in pair] == pytest.approx([float(y) - 4 for y, _ in names for _ in "12"])
+
+
 def test_the_answer_comes_first():
     assert text_of(REPORT.to_html()).startswith(
         "Wordlength for tracker Wordlength for tracker This Kalman filter needs 21 bits to keep rounding errors within "

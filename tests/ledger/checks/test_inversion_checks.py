@@ -213,6 +213,19 @@ def test_readings_belong_to_the_columns_of_the_table():
     assert proposed > 10 * actual
 
 
+def test_a_bound_near_the_printed_error_is_not_conservative(monkeypatch):
+    _, actual = numerical_example._columns()
+    monkeypatch.setattr(numerical_example, "_columns", lambda: (actual, actual))
+    numerical_example._margin.cache_clear()
+    try:
+        assert numerical_example._margin()[0] == "are not conservative"
+        monkeypatch.undo()
+        numerical_example._margin.cache_clear()
+        assert numerical_example._margin()[0] == "are indeed very conservative"
+    finally:
+        numerical_example._margin.cache_clear()
+
+
 @pytest.mark.parametrize("key", both("s10.practicality-of-44"))
 def test_a_residue_that_is_hard_to_obtain_is_verified(monkeypatch, key):
     assert CHECKS.run(statement(key)).verdict is Verdict.WRONG
@@ -281,6 +294,7 @@ def test_first_order_arithmetic_is_that_of_polynomials():
     a = matrix([[x, y], [2, x]])
     unit = FirstOrder(np.array([[Fraction(1), Fraction(0)], [Fraction(0), Fraction(1)]], dtype=object))
     assert a * a.inv() == unit
+    assert matrix([x, y, 2]).value.tolist() == [[3, 7, 2]]
     assert (a * a).T == a.T * a.T
     with pytest.raises(ValueError, match="needed an exact quantity"):
         abs(x)
