@@ -94,4 +94,5 @@ def test_distribution(ax):
     assert near(names.pop("random draws"), BLUE, (0, top))
     assert not names
     assert ax.get_ylim() == pytest.approx((0, 1.42 * top))  # above the highest line, at 1.3
+    assert ax.get_xlim() == pytest.approx((-11.5, 15))  # beyond the widest lines, at 10
     return ax.figure

@@ -160,6 +160,7 @@ def test_deroll_of_a_roll(ax, printed):
     names = named(ax)
     assert near(names[r"true $\alpha_3$"], BLACK, (1.03, 15))
     assert near(names[r"true $\alpha_2$"], BLACK, (1.03, -8))
+    assert ax.get_ylim() == pytest.approx((-1.2 * 17, 1.35 * 17))  # of the first reading, 17 arcseconds long
     equation = "(8)" if printed else "(5)"
     assert ax.get_title(loc="left") == rf"equation {equation}: circles $\hat\alpha_3$, squares $\hat\alpha_2$"
     return ax.figure

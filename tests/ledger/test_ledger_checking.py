@@ -29,6 +29,7 @@ def test_topics_check_entries_of_the_inventory_only():
 
 
 def test_each_topic_has_the_checks_of_its_own_module():
+    assert list(TOPICS) == ["rounding", "inversion", "kalman", "rolling", "integration", "budget", "geometry"]
     for name, checks in TOPICS.items():
         assert checks is importlib.import_module(f"gpbnb.ledger.checks.{name}").CHECKS
 

@@ -8,6 +8,7 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
+from gpbnb.ledger.agreement import prints_side
 from gpbnb.ledger.formula import Link, Number, Relation, Undefined, Words, read
 
 
@@ -223,6 +224,12 @@ def test_dots_have_no_value():
 )
 def test_a_relation_is_typeset(form, typeset):
     assert latex(form).replace(" ", "") == typeset.replace(" ", "")
+
+
+def test_a_chain_prints_its_last_side():
+    (chain,) = read("x == y == 0.333")
+    assert prints_side(Fraction(1, 3), chain)
+    assert not prints_side(Fraction(1, 3), Relation("0.333 == x == y"))
 
 
 def test_numbers_and_words_are_shown_as_printed():
