@@ -68,7 +68,7 @@ def test_the_closed_best_rate_is_the_least_of_both_variances():
     omega, t = 30.0, 500.0
     fmt, chopped = FloatFormat(2, 24), FloatFormat(2, 24, CHOP)
     f, g = (theory.independent_best_rate(omega, t, each) for each in (fmt, chopped))
-    assert theory.mean_square_rounding(fmt) * t**2 / omega == pytest.approx(omega * t / (3 * f**3), rel=1e-12)
+    assert theory.mean_square_rounding(fmt) * t**2 / omega == pytest.approx(omega * t / (3 * f**3), rel=1e-12, abs=0)
     slope = 4 * theory.mean_chopping(chopped) ** 2 * t**3 * g / (3 * omega)
     assert slope == pytest.approx(omega * t / (3 * g**3), rel=1e-12)
 

@@ -154,7 +154,7 @@ def test_float64_is_near_the_exact_value(reading):
         exact = float(procedure.evaluate(reduction, beta, reading).bound)
         quick = float(procedure.evaluate(procedure.as_floats(reduction), float(beta), reading).bound)
         # Some hundred operations on numbers that cancel by less than a thousand: 1e5 units of 1e-16.
-        assert quick == pytest.approx(exact, rel=1e-11)
+        assert quick == pytest.approx(exact, rel=1e-11, abs=0)
 
 
 def test_there_are_fifty_readings():

@@ -262,7 +262,7 @@ def test_what_earlier_steps_carry_on_is_small_when_rows_go_far() -> None:
     found = guarantee(tracker(), FloatFormat(2, 24), limits(2, 1, state=[1000, 30], innovation=8))
     # Between two rows that are asked, the difference may add a thousandth of the bound.
     assert (found.parts[:, START] < 1e-3 * found.bound).all()
-    assert np.allclose(found.parts.sum(axis=1), found.bound, rtol=1e-8)
+    assert np.allclose(found.parts.sum(axis=1), found.bound, rtol=1e-8, atol=0)
 
 
 def test_limits_on_measurements_bound_state_and_innovation() -> None:
@@ -374,7 +374,7 @@ def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() ->
         steps.append(np.diagonal(covariance))
     scatter = np.sqrt(steps[-len(F) :])
     assert (np.ptp(scatter, axis=0) > 0.01 * scatter.max()).any()
-    assert np.allclose(probable_error(found), scatter.max(axis=0), rtol=1e-9)
+    assert np.allclose(probable_error(found), scatter.max(axis=0), rtol=1e-9, atol=0)
 
 
 def test_the_probable_error_is_the_scatter_of_an_emulated_run() -> None:

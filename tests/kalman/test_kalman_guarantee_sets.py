@@ -68,7 +68,7 @@ def test_the_width_of_an_ellipsoid(sets, monkeypatch) -> None:
     flat = np.array([[4.0, -2.0], [-2.0, 1.0]])
     assert sets.width(flat, np.array([1.0, 2.0])) == 2.0**-48 * 4
     flat[0, 0] = np.nextafter(4.0, 0)  # a root of what rounding made negative
-    assert sets.width(flat, np.array([1.0, 2.0])) == pytest.approx(2.0**-48 * 4, rel=1e-12)
+    assert sets.width(flat, np.array([1.0, 2.0])) == pytest.approx(2.0**-48 * 4, rel=1e-12, abs=0)
 
 
 def test_two_ellipsoids_join(sets) -> None:

@@ -82,7 +82,7 @@ def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
     first = required_precision(SMALL, 80, 1e-3, z=U, basis=basis)
     second = required_precision(other, 80, 1e-3 * 2.0**-10, z=U * 2.0**30, basis=basis)
     assert first.fmt == second.fmt is not None
-    assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9)
+    assert [ratio for _, ratio in first.tried] == pytest.approx([ratio for _, ratio in second.tried], rel=1e-9, abs=0)
 
 
 def test_probable_errors_are_three_standard_deviations():

@@ -141,8 +141,8 @@ def test_rotations(ax):
     artists = figures.rotations(results, 6600.0, ax, "recursion")
     for i, result in enumerate(results):
         scale = 6600.0 * result.step * 10 / theory.YEAR
-        assert xy(artists[2 * i])[1] == pytest.approx(scale * result.size)
-        assert xy(artists[2 * i + 1])[1] == pytest.approx(scale * result.bound)
+        assert xy(artists[2 * i])[1] == pytest.approx(scale * result.size, rel=1e-12, abs=0)
+        assert xy(artists[2 * i + 1])[1] == pytest.approx(scale * result.bound, rel=1e-12, abs=0)
     assert set(names_of(ax)) == {"6 decimal digits", "8 decimal digits", "1 mas"}
     with pytest.raises(ValueError, match="got 6 curves; needed at most 5, or colours repeat; draw two figures"):
         figures.rotations(results * 3, 6600.0, ax)

@@ -74,7 +74,7 @@ def test_errors_are_within_their_bounds_and_not_far_below(fmt, period):
         # Amplitude and phase are the two parts of the error.
         small = found.size < 1e-3
         both = np.hypot(found.amplitude, found.phase)
-        assert both[small] == pytest.approx(found.size[small], rel=2e-3)
+        assert both[small] == pytest.approx(found.size[small], rel=2e-3, abs=0)
 
 
 def test_direct_evaluation_is_that_of_the_rounded_product():

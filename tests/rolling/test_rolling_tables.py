@@ -27,7 +27,7 @@ def test_registers():
             cells = [float(cell.replace(",", "")) for cell in body[2 * i + j][2:]]
             across = theory.off_tuned_drift(6600.0, error)
             expected = [error, error * theory.YEAR, theory.off_tuned_loss(error), across]
-            assert cells == pytest.approx(expected, rel=6e-3)
+            assert cells == pytest.approx(expected, rel=6e-3, abs=0)
 
 
 def test_each_cost_of_a_register_has_its_column():

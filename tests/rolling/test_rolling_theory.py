@@ -84,8 +84,8 @@ def test_the_worst_error_of_the_rate_bounds_the_error_of_each_rate_of_its_binade
 
 def test_the_printed_sample_calculations():
     six, ten = (float(theory.worst_rate_error(600.0, FloatFormat(10, t))) for t in (6, 10))
-    assert six == pytest.approx(0.5e-7, rel=1e-15)
-    assert ten == pytest.approx(0.5e-11, rel=1e-15)
+    assert six == pytest.approx(0.5e-7, rel=1e-15, abs=0)
+    assert ten == pytest.approx(0.5e-11, rel=1e-15, abs=0)
     assert theory.off_tuned_loss(six) == pytest.approx(1 - math.cos(0.5e-7 * YEAR), rel=1e-12)
     assert theory.off_tuned_loss(ten) == pytest.approx(1.234e-8, rel=0.01)  # printed for 40,000 years, not 39,848
     assert theory.off_tuned_drift(6600.0, ten) == pytest.approx(6600 * ten * YEAR, rel=1e-7)

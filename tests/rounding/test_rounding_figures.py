@@ -100,11 +100,11 @@ def test_cancellation(ax):
     lost = [norm / float(column_sum_norm(t.true)) for norm, t in zip(norms, trials, strict=True)]
     assert list(points.get_xdata()) == pytest.approx(lost[:-1])
     assert list(points.get_ydata()) == pytest.approx(
-        [float(t.error) / norm for norm, t in zip(norms, inexact, strict=False)]
+        [float(t.error) / norm for norm, t in zip(norms, inexact, strict=False)], rel=1e-12, abs=0
     )
     beta = float(fmt.unit_roundoff)
     assert list(bound.get_ydata()) == pytest.approx([2 * beta] * len(trials))
-    assert list(printed.get_ydata()) == pytest.approx([2 * beta / x for x in sorted(lost)])
+    assert list(printed.get_ydata()) == pytest.approx([2 * beta / x for x in sorted(lost)], rel=1e-12, abs=0)
     assert [colour(each) for each in (points, printed, bound)] == [style.OBSERVED, style.REFUTED, style.VALID]
     assert set(names_of(ax)) == {"error", "bound (32)", "(31) as\nprinted"}
     check_names(ax, "cancellation", "error / ")
