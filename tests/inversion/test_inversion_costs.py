@@ -79,6 +79,19 @@ def found():
     return {one.bound: one for one in costs.prices((2, 4), 15, np.random.default_rng(3))}
 
 
+def test_operations_of_known_bounds():
+    """Of matrices with two rows and columns, for which a product takes 12 and an inverse 15."""
+    assert (costs.product(2), costs.elimination(2)) == (12, 15)
+    assert {name: count(2) for name, (_, count, _) in costs.KNOWN.items()} == {
+        "Wilkinson": 8,
+        "Higham": 36,
+        "probabilistic, 99 %": 36,
+        "the report's, corrected": 48,
+        "ball arithmetic": 15,
+        "preconditioned balls": 54,
+    }
+
+
 def test_every_bound_of_an_inverse_has_its_price(found):
     named = {name for name, _, _ in costs.KNOWN.values()}
     assert named | {"a posteriori", "rule of thumb", "strict"} == set(experiment.BETTER)

@@ -79,6 +79,12 @@ def test_a_repair_is_off_for_exact_input_and_on_demand():
     assert model(as_fractions, repair=True).repairs == model(Q).repairs
 
 
+def test_symmetry_is_judged_by_both_variances():
+    """The second is 1e32 times the first, in other units."""
+    found = model([[1e-16, 0.5], [0.5 + 1e-9, 1e16]])
+    assert (found.Q[0] == found.Q[0].T).all()
+
+
 @pytest.mark.parametrize(
     ("Q", "message"),
     [

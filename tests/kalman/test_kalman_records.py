@@ -153,12 +153,12 @@ def test_an_interrupted_cell_goes_on(tmp_path):
 
 
 def test_measurements_reference_and_formats_are_timed_apart(monkeypatch):
-    """A clock stands still except that it goes on by 1, 10, 100 and 1000 seconds during the four parts of a block."""
-    readings = iter([0, 1, 11, 111, 1111])
+    """A clock goes on by 1, 10, 100, 1000 and 10000 seconds during the parts of a block, which has three formats."""
+    readings = iter([0, 1, 11, 111, 1111, 11111])
     monkeypatch.setattr("gpbnb.kalman.lockstep.time.process_time", lambda: next(readings))
-    whole = lockstep(SMALL, 100)
+    whole = lockstep(dataclasses.replace(SMALL, precisions=(20, 22, 24)), 100)
     whole.advance()
-    assert whole.seconds.tolist() == [1, 10, 100, 1000]
+    assert whole.seconds.tolist() == [1, 10, 100, 1000, 10000]
 
 
 @pytest.mark.parametrize(("blocks", "saved"), [(1, [1, 2, 3]), (2, [2]), (3, [3]), (4, [])])

@@ -14,6 +14,11 @@ from gpbnb.kalman import derivation, report_bounds
 # -- counts ---------------------------------------------------------------------------------------
 
 
+def test_each_line_corrects_one_more_fault():
+    faults = ("once", "free_signs", "carried")
+    assert list(report_bounds.CORRECTIONS.values()) == [dict.fromkeys(faults[:k], True) for k in range(4)]
+
+
 @pytest.mark.parametrize("faults", report_bounds.CORRECTIONS.values())
 @pytest.mark.parametrize(("k", "n", "m"), [(1, 1, 1), (3, 2, 1), (4, 3, 5), (17, 10, 2), (3_153_600, 10, 2)])
 def test_coefficients_are_those_derived(faults, k, n, m):

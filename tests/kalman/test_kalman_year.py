@@ -281,6 +281,7 @@ def test_progress_counts_the_steps_of_a_run(tmp_path):
 def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch, capsys):
     here = tmp_path / "here"
     given = ["--directory", str(tmp_path / "saved"), "--steps", "100", "--cases", "3", "--output", str(here)]
+    here.mkdir()
     assert year.main(given) == 0
     origin = read(here / "year.csv", year.COLUMNS, "").provenance
     assert (origin["command"], origin["seed"]) == ("python -m gpbnb.kalman.year", "1984")

@@ -78,6 +78,8 @@ def test_the_spectra_of_the_figures():
     roll = float(theory.flicker_density(found.level, 1 / found.period))
     assert np.mean(found.line_noise) == pytest.approx(roll, rel=4 / math.sqrt(8 * len(found.offset)))
     assert np.mean(found.base_noise) == pytest.approx(roll, rel=4 / math.sqrt(8 * n))
+    noise = theory.flicker_density(found.level, found.noise.frequency, found.interval)
+    assert np.max(abs(found.noise.density / noise - 1) / found.noise.error) < 4.5
     bands = found.derolled.frequency < 0.3 / found.period
     z = (found.derolled.density / theory.derolled_density(found.level, found.period, found.derolled.frequency) - 1)[
         bands

@@ -11,7 +11,7 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.rolling import experiment, theory
+from gpbnb.rolling import experiment, rotations, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [
@@ -132,6 +132,21 @@ def test_the_last_sample_decides_on_the_digits_that_are_tried(marks):
 
 def test_two_digits_are_tried():
     assert experiment.digits_needed_observed("direct", 10, 6600.0, 600.0, [10], 1e3) == 2
+
+
+def test_digits_that_overflow_are_not_enough(monkeypatch):
+    whole, asked = rotations.direct, (10, 6600.0, 77.5, [1000])
+    digits = experiment.digits_needed_observed("direct", *asked, 1e-6)
+
+    def limited(fmt, period, steps):
+        if fmt.precision <= digits:
+            raise OverflowError("got a rotation that grows without limit")
+        return whole(fmt, period, steps)
+
+    monkeypatch.setattr(rotations, "direct", limited)
+    rotations._digits_needed_observed.cache_clear()
+    assert experiment.digits_needed_observed("direct", *asked, 1e-6) == digits + 1
+    rotations._digits_needed_observed.cache_clear()
 
 
 def test_what_a_rotation_costs_a_drift():

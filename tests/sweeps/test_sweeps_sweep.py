@@ -175,6 +175,7 @@ def test_a_sample_of_what_is_stored_is_verified(sweep):
 def test_progress_of_a_verification_is_shown_if_asked_for(sweep, capsys):
     sweep.store(EXPECTED)
     sweep.verify(2, seed=1)
+    verify([sweep], 2, 1)
     assert capsys.readouterr().err == ""
     sweep.verify(2, seed=1, progress=True)
     assert "2/2 [" in capsys.readouterr().err

@@ -11,7 +11,7 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
@@ -131,6 +131,15 @@ def test_a_compensated_sum_counts_each_term_once() -> None:
     assert processors.compensated_sum(x).tolist() == [2.0, 5.0]
     assert processors.compensated_sum(x[:1]).tolist() == [1.0, 3.0]
     assert processors.integrators()[2].add(x.to_float()).tolist() == [1.0, 3.0]
+
+
+def test_processors_have_the_arithmetic_of_their_names() -> None:
+    assert {each.name: (each.fmt, each.sums) for each in processors.PROCESSORS} == {
+        "Cortex-M4F, binary32": (BINARY32, None),
+        "accelerator, bfloat16 with binary32 sums": (BFLOAT16, BINARY32),
+        "bfloat16 alone": (BFLOAT16, None),
+        "16-bit fixed point, 9 bits before the point": (FixedFormat(9, 6, Rounding.EVEN), None),
+    }
 
 
 def test_variants_differ_in_one_property_each() -> None:

@@ -29,6 +29,12 @@ def standards_of(ax, upright):
     return texts
 
 
+def test_formats_at_the_ends_of_an_axis_have_their_lines(ax):
+    ax.set_xlim(11, 24)
+    figures.standards(ax)
+    assert set(standards_of(ax, True)) == {"binary16", "binary32"}
+
+
 @pictured
 def test_survey(ax):
     inf = math.inf

@@ -99,15 +99,15 @@ def test_the_emulation_is_the_processors_float32_but_for_ties(monkeypatch):
     assert (plain[1:] != ours[1:].astype(float)).any()
 
 
-def test_arrays_of_a_type_are_computed_as_its_numbers_one_by_one():
+@pytest.mark.parametrize("m", [2, 3])
+def test_arrays_of_a_type_are_computed_as_its_numbers_one_by_one(m):
     rng = np.random.default_rng(3)
     dense = LinearModel(
-        rng.standard_normal((3, 3)) / 3, rng.standard_normal((2, 3)), np.eye(3), 2 * np.eye(2), [1, 2, 3], np.eye(3)
+        rng.standard_normal((3, 3)) / 3, rng.standard_normal((m, 3)), np.eye(3), 2 * np.eye(m), [1, 2, 3], np.eye(3)
     )
-    found = study.innovation_form(
-        in_numbers(dense, lambda entry: Even(float(entry))), np.frompyfunc(Even, 1, 1)(Z[:40])
-    )
-    assert [[float(x.value) for x in row] for row in found] == study.native(dense, Z[:40], np.float32).tolist()
+    z = rng.standard_normal((40, m))
+    found = study.innovation_form(in_numbers(dense, lambda entry: Even(float(entry))), np.frompyfunc(Even, 1, 1)(z))
+    assert [[float(x.value) for x in row] for row in found] == study.native(dense, z, np.float32).tolist()
 
 
 def test_a_type_of_numpy_has_a_range_and_the_errors_of_its_digits(capsys):

@@ -113,8 +113,7 @@ DEPENDS = [
     ("IV.known-misalignments", angles, "compensated", lambda: ARCSEC),
     ("IV.axes-colinear", angles, "boresight_offset", lambda angles: 1.0),
     ("IV.use-of-model", theory, "effect", lambda case, rolling: theory.Effect((0, 0), (ARCSEC, 0), 0.0)),
-    ("IV.use-of-model", angles, "THIRD_ORDER", 0.0),
-    ("IV.use-of-model", theory, "GEODETIC", 1e-3 * theory.GEODETIC),
+    ("IV.use-of-model", angles, "THIRD_ORDER", 1e-3),
 ]
 
 

@@ -286,6 +286,7 @@ def test_first_order_arithmetic_is_that_of_polynomials():
     assert x * y == FirstOrder(Fraction(21), Fraction(29))
     assert x / y * y == x
     assert 2 - x == FirstOrder(Fraction(-1), Fraction(-5))
+    assert FirstOrder(Fraction(0), Fraction(1)) == EPSILON
     assert (1 + EPSILON) ** 3 == 1 + 3 * EPSILON
     assert 1 / (1 + EPSILON) == 1 - EPSILON
     assert Fraction(0) == EPSILON * EPSILON
