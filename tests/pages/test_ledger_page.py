@@ -128,7 +128,7 @@ def test_collapsed_formulas_are_typeset_when_opened_and_all_before_printing(open
     with open_page(LEDGER, shared=True) as page:
         evidence = page.locator(".ledger tr[id] details:has(.math)").first
         assert evidence.locator("mjx-container").count() == 0
-        evidence.locator("summary").evaluate("summary => summary.click()")
+        evidence.locator("summary").click()
         evidence.locator("mjx-container").first.wait_for()
         page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
         assert page.locator(".ledger .math").evaluate_all(UNSET) == []

@@ -297,7 +297,7 @@ def test_what_was_collapsed_is_ready_once_opened(open_page):
     with open_page("book/inversion.html", "phone", shared=True) as page:
         part = page.locator("details.derivation").first
         assert part.locator("mjx-container").count() == 0
-        part.locator("summary").evaluate("summary => summary.click()")
+        part.locator("summary").click()
         unset = "part => !part.querySelector('.math:not(:has(mjx-container))')"
         page.wait_for_function(unset, arg=part.element_handle())
         page.wait_for_timeout(100)
