@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ __all__ = [
     "YEAR_SAMPLES",
     "DriftStudy",
     "FilterStudy",
+    "LowPass",
     "Rotation",
     "Slope",
     "Spectra",
@@ -219,6 +221,13 @@ def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
 # -- filters -------------------------------------------------------------------------------------
 
 
+class LowPass(Enum):
+    """A kind of low-pass filter."""
+
+    SINGLE_POLE = "single pole"
+    MOVING_AVERAGE = "moving average"
+
+
 @dataclass(frozen=True)
 class FilterStudy:
     """Mean square errors (filters, records) in mas², after low-pass filters that have settled.
@@ -228,7 +237,7 @@ class FilterStudy:
 
     drift: float
     period: float
-    names: tuple[str, ...]
+    kinds: tuple[LowPass, ...]
     lag: NDArray[np.float64]
     bandwidth: NDArray[np.float64]
     squares: NDArray[np.float64]
@@ -259,7 +268,7 @@ def filter_study(
     Each component of each gyro, rolled and derolled, is a record. Averages start after ten time constants.
     """
     n = samples_in(duration, interval)
-    names = [*("single pole" for _ in bandwidths), *("moving average" for _ in bandwidths)]
+    kinds = (*(LowPass.SINGLE_POLE for _ in bandwidths), *(LowPass.MOVING_AVERAGE for _ in bandwidths))
     if not len(bandwidths) or not min(bandwidths) > 0:
         raise ValueError(f"got bandwidths {tuple(bandwidths)} Hz; needed at least one, and each above 0")
     longest = 10 / (4 * min(bandwidths))
@@ -269,7 +278,7 @@ def filter_study(
             "a longer record"
         )
     skip = math.ceil(longest / interval)
-    squares = np.zeros((len(names), 2 * gyros))
+    squares = np.zeros((len(kinds), 2 * gyros))
     filters = [theory.single_pole(1 / (4 * b), interval) for b in bandwidths]
     filters += [theory.moving_average(1 / (2 * b), interval) for b in bandwidths]
     for g, child in enumerate(rng.spawn(gyros)):
@@ -277,7 +286,7 @@ def filter_study(
         for c, part in enumerate((np.real, np.imag)):
             derolled, truth = part(stages["derolled"]), part(stages["signal"])
             for i, weights in enumerate(filters):
-                if names[i] == "single pole":
+                if kinds[i] is LowPass.SINGLE_POLE:
                     out = scipy.signal.lfilter([weights[0]], [1, weights[0] - 1], derolled)
                 else:
                     total = np.concatenate([np.zeros(len(weights)), np.cumsum(derolled)])
@@ -285,7 +294,7 @@ def filter_study(
                 squares[i, 2 * g + c] = np.mean((out - truth)[skip:] ** 2)
     lag = np.array([theory.filter_lag(weights, interval) for weights in filters])
     width = np.array([theory.noise_bandwidth(weights, interval) for weights in filters])
-    return FilterStudy(drift, period, tuple(names), lag, width, squares)
+    return FilterStudy(drift, period, kinds, lag, width, squares)
 
 
 def image_behind(

@@ -28,7 +28,7 @@ from gpbnb.display.style import (
 from gpbnb.display.tables import digits
 from gpbnb.measurement import YEAR
 from gpbnb.rolling import theory
-from gpbnb.rolling.experiment import DriftStudy, FilterStudy, Rotation, Slope, Spectra, Spectrum
+from gpbnb.rolling.experiment import DriftStudy, FilterStudy, LowPass, Rotation, Slope, Spectra, Spectrum
 
 DENSITY = "density (mas²/Hz)"
 Drawn = Artist | ErrorbarContainer
@@ -195,8 +195,8 @@ def drift_errors(study: DriftStudy, ax: Axes) -> list[Drawn]:
 def bandwidths(study: FilterStudy, density: float, ax: Axes) -> list[Drawn]:
     """Draw the rms error after low-pass filters against their bandwidth, with two standard errors, and theory."""
     artists: list[Drawn] = []
-    for text, colour, marker in (("single pole", OBSERVED, "o"), ("moving average", SIGNAL, "s")):
-        chosen = [i for i, each in enumerate(study.names) if each == text]
+    for kind, colour, marker in ((LowPass.SINGLE_POLE, OBSERVED, "o"), (LowPass.MOVING_AVERAGE, SIGNAL, "s")):
+        chosen = [i for i, each in enumerate(study.kinds) if each is kind]
         size = np.sqrt(study.error[chosen])
         artists.append(
             ax.errorbar(
@@ -206,7 +206,7 @@ def bandwidths(study: FilterStudy, density: float, ax: Axes) -> list[Drawn]:
                 fmt=marker,
                 color=colour,
                 markerfacecolor="none" if marker == "s" else colour,
-                label=text,
+                label=kind.value,
             )
         )
     b = np.geomspace(study.bandwidth.min() / 1.5, study.bandwidth.max() * 1.5, 200)

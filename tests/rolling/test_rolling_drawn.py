@@ -13,6 +13,7 @@ from drawn import BLUE, GREEN, GREY, ORANGE, PURPLE, at, look, named, near, pict
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.rolling import experiment, figures
+from gpbnb.rolling.experiment import LowPass
 from gpbnb.rolling.spectra import Slope, Spectra, Spectrum
 
 YEAR = 365 * 86400
@@ -216,7 +217,7 @@ def test_bandwidths(ax):
     study = experiment.FilterStudy(
         6600.0,
         80.0,
-        ("single pole", "moving average", "single pole", "moving average"),
+        (LowPass.SINGLE_POLE, LowPass.MOVING_AVERAGE) * 2,
         np.ones(4),
         np.array([1e-5, 2e-5, 3e-5, 4e-5]),
         squares,

@@ -211,7 +211,7 @@ def test_memory_does_not_grow_with_the_record():
 
 def test_filtered_drifts_agree_with_lag_and_exact_noise():
     study = material.filter_study()
-    assert study.names == ("single pole",) * 3 + ("moving average",) * 3
+    assert study.kinds == (experiment.LowPass.SINGLE_POLE,) * 3 + (experiment.LowPass.MOVING_AVERAGE,) * 3
     expected = material.expected_squares(study)
     assert np.max(abs(study.error - expected) / study.uncertainty) < 4
     assert np.max(study.uncertainty / study.error) < 0.06

@@ -58,8 +58,8 @@ def expected_squares(study: experiment.FilterStudy, duration: float = YEAR / 16)
     """Return lag and exact noise of a study's filters; the noise is taken where its logarithm has its mean."""
     middle = round(duration / theory.INTERVAL / math.e)
     expected = []
-    for name, lag, width in zip(study.names, study.lag, study.bandwidth, strict=True):
-        if name == "single pole":
+    for kind, lag, width in zip(study.kinds, study.lag, study.bandwidth, strict=True):
+        if kind is experiment.LowPass.SINGLE_POLE:
             weights = theory.single_pole(lag_constant(lag))
         else:
             weights = theory.moving_average(1 / (2 * width))
