@@ -198,6 +198,53 @@ def test_the_set_that_is_never_left(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.start == 2
 
 
+def test_each_phase_of_the_set_takes_up_what_the_phases_before_it_add(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One state, two phases, and products of three loops: which phase each of them came from is written out."""
+    array = lambda x: np.array([[float(x)]])  # noqa: E731
+    ball = lambda x: arb_mat([[arb(float(x))]])  # noqa: E731
+    centers, after, disturbed, start = (F(640), F(576)), (F(578), F(643)), (F(5), F(11)), F(639)
+    products = [F(1), F(1, 2), F(1, 4), F(3, 16)], [F(1), F(1, 4), F(1, 8), F(1, 32)]
+    residuals = [F(1, 32), F(1, 64), F(1, 128)], [F(1, 16), F(1, 128), F(1, 256)]
+    phases = [
+        enclosure._Phase((), array(c), ball(F(1, 2)), ball(F(2)), array(1), array(1), ball(a))
+        for c, a in zip(centers, after, strict=True)
+    ]
+    powers = [
+        enclosure._Powers([array(x) for x in M], [array(x) for x in off])
+        for M, off in zip(products, residuals, strict=True)
+    ]
+    monkeypatch.setattr(enclosure, "_SUMS", 1.0)
+    monkeypatch.setattr(enclosure, "_phases", lambda *_: phases)
+    monkeypatch.setattr(enclosure, "_powers", lambda _: powers)
+    known = [enclosure._Disturbed(array(w), array(gain)) for w, gain in zip(disturbed, (F(5), F(7)), strict=True)]
+    monkeypatch.setattr(enclosure, "_disturbed", lambda form, phase, *_: known[phases.index(phase)])
+    run = SimpleNamespace(C=[None, None, array(start)], G=[None, array(F(7, 4)), array(F(3))])
+    run.exactly = lambda x: np.vectorize(F, otypes=[object])(np.asarray(x))
+    stored: Any = SimpleNamespace(cycle=2)
+    found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 3, 60)
+    begun = abs(start - centers[0])
+    # a step of phase 0 leads to the center of phase 1, and the other way round
+    w0, w1 = 5 + abs(F(578) - 576), 11 + abs(F(643) - 640)
+
+    def step(b0: F, b1: F) -> tuple[F, F]:
+        new0 = begun + F(3, 16) ** 2 * b1 + w1 + F(1, 2) ** 2 * w0 + F(1, 4) ** 2 * w1
+        new0 += 2 * F(1, 32) * b1 * (F(1, 2) + F(1, 32)) + 2 * F(1, 64) * b0 * (F(1, 4) + F(1, 64))
+        new0 += 2 * F(1, 128) * b1 * (F(3, 16) + F(1, 128))
+        new1 = begun + F(1, 32) ** 2 * b0 + w0 + F(1, 4) ** 2 * w1 + F(1, 8) ** 2 * w0
+        new1 += 2 * F(1, 16) * b0 * (F(1, 4) + F(1, 16)) + 2 * F(1, 128) * b1 * (F(1, 8) + F(1, 128))
+        new1 += 2 * F(1, 256) * b0 * (F(1, 32) + F(1, 256))
+        return new0, new1
+
+    trial = 2 * begun, 2 * begun
+    while any(new > b for new, b in zip(step(*trial), trial, strict=True)):
+        trial = tuple(max(F(11, 10) * new, b) for new, b in zip(step(*trial), trial, strict=True))
+    assert found is not None
+    for j in range(2):
+        same(found.covariance[j, 0, 0], trial[j])
+    same(found.gain[0, 0, 0], 5 + abs(F(2) - F(7, 4)))
+    same(found.gain[1, 0, 0], 7 + abs(F(2) - 3))
+
+
 # -- a gain that repeats ----------------------------------------------------------------------------------------------
 
 

@@ -330,6 +330,12 @@ def test_published_error_coefficients() -> None:
     assert [round(float(e), 6) for e in found] == models["published_E"]
 
 
+def test_a_largest_state_that_may_be_a_power_of_two_has_no_coefficients() -> None:
+    """The sum of 1, 1/2, 1/4, ... is two; the output, 1.5 times the state, is not near a power of two."""
+    with pytest.raises(ArithmeticError, match="too near a power of two"):
+        error_coefficients([["0.5"]], [["1"]], [["1.5"]], [["0"]], 1)
+
+
 @pytest.mark.parametrize("given", [{}, {"state": 1}, {"measurement": -1}, {"measurement": float("nan")}])
 def test_limits_that_are_none_are_refused(given: dict[str, float]) -> None:
     with pytest.raises(ValueError, match="needed"):

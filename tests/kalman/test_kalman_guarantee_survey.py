@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.guarantee import survey
-from gpbnb.kalman.guarantee.published import dynamax_tracking
+from gpbnb.kalman.guarantee.published import dynamax_tracking, filterpy_fusion, px4_landing_target
 
 
 def test_a_sample_recomputes_no_row_twice(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,3 +52,21 @@ def test_the_noises_of_dynamax_s_tracking_are_independent() -> None:
     assert (model.Q[0] == exact(unit) / 1000).all()
     assert (exact(unit) / 10 == model.P0).all()
     assert (model.R[0] == exact(np.eye(2, dtype=int))).all()
+
+
+def test_noises_of_filterpy_and_px4_are_those_of_their_time_steps() -> None:
+    """filterpy: white noise of an intensity of 0.02, R = 2². PX4: an acceleration of variance 10 that lasts a step."""
+    model, dt = filterpy_fusion(), Fraction(1, 10)
+    assert (model.Q[0] == Fraction(1, 50) * exact([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])).all()
+    assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (2**2, dt)
+    model, dt = px4_landing_target(), Fraction(1, 50)
+    assert (model.Q[0] == 10 * exact([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]])).all()
+    assert (model.R[0, 0, 0], model.Phi[0, 0, 1]) == (Fraction(5, 1000), dt)
+
+
+def test_a_filter_that_rounding_makes_unstable_has_a_row_without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    unstable = SimpleNamespace(for_ever=False, radius=1.03125)
+    monkeypatch.setattr(survey, "from_schedule", lambda *_: unstable)
+    (kept,) = (row for row in survey.load() if row.seed == 0)
+    assert (kept.n, kept.m) == (3, 1)
+    assert survey.compute(0) == kept._replace(radius="1.0312", runs=0, random="0", constant="0", chosen="0")

@@ -13,7 +13,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.array_forms import ArrayForm
 from gpbnb.kalman.array_run import ArrayRun, _double_doubles
-from gpbnb.kalman.array_steps import predict_root
+from gpbnb.kalman.array_steps import predict_root, predict_ud
 from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.covariance import Repair, is_definite, raised_until
 from gpbnb.kalman.emulation import emulate
@@ -184,3 +184,14 @@ def test_a_predicted_root_with_a_zero_on_the_diagonal_is_not_definite():
     assert not definite
     assert (root @ root.T).tolist() == (S @ S.T).tolist()
     assert predict_root(fmt.array([[1, 0], [0, 1]]), fmt.array([[2, 1], [0, 1]]), zero)[1]
+
+
+@pytest.mark.parametrize("zero", [0, 1])
+def test_a_predicted_variance_of_zero_is_reported_whichever_it_is(zero):
+    fmt, nothing = FloatFormat(2, 24), np.zeros((2, 2))
+    Phi = np.eye(2)
+    Phi[zero, zero] = 0
+    found, definite = predict_ud(fmt.array(Phi), fmt.array(np.eye(2)), fmt.array(nothing))
+    assert found.to_float().tolist() == Phi.tolist()
+    assert not definite
+    assert predict_ud(fmt.array(np.eye(2)), fmt.array(np.eye(2)), fmt.array(nothing))[1]
