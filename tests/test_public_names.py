@@ -1,6 +1,8 @@
 """The names of the package itself lead to the modules that define them."""
 
+import ast
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -34,3 +36,19 @@ def test_the_public_names_are_these():
     assert list(gpbnb.NAMED_FORMATS) == HOMES["arithmetic.named"].split()
     with pytest.raises(AttributeError, match="no attribute 'BINARY8'; the public names are BFLOAT16, "):
         _ = gpbnb.BINARY8
+
+
+def test_only_long_computations_of_commands_show_progress_unasked():
+    shown = set()
+    for path in Path(gpbnb.__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                given = node.args
+                defaults = [*zip(reversed(given.args), reversed(given.defaults), strict=False)]
+                defaults += zip(given.kwonlyargs, given.kw_defaults, strict=True)
+                shown |= {
+                    f"{path.stem}.{node.name}"
+                    for argument, default in defaults
+                    if argument.arg == "progress" and default is not None and ast.unparse(default) == "True"
+                }
+    assert shown == {"sweep.run", "year_runs.run_cases"}

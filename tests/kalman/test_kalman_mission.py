@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import mission_runs
+from gpbnb.kalman import mission, mission_runs
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.lockstep import Lockstep
 from gpbnb.kalman.mission import PARAMETERS, STATES, Mission
@@ -143,10 +143,26 @@ def test_the_sweep_changes_one_choice_at_a_time():
 def test_every_cell_of_the_sweep_can_be_computed():
     heads = [(*head, cell.first) for cell in mission_runs.CELLS for head in cell.heads()]
     assert len(set(heads)) == len(heads)
+    records = [
+        (*head, str(cell.first + i)) for cell in mission_runs.CELLS for head in cell.heads() for i in range(cell.count)
+    ]
+    assert sorted(records) == sorted(row[: mission_runs.SWEEP.key] for row in mission_runs.SWEEP.load().rows)
     for cell in mission_runs.CELLS:
         found = mission_runs.lockstep(replace(cell, count=1), 1)
         assert str(found.runs[0].form) == {"hung": "Hung (1984)", "innovation": "innovation"}[cell.form]
         assert [run.fmt.precision for run in found.runs] == list(cell.precisions)
+
+
+def test_measurements_are_whole_multiples_of_their_resolution(monkeypatch):
+    given = Mission()
+    H, truth = given.matrices(0, 2), np.array(given.start)
+    fine, _ = given.measurements(0, 0, truth, H, 200)
+    assert mission._VALUE["resolution of measurements"] == 1
+    monkeypatch.setitem(mission._VALUE, "resolution of measurements", 0.25)
+    coarse, _ = given.measurements(0, 0, truth, H, 200)
+    assert np.array_equal(coarse * 4, np.rint(coarse * 4))
+    assert not np.array_equal(coarse, np.rint(coarse))
+    assert np.abs(coarse - fine).max() == 0.5
 
 
 def test_the_filter_learns_the_roll_phase():

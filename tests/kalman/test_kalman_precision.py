@@ -337,6 +337,11 @@ def test_what_a_survey_refuses(arguments, message):
         precision.survey(**({"model": MODEL, "z": Z, "tolerance": 1e-3, "precisions": [10]} | arguments))
 
 
+def test_a_survey_of_what_is_neither_model_nor_function_says_what_is_needed():
+    with pytest.raises(TypeError, match="got a model int; needed a LinearModel or a LinearSystem"):
+        precision.survey(3, Z, 1e-3, [10])
+
+
 def test_an_answer_says_why_fewer_digits_were_refused():
     """A state without a variance, in which no run can go on; and a Q of rank one, which few bits make indefinite."""
     known = LinearModel(MODEL.Phi, MODEL.H, [[0, 0], [0, 0]], MODEL.R, MODEL.x0, [[2, 0], [0, 0]])

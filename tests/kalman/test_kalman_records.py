@@ -193,6 +193,8 @@ def test_rows_have_the_larger_error_of_both_drifts_and_of_both_rates():
 
 
 def test_the_cells_are_distinct_and_cover_the_threshold():
+    records = [(*head, str(cell.first + i)) for cell in CELLS for head in cell.heads() for i in range(cell.count)]
+    assert sorted(records) == sorted(row[: threshold.SWEEP.key] for row in threshold.SWEEP.load().rows)
     heads = [(*head, cell.first) for cell in CELLS for head in cell.heads()]
     assert len(set(heads)) == len(heads)
     nearest = {

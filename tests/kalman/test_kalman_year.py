@@ -249,6 +249,9 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
     assert saved == [(case, steps) for case in (SINGLE.reference, SINGLE) for steps in ends]
     monkeypatch.undo()
     assert results(parts) == results(whole)
+    once = Run(year_cases.model(SINGLE.model, SINGLE.base), SINGLE.fmt, SINGLE.form, ())
+    once.take(year_cases.simulation(SINGLE.model).measurements(STEPS))
+    assert results(whole)[1:] == (once.x.tolist(), once.P.tolist())
     assert year.bound_rows(SINGLE.reference, parts, STEPS) == year.bound_rows(SINGLE.reference, whole, STEPS)
     year_runs.reference_checkpoints.cache_clear()
     assert sorted(file.name for file in parts.iterdir()) == [f"{SINGLE.reference.name}.npz", f"{SINGLE.name}.npz"]

@@ -202,6 +202,7 @@ def test_dots_have_no_value():
         ("x[i,j] == P[k-1].inv", r"x_{ij}=P_{k-1}^{-1}"),
         ("x[i,k-1] == y[10,2]", r"x_{i,k-1}=y_{10,2}"),
         ("phi_2[k] == x", r"\phi_{2,k}=x"),
+        ("R_x_y == z", r"R_{x,y}=z"),
         ("x == 60*degree + y_total", r"x=60^{\circ}+y_{\text{total}}"),
         ("a - (b - c)", r"a-\left(b-c\right)"),
         ("s == Sum(x[j],(j,1,n))", r"s=\sum_{j=1}^{n}x_{j}"),

@@ -261,6 +261,15 @@ def test_a_header_and_gaps_in_measurements(files):
     assert np.array_equal(found, files[1], equal_nan=True)
 
 
+@pytest.mark.parametrize("header", ["z1,z2", " north , east"])
+def test_names_of_measurements_may_have_digits_and_spaces(header, tmp_path):
+    (tmp_path / "z.csv").write_text(f"{header}\n1,2\n3,4\n", encoding="utf-8")
+    assert read_measurements(tmp_path / "z.csv").tolist() == [[1, 2], [3, 4]]
+    (tmp_path / "z.csv").write_text("1,2\nz1,z2\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"z\.csv, line 2: got 'z1'"):
+        read_measurements(tmp_path / "z.csv")
+
+
 def test_systems_of_other_libraries_are_read():
     discrete = signal.dlti(*signal.butter(2, 0.3), dt=1)
     for given in (discrete, discrete.to_ss(), SimpleNamespace(A=[[1]], B=[[1]], C=[[1]], D=[[0]], dt=0.1)):
