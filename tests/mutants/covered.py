@@ -66,9 +66,9 @@ class Covered:
         self.seconds: dict[str, float] = found["seconds"]
 
     def tests(self, name: str, source: str, line: int) -> set[str]:
-        """Tests, and files whose fixtures do, that execute the statement of a line in a function."""
+        """Tests, and files whose fixtures do, that execute the statement of a line, or use what it defines."""
         executed = self._lines.get(name, {})
-        return {test for each in statement(source, line) for test in executed.get(str(each), ())}
+        return {test for each in statement(source, line) or uses(source, line) for test in executed.get(str(each), ())}
 
 
 def statement(source: str, line: int) -> range:
@@ -86,6 +86,19 @@ def statement(source: str, line: int) -> range:
                     end = max(getattr(first, "lineno", None) or first.pattern.lineno, node.lineno + 1)
                 found = range(node.lineno, end)
     return found
+
+
+def uses(source: str, line: int) -> set[int]:
+    """The lines of functions that use what the statement of a line outside functions defines."""
+    module = ast.parse(source)
+    names = set()
+    for node in module.body:
+        if node.lineno <= line <= (node.end_lineno or line):
+            stored = (each for each in ast.walk(node) if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store))
+            names = {node.name} if isinstance(node, ast.ClassDef) else {each.id for each in stored}
+    functions = (each for each in ast.walk(module) if isinstance(each, ast.FunctionDef))
+    inside = (each for function in functions for part in function.body for each in ast.walk(part))
+    return {each.lineno for each in inside if isinstance(each, ast.Name) and each.id in names}
 
 
 if __name__ == "__main__":
