@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import matplotlib
 import pytest
+from title_and_axes import TITLE_AND_AXES
 
 # Set here, not in the environment, which the kernels of the notebooks inherit: they draw inline.
 matplotlib.use("Agg")
@@ -11,13 +12,17 @@ pytest.register_assert_rewrite("exact_terms", "faults", "steps")
 
 
 @pytest.fixture
-def ax():
-    """An empty panel of a figure."""
+def ax(request):
+    """An empty panel of a figure, whose title and axes get the names written out in `title_and_axes`."""
     import matplotlib.pyplot as plt
 
     from gpbnb.display import style
 
     figure, axes = style.figure()
     yield axes[0]
+    if request.node.get_closest_marker("mpl_image_compare"):
+        (panel,) = figure.axes
+        found = panel.get_title(loc="left") or panel.get_title(), panel.get_xlabel(), panel.get_ylabel()
+        assert found == TITLE_AND_AXES.get(f"{request.path.parent.name} {request.node.name}", ("", "", ""))
     figure.canvas.draw()  # a figure that cannot be drawn, or warns, is of no use
     plt.close("all")

@@ -12,6 +12,7 @@ from sympy.core.function import AppliedUndef
 
 from gpbnb.display.derivation import Derivation, Step
 
+UNEVALUATED = (sp.Integral, sp.Sum, sp.Limit, sp.Derivative)
 AMOUNT = sp.Symbol("amount", positive=True)
 
 
@@ -49,6 +50,8 @@ def check(step: Step, alike: bool = False) -> None:
     assert step.name.count("$") % 2 == 0
     for wrong in wrong_ones(step):
         assert not wrong.holds
+    # What is still to be evaluated is on the left, its value on the right.
+    assert step.left.has(*UNEVALUATED) or not step.right.has(*UNEVALUATED)
     latex = step.latex()
     left, right = latex.split(r"\;=\;")
     assert (left.strip() == right.strip()) == alike

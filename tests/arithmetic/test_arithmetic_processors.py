@@ -410,6 +410,21 @@ class TestStochastic:
         assert set(x) == {1.0, 1 + 2.0**-7}
         assert abs(up - 0.3) < 5 * math.sqrt(0.3 * 0.7 / count)  # five standard errors
 
+    @pytest.mark.parametrize("seed", range(8))
+    def test_the_first_24_bits_of_splitmix64_decide(self, seed: int) -> None:
+        """Steele, Lea and Flood 2014. A number as near to the next one as the bits say is not rounded up."""
+        z = (seed + 0x9E3779B97F4A7C15) % 2**64
+        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+            z = (z ^ (z >> shift)) * factor % 2**64
+        drawn = Fraction((z ^ (z >> 31)) >> 40, 2**24)
+        fmt = replace(self.FMT, seed=seed)
+        for share, result in ((drawn, 1), (drawn + Fraction(1, 2**26), 1 + Fraction(1, 128))):
+            x = 1 + share / 128
+            assert x == Fraction(float(x))
+            for given in ([x], np.array([float(x)])):
+                fmt.restart()
+                assert fmt.array(given).to_fractions().tolist() == [result]
+
     def test_equal_entries_are_rounded_each_by_itself(self) -> None:
         self.FMT.restart()
         values = self.FMT.array(["1.003"] * 100).to_fractions()

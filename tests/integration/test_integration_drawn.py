@@ -293,7 +293,6 @@ def test_build_up(ax):
     assert near(names.pop("trapezoidal"), BLUE, (1, 1))
     assert near(names.pop("rectangular"), PINK, (1, 20))
     assert not names
-    assert ax.get_title(loc="left") == r"$\mu = 0.2$; green: theory; dashed: random walk only"
     return ax.figure
 
 
@@ -330,7 +329,6 @@ def test_rules_resonant(ax):
         assert found[name].get_ydata()[77] == pytest.approx(expected)
         assert look(found[name])[:2] == (paint, "-")
     assert found["trapezoidal"].get_ydata()[77] != found["Simpson"].get_ydata()[77]
-    assert ax.get_title(loc="left") == "resonant input, damping 0.05; colours as above"
     return ax.figure
 
 
@@ -403,7 +401,6 @@ def test_totals(ax, swept):
     assert near(names.pop("11 bits"), BLUE, (4000, 7))
     assert near(names.pop("20 bits, chopped"), PINK, (4000, 7 * 10**0.3))  # moved apart from the other
     assert not names
-    assert ax.get_title(loc="left") == "total error; stars mark the best rate"
     return ax.figure
 
 
@@ -433,7 +430,6 @@ def test_best_rates(ax):
         expected = max(math.log10(ends[text]), last + 1.2)
         assert math.log10(heights[text]) == pytest.approx(expected)
         last = expected
-    assert ax.get_title(loc="left") == "solid: rounded; dotted: chopped"
     return ax.figure
 
 
