@@ -38,6 +38,8 @@ X, Y = symbol("x"), symbol("y")
         (2 * sp.pi * X, "2*Math.PI*x"),
         (sp.Integer(2) ** 60 * X, "1.152921504606847e+18*x"),
         (sp.Rational(1, 3**40) * X, f"({1 / 3**40!r})*x"),
+        (sp.Rational(-(3**40), 7), repr(-(3**40) / 7)),
+        (sp.Rational(-5, 7), "-5/7"),
         (sp.Float("0.1") * X, "0.1*x"),
         (sp.UnevaluatedExpr(X) + 1, "x + 1"),
         (sp.codegen.cfunctions.expm1(-X), "Math.expm1(-x)"),

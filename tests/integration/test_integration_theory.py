@@ -398,6 +398,8 @@ BAD = [
     (lambda: theory.validity(0.0), "got excess = 0.0; needed 1e-9 to 1e3"),
     (lambda: theory.series(0), "got terms = 0; needed at least 1"),
     (lambda: theory.error_variance(-1, 1.0), "needed cycles, at least 0"),
+    (lambda: theory.error_variance([1, -1], 1.0), "needed cycles, at least 0"),
+    (lambda: theory.error_variance([1, math.inf], 1.0), "needed cycles, at least 0 and finite"),
     (lambda: theory.error_variance(1, 1.0, start=-0.1), "got start = -0.1"),
     (lambda: theory.error_variance(1, 1.0, start=math.inf), "got start = inf"),
     (lambda: theory.settling_cycles(1.0, 0.0), "got share = 0.0"),

@@ -190,6 +190,12 @@ class TestSearch:
         # In more digits than the wordlength, all bounds are multiples of β.
         assert all(c.same_digits for c in columns if c.detail.endswith("more digits"))
 
+    @pytest.mark.parametrize(
+        ("values", "falls"), [((3, 2, 1), True), ((3, 1, 2), False), ((2, 3, 1), False), ((2, 2, 1), False)]
+    )
+    def test_a_column_decreases_if_each_number_is_smaller(self, values, falls):
+        assert example.Column("8", "8", "x", "column sum", False, values).decreasing == falls
+
     def test_a_bound_below_the_error_would_be_seen(self, monkeypatch):
         columns = example.bound_readings()
         small = example.Column(

@@ -96,6 +96,25 @@ class TestFamilies:
             assert (a == c).all() == (family in experiment.FIXED)
             assert bounds.true_inverse(a)
 
+    def test_random_families_are_made_from_uniform_numbers(self):
+        """Drawn from the same seeds: whole multiples of 2**-30 from -1 to 1."""
+        rng = np.random.default_rng(3)
+        u = np.asarray(rng.integers(-(2**30), 2**30, (5, 5)).astype(object)) * Fraction(1, 2**30)
+        assert (draw("random", 5, seed=3) == u).all()
+        assert (draw("symmetric", 5, seed=3) == u + u.T).all()
+        nearly = np.vstack([u[:4], u[:4].sum(axis=0) + u[4] / 1000])
+        found = draw("nearly singular", 5, seed=3)
+        assert (found[:4] == nearly[:4]).all()
+        assert np.abs(found[4] - nearly[4]).max() < Fraction(1, 10**15)  # the nearest float64 to 1/1000
+        wilkinson = [[1, 0, 0, 0, 1], [-1, 1, 0, 0, 1], [-1, -1, 1, 0, 1], [-1, -1, -1, 1, 1], [-1, -1, -1, -1, 1]]
+        assert (draw("Wilkinson", 5, seed=3) == np.array(wilkinson, dtype=object) * (1 + u[0] / 1000)).all()
+        rng = np.random.default_rng(3)
+        rows, columns = ([Fraction(1, 10 ** int(k)) for k in rng.permutation(5)] for _ in range(2))
+        u = np.asarray(rng.integers(-(2**30), 2**30, (5, 5)).astype(object)) * Fraction(1, 2**30)
+        found = draw("graded", 5, seed=3)
+        for i, j in np.ndindex(5, 5):  # in float64, two products of a power of ten: four roundings
+            assert found[i, j] == pytest.approx(float(rows[i] * u[i, j] * columns[j]), rel=5e-16, abs=0)
+
     def test_what_they_are(self):
         assert draw("Hilbert", 3)[1].tolist() == [Fraction(1, 2), Fraction(1, 3), Fraction(1, 4)]
         symmetric = draw("symmetric", 6)
@@ -275,7 +294,8 @@ class TestCommand:
         monkeypatch.setattr(experiment, "SWEEPS", {"small": (lambda: cells, ("ball", "a posteriori"))})
         folder = tmp_path / "new" / "folder"
         given = ["small", "--folder", str(folder), "--first", "2", "--directory", str(tmp_path / "saved")]
-        assert command.main(given) == 0
+        for _ in range(2):  # the second time, the folder exists
+            assert command.main(given) == 0
         text = (folder / "small.csv").read_text(encoding="utf-8")
         assert "\n# command: python -m gpbnb.inversion small\n# seed: 1984\n# cells: 2 of 3\n" in text
         assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
