@@ -127,16 +127,44 @@ def test_a_saved_run_continues_with_the_same_bounds(tmp_path: Path, monkeypatch:
         assert (again.last == once.last).all()
 
 
-def test_the_command_follows_binary64_unless_told_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_follows_binary64_unless_told_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     none = horizon.Bounds(np.ones(10), np.ones(10), np.ones((10, 4)))
     asked = []
 
     def bounds(precision: int, steps: int, saved: Path) -> list[object]:
         asked.append((precision, steps, saved.name))
-        return [(steps, [none, none])]
+        return [(done, [none, none]) for done in (1, 2, steps)]
 
     monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
     for arguments in (["--steps", "3"], ["24", "--steps", "3"]):
         assert horizon.main([*arguments, "--output", str(tmp_path)]) == 0
     assert asked == [(53, 3, "state_53.pickle"), (24, 3, "state_24.pickle")]
-    assert [row.precision for row in horizon.load(tmp_path / horizon.FILE.name)] == [24, 24]
+    assert capsys.readouterr().err.count("3/3") == 2
+    assert [row.precision for row in horizon.load(tmp_path / horizon.FILE.name)] == [24] * 4
+
+
+def test_the_command_writes_lines_for_each_hundredth_of_a_year_and_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that goes on keeps the lines before the saved state, and waits for the next hundredth after the last."""
+    part, none = YEAR // 100, horizon.Bounds(np.ones(10), np.ones(10), np.ones((10, 4)))
+    steps = [1, part, part + 1, 2 * part, 2 * part + 1, 3 * part]
+
+    def bounds(precision: int, last: int, saved: Path) -> list[object]:
+        saved.touch()
+        return [(done, [none, none]) for done in steps if begin <= done <= last]
+
+    monkeypatch.setattr(horizon, "gravity_probe_b_bounds", bounds)
+    folder = ["--output", str(tmp_path)]
+
+    def written() -> list[int]:
+        return [row.steps for row in horizon.load(tmp_path / horizon.FILE.name)]
+
+    begin = 0
+    assert horizon.main(["24", "--steps", str(part + 1), *folder]) == 0
+    assert written() == [1, 1, part + 1, part + 1]
+    begin = part + 1  # the state was saved before the last line
+    assert horizon.main(["24", "--steps", str(3 * part), *folder]) == 0
+    assert written() == [1, 1, part + 1, part + 1, 2 * part + 1, 2 * part + 1, 3 * part, 3 * part]

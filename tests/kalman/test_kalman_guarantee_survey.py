@@ -70,3 +70,10 @@ def test_a_filter_that_rounding_makes_unstable_has_a_row_without_runs(monkeypatc
     (kept,) = (row for row in survey.load() if row.seed == 0)
     assert (kept.n, kept.m) == (3, 1)
     assert survey.compute(0) == kept._replace(radius="1.0312", runs=0, random="0", constant="0", chosen="0")
+
+
+def test_sizes_in_the_table_are_those_that_are_drawn() -> None:
+    columns = {column.name: column for column in survey.COLUMNS}
+    for name in ("n", "m"):
+        drawn = {getattr(row, name) for row in survey.load()}
+        assert drawn == set(range(int(columns[name].low), int(columns[name].high) + 1))

@@ -10,6 +10,7 @@ from markup import Elements
 from gpbnb import ledger
 from gpbnb.ledger import Row, load_statements, page
 from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.ledger.html import typeset
 from gpbnb.ledger.statements import DOCUMENTS, Statement
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
@@ -156,6 +157,13 @@ def test_root_errors_begin_with_the_one_that_spoils_most():
 def test_what_most_readers_skip_is_collapsed(finding, shown, collapsed):
     before, _, after = ledger.ledger_page([Row(STATEMENTS[0], finding)], ledger.PAGES[0]).html.partition("<details>")
     assert [re.findall(r'<p class="(\w+)">', text) for text in (before, after)] == [shown, collapsed]
+
+
+def test_quotation_marks_stay_and_what_would_be_markup_does_not():
+    shown = typeset('"less" than it\'s, $a<b$ & more <b>')
+    assert shown == (
+        '"less" than it\'s, <span class="math notranslate nohighlight">\\(a&lt;b\\)</span> &amp; more &lt;b&gt;'
+    )
 
 
 def test_printed_statements_are_collapsed_under_their_title():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,6 +182,16 @@ def test_a_sample_of_the_survey_has_one_to_three_gyros(monkeypatch):
     monkeypatch.setattr(stored, "compute", lambda gyros: gyros)
     rng = np.random.default_rng(1)
     assert {stored.sample(20, rng) for _ in range(30)} == {1, 2, 3}
+
+
+@pytest.mark.parametrize("folder", [None, Path("saved")])
+def test_the_stored_survey_is_that_of_its_periods_and_seed(folder, monkeypatch):
+    asked = []
+    monkeypatch.setattr(experiment, "drift_rates", lambda *given, **options: asked.append((given, options)))
+    monkeypatch.setattr(experiment, "survey_rng", lambda: "seeded")
+    monkeypatch.setattr(experiment, "survey_rows", lambda study: [("0", "1")])
+    assert stored.compute(7, folder) == [("0", "1")]
+    assert asked == [((experiment.SURVEY_PERIODS, 7, "seeded"), {"progress": folder is not None})]
 
 
 def test_the_stored_survey_is_computed_again_for_one_gyro_to_the_last_digit():
