@@ -400,6 +400,7 @@ def test_totals(ax, swept):
     assert (to_hex(star.get_markeredgecolor()).upper(), star.get_marker()) == (BLUE, "*")
     assert near(names.pop("11 bits"), BLUE, (4000, 7))
     assert near(names.pop("20 bits, chopped"), PINK, (4000, 7 * 10**0.3))  # moved apart from the other
+    assert ax.get_ylim() == (7 / 2, 99 * 5)
     assert not names
     return ax.figure
 

@@ -281,6 +281,14 @@ def test_progress_counts_the_steps_of_a_run(tmp_path):
     assert shown == [BLOCK, BLOCK, 100]
 
 
+def test_the_processor_time_of_a_run_is_that_of_its_blocks(tmp_path, monkeypatch):
+    """A clock goes on by 1, 10 and 100 seconds during the blocks, and by 1000 seconds between them."""
+    run, readings = ResumableRun(SINGLE, tmp_path, STEPS), iter([5, 6, 1006, 1016, 2016, 2116])
+    monkeypatch.setattr(year_runs, "time", SimpleNamespace(process_time=lambda: next(readings)))
+    run.advance(3)
+    assert run.seconds == ResumableRun(SINGLE, tmp_path, STEPS).seconds == 111
+
+
 def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch, capsys):
     here = tmp_path / "here"
     given = ["--directory", str(tmp_path / "saved"), "--steps", "100", "--cases", "3", "--output", str(here)]

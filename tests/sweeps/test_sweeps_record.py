@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from importlib.resources import files
 
 import pytest
 
@@ -15,6 +16,13 @@ VALUES = {"command": "python -m x", "seconds": 1.5, "names": ["é", "b"], "nothi
 def test_a_record_is_read_as_it_was_written(tmp_path):
     write_record(tmp_path / "a.json", VALUES)
     assert read_record(tmp_path / "a.json", "cure") == VALUES
+
+
+@pytest.mark.parametrize("name", ["year", "ensembles"])
+def test_a_stored_record_written_again_has_the_same_bytes(name, tmp_path):
+    stored = files("gpbnb.kalman").joinpath(f"{name}.json")
+    write_record(tmp_path / "again.json", read_record(stored, "cure"))
+    assert (tmp_path / "again.json").read_bytes() == stored.read_bytes()
 
 
 def test_every_damage_of_a_record_is_an_error_with_file_and_cure(tmp_path):

@@ -14,9 +14,11 @@ from distributed import Client, KilledWorker
 from executors import Failing, local_cluster
 
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
+from gpbnb.sweeps import sweep as sweep_module
+from gpbnb.sweeps.__main__ import SWEEPS
 from gpbnb.sweeps.command import INTERRUPTED, run_command
 from gpbnb.sweeps.stored import run, verify
-from gpbnb.sweeps.sweep import ATTEMPTS
+from gpbnb.sweeps.sweep import ATTEMPTS, machine
 
 
 class Cell(NamedTuple):
@@ -151,6 +153,27 @@ def test_what_is_stored_has_its_provenance(sweep):
     assert table.provenance["processor seconds"] == "12"
     assert table.provenance["versions"].startswith("numpy ")
     assert {"machine", "commit", "sha256"} < set(table.provenance)
+
+
+def test_outside_of_a_repository_there_is_no_commit(tmp_path, monkeypatch):
+    assert machine()["commit"] != "none"
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    monkeypatch.setattr(sweep_module, "__file__", str(tmp_path / "sweep.py"))
+    assert machine()["commit"] == "none"
+
+
+@pytest.mark.parametrize("stored", SWEEPS, ids=lambda each: each.name)
+def test_columns_refuse_numbers_that_cannot_be(stored):
+    accepted = {"base": ("2", "16"), "precision": ("1", "53"), "record": ("0", "9999"), "step": ("1", "3153600")}
+    for column in stored.columns:
+        if column.kind == "integer":
+            least, largest = accepted.get(column.name, ("0", None))
+            assert column.fault(least) is None
+            # The precision of the reference of a year is 0.
+            assert column.fault(str(int(least) - 1 - (column.name == "precision" and stored.name == "kalman/year")))
+            if largest:
+                assert column.fault(largest) is None
+                assert column.fault(str(int(largest) + 1))
 
 
 def test_a_sample_of_what_is_stored_is_verified(sweep):

@@ -37,6 +37,13 @@ ENTRIES = (
 PRINTED = {entry.id: entry for entry in ENTRIES}
 
 
+def test_the_norm_of_a_column_is_its_largest_entry_and_of_others_the_largest_column_sum():
+    """(21) and (22) of hung1984."""
+    assert matrix([[1], [-3], [2]]).norm() == FirstOrder(Fraction(3))
+    assert matrix([[1, 2], [-3, 4]]).norm() == FirstOrder(Fraction(6))
+    assert matrix([[1, -5]]).norm() == FirstOrder(Fraction(5))
+
+
 # -- the present state ----------------------------------------------------------------------------
 
 
