@@ -84,6 +84,17 @@ class TestInverses:
         # for each of 3 pivots: 6 divisions, and for 2 rows 6 products and 6 differences
         assert len(calls) == 3 * (6 + 2 * 12)
 
+    def test_numbers_near_another_are_nearer_than_asked(self):
+        fixed, floating = Wordlength("fixed point", Rounding.NEAREST), Wordlength("t = places", Rounding.NEAREST)
+        assert existence._near(Fraction(0), fixed, 1, Fraction(2, 10), False) == [
+            (0, 0),
+            (Fraction(1, 10), Fraction(-1, 10)),
+            (Fraction(1, 10), Fraction(1, 10)),
+        ]
+        # Spaced by 0.01 below one and by 0.1 above; squares of distances up to 0.01, and not it.
+        found = existence._near(Fraction(1), floating, 2, Fraction(1, 100), True)
+        assert found == [(Fraction(k, 100) ** 2, 1 - Fraction(k, 100)) for k in range(10)]
+
 
 class TestAgreement:
     @pytest.mark.parametrize("value", ["3.706e-2", "3.7055e-2", "3.7069e-2"])

@@ -14,9 +14,9 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import derivation, gains
+from gpbnb.kalman.guarantee import adversary, derivation, gains
 from gpbnb.kalman.guarantee.adversary import attack, ceiling, random_errors
-from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
+from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits, unit_disturbances
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
 from gpbnb.kalman.guarantee.gains import pack, schedule
 from gpbnb.kalman.guarantee.linear import biquad, controller, error_coefficients, peak_gain, state_space
@@ -425,6 +425,25 @@ def test_the_ceiling_adds_up_roundings_by_the_size_of_their_results():
         total = 0.5625 * total + sum(half[math.frexp(each)[1]] for each in sizes)
         x = sum(products)
     assert ceiling(found, z, 0) == pytest.approx(total, rel=1e-12)
+
+
+def test_the_ceiling_includes_the_errors_of_gain_and_closed_loop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without roundings, it is the distance of the filter with stored coefficients from the exact one."""
+    model = LinearModel([[1]], [[1]], [["0.3"]], [[1]], [0], [[1]])
+    found = guarantee(model, FloatFormat(2, 7), limits(1, 1, state=100, innovation=10), Form.HUNG)
+    monkeypatch.setattr(adversary, "units", lambda fmt: units(fmt)._replace(errors=0 * units(fmt).errors))
+    given, parts, z = found.schedule, unit_disturbances(found.schedule), np.array([[5.0], [-3.0], [7.0], [9.0]])
+    assert parts.loop[:4].any()
+    assert parts.gain[:4].any()
+    x = stored = 0.0
+    for k, value in enumerate(z[:, 0]):
+        at = k if k < given.steps else given.first + (k - given.first) % (given.steps - given.first)
+        K = given.exact[at, 0, 0, 0]
+        wrong = K + parts.gain[at, 0, 0]
+        stored = (1 - wrong + parts.loop[at, 0, 0]) * stored + wrong * value
+        x = (1 - K) * x + K * value
+    # products of two errors of coefficients, each of at most 2**-7, are neglected
+    assert ceiling(found, z, 0) == pytest.approx(abs(stored - x), rel=2**-7)
 
 
 def test_outputs_and_delays_have_a_guarantee():

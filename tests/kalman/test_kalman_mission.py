@@ -140,6 +140,16 @@ def test_the_sweep_changes_one_choice_at_a_time():
     assert len(found) == 2 * len(cell.precisions)
 
 
+def test_a_sample_is_one_record_of_one_format(monkeypatch):
+    asked = set()
+    monkeypatch.setattr(mission_runs, "compute", lambda cell: asked.add((cell.precisions, cell.first, cell.count)))
+    monkeypatch.setattr(mission_runs, "rows", lambda cell, result: [])
+    cell = replace(mission_runs.CELLS[0], precisions=(20, 24), first=5, count=3)
+    for seed in range(40):
+        mission_runs.sample(cell, np.random.default_rng(seed))
+    assert asked == {((precision,), record, 1) for precision in (20, 24) for record in (5, 6, 7)}
+
+
 def test_every_cell_of_the_sweep_can_be_computed():
     heads = [(*head, cell.first) for cell in mission_runs.CELLS for head in cell.heads()]
     assert len(set(heads)) == len(heads)

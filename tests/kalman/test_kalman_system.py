@@ -157,6 +157,14 @@ def test_shapes_that_do_not_fit(arguments, message):
         LinearSystem(**({"A": [["0.5"]], "B": [[1]]} | arguments))
 
 
+@pytest.mark.parametrize("x0", [[1, 0], [0, 1], [1, 1]])
+@pytest.mark.parametrize("basis", ["bound", "guarantee"])
+def test_a_system_with_a_first_state_has_no_bound(x0, basis):
+    system = LinearSystem([["0.5", 0], [0, "0.25"]], [[1], [1]], [[1, 1]], x0=x0)
+    with pytest.raises(ValueError, match=rf"got a first state .* and basis \"{basis}\"; needed x0 = 0 for a bound"):
+        required_precision(system, 80, 1e-3, z=U, basis=basis, within=limits(3, 1, measurement=1.0))
+
+
 def test_an_unstable_system_has_no_bound():
     growing = LinearSystem([["1.01"]], [[1]])
     found = required_precision(growing, 80, 1e-3, z=U, basis="bound")

@@ -135,6 +135,13 @@ def test_of_equally_serious_errors_the_one_with_more_statements_comes_first():
     assert re.findall(r'<tr><th scope="row">(\w+)</th>', html) == ["three", "two", "one", "four", "last"]
 
 
+def test_errors_list_the_statements_of_each_document_under_its_year():
+    ones = [next(each for each in STATEMENTS if each.document == document) for document in DOCUMENTS]
+    rows = [Row(each, compare(False, "1", Verdict.WRONG, "the same")) for each in ones]
+    places = re.findall(r"<p>(\d+): ", ledger.error_table(rows).html)
+    assert sorted(places) == ["1982", "1984", "2016"]
+
+
 def test_root_errors_begin_with_the_one_that_spoils_most():
     first, second, third = list(ledger.load_roots())[:3]
     roots = [first, second, second, second, third, third]

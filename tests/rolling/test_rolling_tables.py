@@ -9,6 +9,7 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.measurement import YEAR
 from gpbnb.rolling import experiment, tables, theory
 
 
@@ -145,6 +146,12 @@ def test_needed():
         "digits, by the bound": "10",
     }
     assert [cells[2] for cells in body] == ["recursion", "direct"]
+    # The bound is that of the whole duration, four times as long as the time before.
+    limit = 1e-4 / (6600.0 * 4000 * theory.INTERVAL / YEAR)
+    for row in by_header(tables.needed([600.0], [2], 6600.0, steps, 1e-4)):
+        bound = theory.rotation_bound(row["method"], 600.0, 4000)
+        assert row["digits, by the bound"] == str(theory.digits_needed(bound, 2, limit))
+        assert theory.digits_needed(bound, 2, 4 * limit) == theory.digits_needed(bound, 2, limit) - 2
     assert tables.needed([600.0], [10], 6600.0, [100, 1000]).title == "Digits for 1 mas"
     for cells in body:
         observed = experiment.digits_needed_observed(cells[2], 10, 6600.0, 600.0, steps, 1e-4)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -13,6 +15,7 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
 from gpbnb.kalman.guarantee.linear import biquad
+from gpbnb.kalman.guarantee.published import fixif_longitudinal
 from gpbnb.wordlength import figures, fixed_point, guarantees, processor_tables
 from gpbnb.wordlength.processors import Outcome, Processor, Sum
 
@@ -137,3 +140,23 @@ def test_figures_draw_every_finite_point() -> None:
     assert list(middle) == [2.0, 1.0]
     assert list(most) == [3.0, 1.5]
     plt.close(fig)
+
+
+def test_bits_of_the_controller_are_those_that_meet_its_target(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sixty-fourth at the output, the last of its errors; a unit in the last place there costs E 2**-w."""
+    coefficients = sum(fixif_longitudinal()["published_E"])
+    judged = []
+
+    def found(case: guarantees.Case, filter_: object, fmt: FloatFormat) -> SimpleNamespace:
+        return SimpleNamespace(bound=np.array([9.0, 2.0 ** (14 - fmt.precision)]))
+
+    def smallest(meets: Callable[[FloatFormat], bool], *_: object, **__: object) -> FloatFormat:
+        judged.extend(meets(FloatFormat(2, bits)) for bits in (19, 20, 21))
+        return FloatFormat(2, 20)
+
+    monkeypatch.setattr(guarantees, "_found", found)
+    monkeypatch.setattr(guarantees, "smallest_precision", smallest)
+    fixed, floating = guarantees.fixed_and_floating_bits()
+    assert coefficients / 2.0**fixed <= 1 / 64 < coefficients / 2.0 ** (fixed - 1)
+    assert floating == 20
+    assert judged == [False, True, True]
