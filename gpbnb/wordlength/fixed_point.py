@@ -204,7 +204,13 @@ def required_fraction_bits(
     tolerance : for each state, in the units of the model; infinite if the state does not matter.
     basis : "emulation" of these measurements, or "guarantee" for all measurements that do not overflow.
     rounding, coefficient_bits, wide : as for :func:`emulated`.
+
+    Raises
+    ------
+    ValueError : a tolerance that is not above 0, no finite tolerance, or another basis.
     """
+    if basis not in ("emulation", "guarantee"):
+        raise ValueError(f'got basis {basis!r}; needed "emulation" or "guarantee"')
     goal = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (given.filter.program.n,))
     if not (goal > 0).all() or not np.isfinite(goal).any():
         raise ValueError(f"got tolerance {tolerance}; needed errors above 0, one of them finite")

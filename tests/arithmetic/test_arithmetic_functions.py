@@ -128,6 +128,10 @@ def test_closeness_is_computed_exactly_from_any_numbers():
     edge = 1 + Fraction(1e-8) + Fraction(1e-5)  # the largest number close to 1, which float64 does not hold
     x, above = fmt.array([edge, 1]), edge + Fraction(1, 10**28)
     assert np.isclose(np.array([edge, above], dtype=object), fmt.array(1)).tolist() == [True, False]
+    for b in (1000, Fraction(-1, 4)):  # the tolerance is relative to the second number
+        edge = b + Fraction(1e-8) + abs(b) * Fraction(1e-5)
+        pair = np.array([edge, edge + Fraction(1, 10**28)], dtype=object)
+        assert np.isclose(pair, fmt.array(b)).tolist() == [True, False]
     assert np.allclose(x, 1)
     assert not np.allclose(x, 1, rtol=0)
     assert np.allclose(x, [1.1, 1.0], rtol=0, atol="0.1")

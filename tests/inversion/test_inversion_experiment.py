@@ -228,6 +228,7 @@ class TestKept:
         assert "python-flint" in kept.provenance["versions"]
         assert kept.provenance["commit"]
         cells, names = experiment.SWEEPS[sweep]
+        assert {row["bound"] for row in kept.rows} == set(names)
         for name in names:
             parts = [row for row in kept.select(bound=name) if row["format"] != "all"]
             (whole,) = kept.select(bound=name, family="all")

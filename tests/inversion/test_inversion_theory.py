@@ -421,6 +421,8 @@ def test_input_is_left_alone():
             lambda: theory.bound(Reduction(STAGES, RIGHTS, [[1]]), BETA),
             r"got 3 stages, right sides of shape \(3, 2\), a solution of shape \(1, 1\)",
         ),
+        (lambda: theory.residual_bound([[2]], [1]), r"residual: got shape \(1,\); needed a matrix"),
+        (lambda: theory.residual_bound([2], [[0]]), r"x: got shape \(1,\); needed a matrix"),
         (lambda: theory.residual_bound([[2]], [[1]]), r"got ‖R‖ = 1; needed less than 1; this takes a better inverse"),
         (lambda: theory.strict_first_bound([[2]], [[0]], [[3]]), r"got ‖A⁻¹‖‖ΔA‖ = 6; needed less than 1"),
         (lambda: theory.strict_bound(MADE_UP, Fraction(1, 20)), r"got ‖E‖ = \S+; needed less than 1; .* more digits"),

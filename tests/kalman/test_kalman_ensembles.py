@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
@@ -260,3 +261,10 @@ def test_none_is_lost_on_a_cluster_whose_worker_is_killed(cluster):
 def test_the_processes_of_this_machine_give_the_same():
     todo = some(4)
     assert sweep(todo, batch=2) == sweep(todo, batch=4)
+
+
+@pytest.mark.parametrize(
+    ("ratios", "largest"), [([math.nan], 0.0), ([math.nan, 0.5], 0.5), ([], 0.0), ([2.0, math.inf], math.inf)]
+)
+def test_an_error_of_zero_violates_no_bound_of_zero(ratios, largest):
+    assert ensembles._largest(np.array(ratios)) == largest

@@ -446,6 +446,21 @@ def test_the_ceiling_includes_the_errors_of_gain_and_closed_loop(monkeypatch: py
     assert ceiling(found, z, 0) == pytest.approx(abs(stored - x), rel=2**-7)
 
 
+@pytest.mark.parametrize(
+    "given",
+    [
+        ([[1, 0]], [[1]]),
+        ([[1, 0]], [[1]], [[1]], [[0]]),
+        ([[1]], [[1]], [[1, 2]], [[0]]),
+        ([[1]], [[1]], [[1]], [[0, 0]]),
+        ([[1]], [[1]], [[1]], [[0], [0]]),
+    ],
+)
+def test_a_state_space_filter_with_shapes_that_do_not_fit_is_refused(given) -> None:
+    with pytest.raises(ValueError, match=r"got A of shape .* needed \(n, n\) and \(n, m\), C \(p, n\), D \(p, m\)"):
+        state_space(*given)
+
+
 def test_outputs_and_delays_have_a_guarantee():
     """A delayed copy of a state has no disturbance of its own, nor has an output without a direct term."""
     A, B = [["0.5625", 0, 0], [1, 0, 0], [0, 1, 0]], [["0.4375"], [0], [0]]

@@ -26,6 +26,18 @@ def test_every_number_has_its_source():
     assert sum(each.source.startswith("ours") for each in PARAMETERS) < len(PARAMETERS) * 2 / 3
 
 
+def test_noises_keep_the_variances_of_pointing_and_of_flicker():
+    """A Gauss-Markov process of variance v has noise v (1 - phi²) per step; numbers are stored in four digits."""
+    model = Mission().model(10)
+    variances = dict.fromkeys((4, 5), mission._VALUE["pointing, standard deviation"] ** 2)
+    variances |= dict.fromkeys((10, 11, 12), mission._VALUE["1/f readout noise per decade of time constants"] ** 2)
+    Phi, Q = model.Phi[0], model.Q[0]
+    for state, variance in variances.items():
+        assert 0 < Phi[state, state] < 1
+        kept = float(Phi[state, state]) ** 2 * variance + float(Q[state, state])
+        assert kept == pytest.approx(variance, rel=2e-4)
+
+
 def test_annual_aberration_is_the_ellipse_of_the_star_s_latitude():
     both, orbit = (Mission(annual=annual).known_signal(YEAR) for annual in (True, False))
     ellipse = (both - orbit) / 20.5

@@ -116,6 +116,7 @@ def test_answers_count_fraction_bits() -> None:
     proved = fixed_point.required_fraction_bits(given, z, tolerance, "guarantee")
     assert observed.fmt is not None
     assert proved.fmt is not None
+    assert (observed.basis, proved.basis) == ("emulation", "guarantee")
     assert observed.fmt.fraction_bits <= proved.fmt.fraction_bits
     for answer in (observed, proved):
         ratios = dict(answer.tried)
@@ -158,3 +159,10 @@ def test_a_tolerance_is_above_zero_for_each_state_and_finite_for_one(tolerance: 
     given, z = tracked()
     with pytest.raises(ValueError, match="needed errors above 0, one of them finite"):
         fixed_point.required_fraction_bits(given, z, tolerance)
+
+
+@pytest.mark.parametrize("basis", ["bound", "probable", "", None])
+def test_fixed_point_has_two_bases(basis: Any) -> None:
+    given, z = tracked()
+    with pytest.raises(ValueError, match=rf"got basis {basis!r}; needed \"emulation\" or \"guarantee\""):
+        fixed_point.required_fraction_bits(given, z, 0.1, basis)

@@ -61,6 +61,26 @@ def test_each_power_stands_beside_its_grid_line():
     assert [float(y) for pair in lines for y in pair] == pytest.approx([float(y) - 4 for y, _ in names for _ in "12"])
 
 
+@pytest.mark.parametrize(
+    ("ratios", "powers"),
+    [
+        ((300.0, 0.4, 0.2), range(-1, 4)),
+        ((5e-3, 2e-9), range(-9, 1)),
+        ((9e7, 2e5), range(9)),
+        ((8e12, 1e6), range(0, 14)),
+    ],
+)
+def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
+    """Every second power if there are twelve or more steps between them."""
+    tried = tuple((20 + k, ratio) for k, ratio in enumerate(ratios))
+    drawn = replace(REPORT, answers=(replace(REPORT.answers[0], tried=tried),)).to_html()
+    names = re.findall(r'<text x="52" y="[^"]*" text-anchor="end">10([^<]*)</text>', drawn)
+    shown = [int(name.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))) for name in names]
+    assert shown == list(powers)[:: max(1, (len(powers) - 1) // 6)]
+    heights = [float(y) for y in re.findall(r'<circle cx="[^"]*" cy="([^"]*)"', drawn)]
+    assert all(30 <= y <= 280 for y in heights)
+
+
 def test_the_answer_comes_first():
     assert text_of(REPORT.to_html()).startswith(
         "Wordlength for tracker Wordlength for tracker This Kalman filter needs 21 bits to keep rounding errors within "
