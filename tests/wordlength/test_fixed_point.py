@@ -11,7 +11,7 @@ import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.kernels.rules import Rounding
-from gpbnb.kalman.guarantee.linear import biquad, controller
+from gpbnb.kalman.guarantee.linear import biquad, controller, state_space
 from gpbnb.kalman.guarantee.program import steps_in_python
 from gpbnb.kalman.simulation import Simulation
 from gpbnb.wordlength import examples, fixed_point
@@ -136,6 +136,16 @@ def test_a_tolerance_that_no_format_meets_has_no_answer() -> None:
     assert answer.tried[-1][0] == 59
     assert all(ratio > 1 for _, ratio in answer.tried)
     assert str(answer).startswith("no format, by guarantee: 59 fraction bits give ")
+
+
+@pytest.mark.parametrize(
+    ("b", "z", "place"), [("3", [1, 1.5], "a product, operation 2 of 3"), ("0.9", [3, 3], "a sum, operation 3 of 3")]
+)
+def test_overflow_is_in_a_product_or_in_a_sum(b: str, z: list[float], place: str) -> None:
+    """x = 0.9 x + b z, with numbers below four."""
+    given = fixed_point.unscaled(state_space([["0.9"]], [[b]]))
+    with pytest.raises(OverflowError, match=f"overflow in {place}, at step 2"):
+        fixed_point.emulated(given, np.array(z).reshape(-1, 1), FixedFormat(2, 8))
 
 
 def test_overflow_names_operation_and_step() -> None:
