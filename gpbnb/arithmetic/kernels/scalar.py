@@ -256,30 +256,19 @@ def _overload_two(stub: Callable[..., Any]) -> None:
         return None if function is None else lambda fmt, a, b: function(fmt, a, b)
 
 
-def _overload_one(stub: Callable[..., Any], argument: str) -> None:
-    if argument == "a":
-
-        @overload(stub, strict=False, jit_options=_INLINE)
-        def choose_a(fmt: Any, a: Any) -> Any:
-            if _tag(fmt) is Mixed:
-                return lambda fmt, a: stub(fmt.stored, a)
-            function = _implementation(fmt, stub.__name__)
-            return None if function is None else lambda fmt, a: function(fmt, a)
-
-    else:
-
-        @overload(stub, strict=False, jit_options=_INLINE)
-        def choose_x(fmt: Any, x: Any) -> Any:
-            if _tag(fmt) is Mixed:
-                return lambda fmt, x: stub(fmt.stored, x)
-            function = _implementation(fmt, stub.__name__)
-            return None if function is None else lambda fmt, x: function(fmt, x)
+def _overload_one(stub: Callable[..., Any]) -> None:
+    @overload(stub, strict=False, jit_options=_INLINE)
+    def choose(fmt: Any, x: Any) -> Any:
+        if _tag(fmt) is Mixed:
+            return lambda fmt, x: stub(fmt.stored, x)
+        function = _implementation(fmt, stub.__name__)
+        return None if function is None else lambda fmt, x: function(fmt, x)
 
 
 for _operation in (add, subtract, multiply, divide):
     _overload_two(_operation)
-_overload_one(sqrt, "a")
-_overload_one(round_, "x")
+_overload_one(sqrt)
+_overload_one(round_)
 
 
 @overload(negative, strict=False, jit_options=_INLINE)
