@@ -368,9 +368,9 @@ def test_the_parameters_of_the_mission():
 def test_what_a_bound_costs():
     fmt, k = FloatFormat(2, 24), 3
     terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
-    error, bound = np.zeros((1, 10)), np.full((1, 10), 9.0)
-    error[0, 2:4], bound[0, 2:4] = (0.25, -0.5), (1.0, 4.0)
-    history = SimpleNamespace(steps=np.array([k]), state=error)
+    error, bound = np.zeros((2, 10)), np.full((2, 10), 9.0)
+    error[1, 2:4], bound[1, 2:4] = (0.25, -0.5), (1.0, 4.0)
+    history = SimpleNamespace(steps=np.array([1, k]), state=error)
     found = SimpleNamespace(history=history, state=bound)
     reference = SimpleNamespace(steps=np.array([1, k]), rate=np.array([[0, 0], [0, 0.125]]))
     first, second = report_bounds.coefficients(k, 10, 2)
