@@ -46,7 +46,7 @@ FIELDS = (
 #: Outcomes in the order of the table. By hand, a survivor becomes equivalent, with the reason; survivors have one, too.
 OUTCOMES = ("caught", "timeout", "caught by a stored picture", "equivalent", "survived", "no test")
 NOT_CAUGHT = OUTCOMES[2:3] + OUTCOMES[4:]
-MOST_FILES = 12
+MOST_FILES = 30
 """Test files that judge a mutant, the nearest."""
 MOST_TESTS = 600
 """Tests that execute its line, the nearest."""
