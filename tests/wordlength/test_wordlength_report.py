@@ -66,12 +66,13 @@ def test_each_power_stands_beside_its_grid_line():
     [
         ((300.0, 0.4, 0.2), range(-1, 4)),
         ((5e-3, 2e-9), range(-9, 1)),
+        ((5e8, 2e-9), range(-9, 10)),
         ((9e7, 2e5), range(9)),
         ((8e12, 1e6), range(0, 14)),
     ],
 )
 def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
-    """Every second power if there are twelve or more steps between them."""
+    """Every second power if there are twelve steps between them, and every third if there are eighteen."""
     tried = tuple((20 + k, ratio) for k, ratio in enumerate(ratios))
     drawn = replace(REPORT, answers=(replace(REPORT.answers[0], tried=tried),)).to_html()
     names = re.findall(r'<text x="52" y="[^"]*" text-anchor="end">10([^<]*)</text>', drawn)

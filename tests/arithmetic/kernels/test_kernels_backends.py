@@ -150,3 +150,35 @@ def test_to_float_of_long_decimals_is_nearest() -> None:
     x = fmt.array(["9007199254740993", "0.1", "123456789012345678e30", "1e-300", "4.35", "1e22", "1e23"])
     assert x.to_float().tolist() == [float(v) for v in x.to_fractions()]
     assert fmt.array(Fraction(1, 3)).to_float() == 1 / 3
+
+
+@pytest.mark.parametrize(("base", "precision"), [(2, 24), (16, 6)])
+def test_floats_hold_powers_of_two_from_minus_960_to_1023(base: int, precision: int) -> None:
+    """At the edges: the smallest size is 2**-960, and all sizes are below 2**1024 with one digit to spare."""
+    carrier, bits = backend(base, precision, True), base.bit_length() - 1
+    least = -960 // bits - (precision - 1)
+    most = 1023 // bits - precision
+    for m, e, held in (
+        (base ** (precision - 1), least, True),
+        (base**precision - 1, least - 1, False),
+        (base**precision - 1, most, True),
+        (base ** (precision - 1), most + 1, False),
+    ):
+        found = carrier.from_exact(np.array([m], dtype=object), np.array([e], dtype=object))
+        assert (found is not None) == held
+        if found is not None:
+            assert Fraction(float(found[0][0])) == m * Fraction(base) ** e
+
+
+@pytest.mark.parametrize("rounding", Rounding.documented())
+@pytest.mark.parametrize(("base", "precision"), COMPILED)
+def test_numbers_of_usual_size_stay_on_the_compiled_backend(base: int, precision: int, rounding: Rounding) -> None:
+    fmt = FloatFormat(base, precision, rounding)
+    x, y = (made(fmt, [(base ** (precision - 1), -precision + k) for k in range(3)]) for _ in range(2))
+    for name in ("add", "subtract", "multiply", "divide", "sqrt", "round_"):
+        operands = (x, y)[: 1 if name in ("sqrt", "round_") else 2]
+        found = fmt.backend.apply(name, *(each.components for each in operands))
+        assert found is not None
+        assert found[0].shape == (3,)
+    for name in ("add", "multiply"):
+        assert fmt.backend.fold(name, x.components) is not None
