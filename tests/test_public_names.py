@@ -34,6 +34,7 @@ def test_the_public_names_are_these():
     assert dir(gpbnb) == sorted(gpbnb.__all__) == sorted(names)
     assert gpbnb.linalg is import_module("gpbnb.arithmetic.linalg")
     assert list(gpbnb.NAMED_FORMATS) == HOMES["arithmetic.named"].split()
+    assert {name: getattr(gpbnb, name) for name in gpbnb.NAMED_FORMATS} == import_module("gpbnb.arithmetic.named").NAMED
     with pytest.raises(AttributeError, match="no attribute 'BINARY8'; the public names are BFLOAT16, "):
         _ = gpbnb.BINARY8
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import pickle
 import re
 import shutil
 import subprocess
@@ -223,6 +224,19 @@ def test_every_cache_has_this_key():
     for path in caching.PACKAGE.rglob("*.py"):
         if path.name != "compiling.py":
             assert "cache=True" not in path.read_text(encoding="utf-8"), f"{path.name}: use `compiled` for a cache"
+
+
+def test_a_file_of_another_version_or_of_other_types_is_not_loaded(tmp_path):
+    """Names of files are shortened digests, which may agree by chance."""
+    files = compiling._Files(tmp_path, "function", ("a version",))
+    path = files._path("types")
+    for stamp, key, data in (
+        (("a version",), "others", None),
+        (("another",), "types", None),
+        (("a version",), "types", 7),
+    ):
+        path.write_bytes(pickle.dumps((stamp, key, 7)))
+        assert files._read(path, "types") == data
 
 
 def test_what_another_process_compiled_meanwhile_is_loaded(tmp_path, monkeypatch):
