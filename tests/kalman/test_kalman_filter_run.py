@@ -11,6 +11,7 @@ import pytest
 from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, model, run
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman import exact_step
 from gpbnb.kalman.bounded_run import BoundedRun, emulate_with_bound
 from gpbnb.kalman.emulation import compare_runs, emulate
@@ -164,6 +165,15 @@ def test_a_division_by_zero_ends_a_run_and_is_a_result():
     assert run.steps == 0
     assert np.array_equal(run.x, before)
     assert run.checkpoints().steps == ()
+
+
+def test_a_zero_pivot_ends_a_run_at_its_step():
+    """In the second step, both sensors measure the same, and eleven bits cannot hold their noise beside it."""
+    one, same = np.eye(2, dtype=int), [[1, 0], [1, 0]]
+    given = LinearModel(one, np.array([one, same, one]), one, exact([["1e-6", 0], [0, "1e-6"]]), [0, 0], one)
+    found = run(FloatFormat(2, 11), Form.INNOVATION, given, np.ones((4, 2)))
+    assert (found.steps, found.stopped) == (1, 2)
+    assert found.reason == "a zero pivot in the innovation covariance at step 2"
 
 
 @pytest.mark.parametrize("form", list(Form))

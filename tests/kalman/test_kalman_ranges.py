@@ -13,6 +13,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import Run, reference_states
+from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import guarantee, limits
 from gpbnb.kalman.guarantee.envelope import ROUNDING, units
@@ -54,6 +55,25 @@ def test_an_answer_names_the_quantity_and_the_step_that_overflow():
     assert found.fmt is None
     assert "overflow in " in found.why
     assert "at step " in found.why
+
+
+@pytest.mark.parametrize(
+    ("form", "given", "reason"),
+    [
+        (Form.INNOVATION, {"Phi": [[300]], "P0": [[300]]}, "the predicted covariance at step 1"),
+        (Form.INNOVATION, {"H": [[300]], "P0": [[300]]}, "the innovation covariance at step 1"),
+        (Form.INNOVATION, {"H": [["1/4096"]], "Q": [[0]], "R": [["1/16777216"]]}, "its inverse at step 1"),
+        (Form.INNOVATION, {"Phi": [[2]]}, "the estimate at step 2"),
+        (Form.UD, {"Phi": [[300]], "P0": [[300]]}, "the predicted covariance at step 1"),
+        (Form.UD, {"Phi": [[2]]}, "the update of factors and estimate at step 2"),
+    ],
+)
+def test_a_run_names_what_overflows(form, given, reason):
+    """Numbers above 65504: squares and products with 300, and the reciprocal of 2**-24; twice an estimate of 40000."""
+    model = LinearModel(**{"Phi": [[1]], "H": [[1]], "Q": [[1]], "R": [[1]], "x0": [0], "P0": [[1]]} | given)
+    run = Run(model, BINARY16, form, range(1, 3))
+    run.take(BINARY16.array(np.full((2, 1), 4e4)))
+    assert run.reason == f"overflow in {reason}"
 
 
 def test_more_range_gives_an_answer():

@@ -14,6 +14,7 @@ import pytest
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, backend
+from gpbnb.arithmetic.named import BINARY16, BINARY32, BINARY64
 
 OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
 COMPILED = [(2, 1), (2, 24), (2, 26), (2, 53), (10, 1), (10, 9), (10, 10), (10, 18), (16, 1), (16, 13)]
@@ -182,3 +183,11 @@ def test_numbers_of_usual_size_stay_on_the_compiled_backend(base: int, precision
         assert found[0].shape == (3,)
     for name in ("add", "multiply"):
         assert fmt.backend.fold(name, x.components) is not None
+
+
+@pytest.mark.parametrize("fmt", [BINARY16, BINARY32, BINARY64], ids=str)
+def test_fused_operations_stay_on_the_compiled_backend(fmt: FloatFormat) -> None:
+    x = fmt.array(["0.1", "2.5", "-3"]).components
+    assert isinstance(fmt.backend, Compiled)
+    assert fmt.backend.fuses
+    assert fmt.backend.apply("fused", x, x, x) is not None
