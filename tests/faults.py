@@ -5,6 +5,7 @@ A change takes pytest's monkeypatch, which undoes it.
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace as changed
@@ -27,6 +28,10 @@ Change = Callable[[pytest.MonkeyPatch], None]
 INVENTORY = ledger.load_statements()
 #: A change of a finding is written with ``python -m gpbnb.ledger --format text --output tests/ledger/findings.txt``.
 RECORDED = set((Path(__file__).parent / "ledger" / "findings.txt").read_text(encoding="utf-8").splitlines())
+
+with (Path(__file__).parent / "ledger" / "root_errors.csv").open(encoding="utf-8", newline="") as _file:
+    #: The root error of each statement that one spoils.
+    ROOTS = {line["statement"]: line["root"] for line in csv.DictReader(_file)}
 
 
 # -- what the checks found ------------------------------------------------------------------------
@@ -60,7 +65,7 @@ def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
 
 
 def check_texts(rows: Iterable[Row]) -> None:
-    """Results and notes are those on record. What differs has a note, and what was compared a number.
+    """Results, notes and root errors are those on record. What differs has a note, and what was compared a number.
 
     No note says seven words twice, or those of the result: a text that is joined from other parts than was meant, or in
     another order, repeats some of them or ends in a space.
@@ -68,6 +73,7 @@ def check_texts(rows: Iterable[Row]) -> None:
     rows = tuple(rows)
     assert [line for line in to_text(rows).splitlines() if line not in RECORDED] == []
     for row in rows:
+        assert row.finding.root == ROOTS.get(row.statement.id, ""), row.statement.id
         for text in (row.finding.note, row.finding.recomputed):
             assert text == " ".join(text.split()), row.statement.id
         words = row.finding.note.split()
