@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import pytest
@@ -96,3 +97,12 @@ def test_without_a_largest_the_range_grows(base, power):
 def test_an_empty_range_is_refused():
     with pytest.raises(ValueError, match="got precisions from 3 to 2"):
         smallest_precision(lambda fmt: True, least=3, largest=2)
+
+
+def test_the_reason_is_that_of_the_highest_precision_below_the_answer_that_has_one():
+    def error(fmt):
+        t = fmt.precision
+        return (0.5, "") if t >= 10 else (2.0, "") if t == 9 else (math.inf, f"the run stops at step {t}")
+
+    assert Search(error, FloatFormat(2, 5), ()).why == "in 8 digits the run stops at step 8"
+    assert Search(lambda fmt: (0.5, ""), FloatFormat(2, 5), ()).why == ""

@@ -443,3 +443,9 @@ def test_one_by_one():
     assert theory.printed_bracket(reduction, beta)[0, 0] == beta
     assert theory.printed_bound(reduction, beta) == theory.bound(reduction, beta) == third * beta
     assert abs(third - Fraction(1, 3)) <= theory.strict_bound(reduction, beta)
+
+
+def test_matrices_of_which_one_is_rounded_are_all_float64():
+    exactly, rounded = np.array([[Fraction(1, 3)]], dtype=object), np.array([[0.5]])
+    assert [each.dtype for each in theory._common(exactly, rounded, exactly)] == [np.float64] * 3
+    assert theory._common(exactly, exactly) == (exactly, exactly)

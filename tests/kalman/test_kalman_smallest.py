@@ -55,6 +55,7 @@ def test_the_largest_violating_noise_is_the_largest(fmt, second):
     found = smallest.largest_violating_noise(fmt, second)
     numbers = {Fraction(d, fmt.base ** (fmt.precision - 1 + e)) for e in range(3) for d in range(1, 100)}
     for name, largest in found.items():
+        assert largest <= 1
         assert getattr(smallest.ratios(fmt, smallest.scalar(fmt, largest), second), name) > 1
         for r in numbers:
             if largest < r <= 1 and fmt.round(r) == r:
