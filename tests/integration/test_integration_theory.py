@@ -421,3 +421,9 @@ BAD = [
 def test_bad_input_is_refused_with_the_cure(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+@pytest.mark.parametrize("rule", theory.RULES.values(), ids=lambda rule: rule.name)
+def test_harmonics_are_the_discrete_fourier_transform_of_the_weights(rule):
+    weights = np.array(rule.sample_weights(), dtype=float)
+    assert np.allclose(rule.harmonics(), np.fft.fft(weights) / rule.period, rtol=0, atol=1e-15)

@@ -13,6 +13,8 @@ from exact_terms import Distance, fractions, same
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.scalar import load
 from gpbnb.kalman import bounded_run, bounded_steps
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.factors import covariance_of_factors
@@ -22,6 +24,7 @@ from gpbnb.kalman.guarantee.bound import from_schedule, limits
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits, units
 from gpbnb.kalman.guarantee.linear import LinearFilter, _peak_gain, state_space
 from gpbnb.kalman.guarantee.program import Builder, Program, steps_in_python
+from gpbnb.kalman.kernels.bounded import widened
 from gpbnb.kalman.model import LinearModel
 
 FMT = FloatFormat(2, 24)
@@ -532,3 +535,20 @@ def test_each_step_has_the_errors_of_its_evaluation(form: Form, monkeypatch: pyt
             assert np.array_equal(found, exactly)
             assert (found > 0).all()
         assert asked[3] is dK
+
+
+@compiled
+def _widen(fmt: Any, x: Any, found: Any) -> None:
+    for k in range(len(found)):
+        wide = widened(fmt, load(fmt, x, k))
+        found[k, 0], found[k, 1] = wide[0], wide[1]
+
+
+@pytest.mark.parametrize("precision", [7, 17])
+def test_decimals_of_any_size_become_double_doubles_of_four_roundings(precision: int) -> None:
+    fmt = FloatFormat(10, precision)
+    x = fmt.array(["1234567", "2e22", "-1.5e30", "7.25e50", "3e-40", "-9.75e-22", "0"])
+    found = np.zeros((7, 2))
+    _widen(fmt.backend.tag, fmt.backend.pack(x.components), found)
+    for (high, low), true in zip(found.tolist(), x.to_fractions(), strict=True):
+        assert abs(F(high) + F(low) - true) <= 4 * abs(true) / 2**102

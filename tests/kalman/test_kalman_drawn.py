@@ -315,4 +315,5 @@ def test_guarantee(ax):
         "random measurements": (GREY, "-", ""),
     }
     assert [look(each)[0] for each in (bound, adversary, noise)] == [GREEN, BLUE, GREY]
+    assert ax.get_ylim() == pytest.approx((3e-3, 150))
     return ax.figure

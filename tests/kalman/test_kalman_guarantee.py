@@ -14,7 +14,7 @@ from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman.exact_step import exact_step
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import adversary, derivation, gains
+from gpbnb.kalman.guarantee import adversary, bound, derivation, gains
 from gpbnb.kalman.guarantee.adversary import attack, ceiling, random_errors
 from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits, unit_disturbances
 from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
@@ -305,7 +305,8 @@ def test_a_covariance_that_loses_definiteness_ends_the_bound() -> None:
     assert not run.stopped
 
 
-def test_an_integrator_has_no_bound_for_all_time() -> None:
+def test_an_integrator_has_no_bound_for_all_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bound, "_caps", lambda *_: pytest.fail("sizes for all time were asked for"))
     found = from_schedule(controller("1", "0.01", "2", "5").schedule(FloatFormat(2, 24)), limits(3, 1, measurement=1))
     assert not found.for_ever
     assert "not stable" in found.why

@@ -192,5 +192,5 @@ def test_the_filter_learns_the_roll_phase():
     assert early.days == pytest.approx(4096 * 10 / 86400)
     # A milliradian before the first measurement.
     assert late.deviation < early.deviation < 206
-    assert early.error < 4 * early.deviation
-    assert late.error < 4 * late.deviation
+    assert 0 < early.error < 4 * early.deviation
+    assert 0 < late.error < 4 * late.deviation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from importlib.resources import files
@@ -16,6 +17,13 @@ VALUES = {"command": "python -m x", "seconds": 1.5, "names": ["é", "b"], "nothi
 def test_a_record_is_read_as_it_was_written(tmp_path):
     write_record(tmp_path / "a.json", VALUES)
     assert read_record(tmp_path / "a.json", "cure") == VALUES
+
+
+def test_the_checksum_is_that_of_the_values_as_json(tmp_path):
+    text = '{"command": "python -m x", "seconds": 1.5, "names": ["é", "b"], "nothing": null}'
+    write_record(tmp_path / "a.json", VALUES)
+    found = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert found["sha256"] == hashlib.sha256(text.encode()).hexdigest()
 
 
 @pytest.mark.parametrize("name", ["year", "ensembles"])

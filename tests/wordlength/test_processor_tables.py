@@ -17,7 +17,7 @@ from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
 from gpbnb.kalman.guarantee.linear import biquad
 from gpbnb.kalman.guarantee.published import fixif_longitudinal
 from gpbnb.wordlength import figures, fixed_point, guarantees, processor_tables
-from gpbnb.wordlength.processors import Outcome, Processor, Sum
+from gpbnb.wordlength.processors import PROCESSORS, Outcome, Processor, Sum
 
 
 def test_outcomes_show_errors_or_why_there_is_none() -> None:
@@ -160,3 +160,11 @@ def test_bits_of_the_controller_are_those_that_meet_its_target(monkeypatch: pyte
     assert coefficients / 2.0**fixed <= 1 / 64 < coefficients / 2.0 ** (fixed - 1)
     assert floating == 20
     assert judged == [False, True, True]
+
+
+def test_names_of_processors_in_fixed_point_count_their_bits() -> None:
+    fixed = [each for each in PROCESSORS if isinstance(each.fmt, FixedFormat)]
+    assert fixed
+    for each in fixed:
+        before, after = each.fmt.integer_bits, each.fmt.fraction_bits
+        assert each.name == f"{1 + before + after}-bit fixed point, {before} bits before the point"
