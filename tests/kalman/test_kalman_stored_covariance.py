@@ -11,6 +11,7 @@ import pytest
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
+from gpbnb.kalman import array_run
 from gpbnb.kalman.array_forms import ArrayForm
 from gpbnb.kalman.array_run import ArrayRun, _double_doubles
 from gpbnb.kalman.array_steps import predict_root, predict_ud
@@ -205,3 +206,17 @@ def test_a_run_in_factors_reports_it_although_the_measurement_is_taken_as_usual(
     run = Run(LinearModel(Phi, [[1, 1]], [[0, 0], [0, 0]], [[1]], [0, 0], np.eye(2, dtype=int)), fmt, Form.UD, (1, 2))
     run.take(fmt.array(np.ones((2, 1))))
     assert (run.indefinite, run.stopped) == (1, None)
+
+
+@pytest.mark.parametrize("form", [Form.UD, ArrayForm.POTTER, ArrayForm.CARLSON])
+def test_a_bound_begins_with_the_distance_of_the_factors_from_the_covariance(form, monkeypatch):
+    """Above it, and by no more than a few roundings of float64."""
+    model, fmt, asked = chain(2, "0.1"), FloatFormat(2, 8), []
+    model = LinearModel(model.Phi, model.H, model.Q, model.R, model.x0, [["3", "1.1"], ["1.1", "0.7"]])
+    start = array_run.contraction_start
+    monkeypatch.setattr(array_run, "contraction_start", lambda P, x, off: asked.append(off) or start(P, x, off))
+    run = ArrayRun(model, fmt, form, (1,), bounded=True)
+    true = np.abs(run.covariance(run.P) - model.rounded(fmt).P0)
+    assert true.any()
+    for off, exactly in zip(asked[0].flat, true.flat, strict=True):
+        assert exactly <= Fraction(off) <= exactly * (1 + Fraction(1, 2**49))
