@@ -423,7 +423,10 @@ def test_bad_input_is_refused_with_the_cure(call, message):
         call()
 
 
-@pytest.mark.parametrize("rule", theory.RULES.values(), ids=lambda rule: rule.name)
+UNEVEN = theory.Rule("uneven", ((Fraction(1),), (Fraction(1, 2), Fraction(1, 2)), (Fraction(3, 4), Fraction(1, 4))))
+
+
+@pytest.mark.parametrize("rule", [*theory.RULES.values(), UNEVEN], ids=lambda rule: rule.name)
 def test_harmonics_are_the_discrete_fourier_transform_of_the_weights(rule):
     weights = np.array(rule.sample_weights(), dtype=float)
     assert np.allclose(rule.harmonics(), np.fft.fft(weights) / rule.period, rtol=0, atol=1e-15)
