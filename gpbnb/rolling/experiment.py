@@ -222,7 +222,7 @@ def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
 
 
 class LowPass(Enum):
-    """A kind of low-pass filter."""
+    """A kind of low-pass filter: a single pole or a moving average."""
 
     SINGLE_POLE = "single pole"
     MOVING_AVERAGE = "moving average"
