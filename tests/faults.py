@@ -30,7 +30,7 @@ INVENTORY = ledger.load_statements()
 RECORDED = set((Path(__file__).parent / "ledger" / "findings.txt").read_text(encoding="utf-8").splitlines())
 
 with (Path(__file__).parent / "ledger" / "root_errors.csv").open(encoding="utf-8", newline="") as _file:
-    #: The root error of each statement that one spoils.
+    #: The root error behind each statement that has one.
     ROOTS = {line["statement"]: line["root"] for line in csv.DictReader(_file)}
 
 
@@ -65,7 +65,7 @@ def by_verdict(rows: Iterable[Row]) -> dict[Verdict, set[str]]:
 
 
 def check_texts(rows: Iterable[Row]) -> None:
-    """Results, notes and root errors are those on record. What differs has a note, and what was compared a number.
+    """Results, notes and root errors match the record. Disagreements have a note, and comparisons a number.
 
     No note says seven words twice, or those of the result: a text that is joined from other parts than was meant, or in
     another order, repeats some of them or ends in a space.

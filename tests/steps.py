@@ -50,7 +50,7 @@ def check(step: Step, alike: bool = False) -> None:
     assert step.name.count("$") % 2 == 0
     for wrong in wrong_ones(step):
         assert not wrong.holds
-    # What is still to be evaluated is on the left, its value on the right.
+    # An unevaluated expression stands on the left, its value on the right.
     assert step.left.has(*UNEVALUATED) or not step.right.has(*UNEVALUATED)
     latex = step.latex()
     left, right = latex.split(r"\;=\;")

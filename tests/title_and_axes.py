@@ -1,6 +1,6 @@
-"""The titles and the names of the axes of every figure that is compared with a picture, written out.
+"""Expected title and axis labels of every figure that is compared with a stored picture.
 
-By folder and test: title, horizontal axis, vertical axis.
+Each key is a folder and a test; each value is the title, the horizontal and the vertical axis label.
 """
 
 TITLE_AND_AXES = {

@@ -207,7 +207,7 @@ def required_fraction_bits(
 
     Raises
     ------
-    ValueError : a tolerance that is not above 0, no finite tolerance, or another basis.
+    ValueError : a tolerance is not above 0, no tolerance is finite, or the basis is neither of the two.
     """
     if basis not in ("emulation", "guarantee"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "guarantee"')

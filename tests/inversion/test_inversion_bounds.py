@@ -324,6 +324,6 @@ class TestSmallestPrecision:
             bounds.smallest_precision(self.HILBERT, 1e-12, largest=8)
         with pytest.raises(ValueError, match="no precision gives a bound at all"):
             bounds.smallest_precision(self.HILBERT, 1e-12, largest=2)
-        # unless told otherwise, up to 60 digits: two rows that differ in the 70th
+        # The default limit is 60 digits; these two rows differ only in the 70th.
         with pytest.raises(ValueError, match="at most 60 base-10 digits"):
             bounds.smallest_precision([["1", "1"], ["1", "1." + 69 * "0" + "1"]], 1e-3)

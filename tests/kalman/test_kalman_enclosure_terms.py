@@ -223,7 +223,7 @@ def test_each_phase_of_the_set_takes_up_what_the_phases_before_it_add(monkeypatc
     stored: Any = SimpleNamespace(cycle=2)
     found = enclosure._enclose(stored, run, 0.0, Form.INNOVATION, 3, 60)
     begun = abs(start - centers[0])
-    # a step of phase 0 leads to the center of phase 1, and the other way round
+    # A step from phase 0 leads to the center of phase 1, and a step from phase 1 to that of phase 0.
     w0, w1 = 5 + abs(F(578) - 576), 11 + abs(F(643) - 640)
 
     def step(b0: F, b1: F) -> tuple[F, F]:

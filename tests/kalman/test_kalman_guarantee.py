@@ -443,7 +443,7 @@ def test_the_ceiling_includes_the_errors_of_gain_and_closed_loop(monkeypatch: py
         wrong = K + parts.gain[at, 0, 0]
         stored = (1 - wrong + parts.loop[at, 0, 0]) * stored + wrong * value
         x = (1 - K) * x + K * value
-    # products of two errors of coefficients, each of at most 2**-7, are neglected
+    # The ceiling is of first order in the coefficient errors, which are at most 2**-7.
     assert ceiling(found, z, 0) == pytest.approx(abs(stored - x), rel=2**-7)
 
 

@@ -122,7 +122,7 @@ def test_after_rolling(ax, found):
     assert near(names.pop("noise"), BLUE, (float(f[100]), flicker(500.0, f[100], 8.0)))
     assert near(names.pop("drift, rolled"), PURPLE, (1 / 80, float(found.line_signal.max())))
     assert not names
-    # a decade below the density A/f at the highest frequency, and thirty times that at the lowest
+    # from a tenth of A/f at the highest frequency to thirty times A/f at the lowest
     assert ax.get_ylim() == pytest.approx((500.0 / (0.5 / 8.0) / 10, 30 * 500.0 * 2.0e7))
     return ax.figure
 

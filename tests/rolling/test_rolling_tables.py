@@ -146,7 +146,7 @@ def test_needed():
         "digits, by the bound": "10",
     }
     assert [cells[2] for cells in body] == ["recursion", "direct"]
-    # The bound is that of the whole duration, four times as long as the time before.
+    # The bound covers all 4000 steps, four times as many as the entry before.
     limit = 1e-4 / (6600.0 * 4000 * theory.INTERVAL / YEAR)
     for row in by_header(tables.needed([600.0], [2], 6600.0, steps, 1e-4)):
         bound = theory.rotation_bound(row["method"], 600.0, 4000)

@@ -79,6 +79,7 @@ def test_about_seven_powers_cover_the_ratios_and_the_tolerance(ratios, powers):
     shown = [int(name.translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))) for name in names]
     assert shown == list(powers)[:: max(1, (len(powers) - 1) // 6)]
     heights = [float(y) for y in re.findall(r'<circle cx="[^"]*" cy="([^"]*)"', drawn)]
+    assert len(heights) == len(ratios)
     assert all(30 <= y <= 280 for y in heights)
 
 
