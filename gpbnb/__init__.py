@@ -19,6 +19,9 @@ wordlength. ``gpbnb.ledger`` judges every statement printed in the three documen
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+# Imported before all other modules: it notes the time, so that it can tell which of them change later.
+from gpbnb import caching as caching
+
 if TYPE_CHECKING:
     from gpbnb.arithmetic import linalg
     from gpbnb.arithmetic.array import FloatArray

@@ -153,12 +153,8 @@ def _processors() -> int:
 
 
 def _outputs(file: Path) -> list[Any] | None:
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-        os.utime(file)
-    except (OSError, ValueError):
-        return None
-    return list(found)
+    content = caching.read(file)
+    return None if content is None else list(json.loads(content))
 
 
 def _put(notebook: Any, outputs: list[Any]) -> None:
@@ -186,9 +182,7 @@ def work(path: Path, file: Path) -> None:
     caching.forget()
     if f"{path.stem}.{key_of(notebook)}.json" != name or name != file.name:
         raise RuntimeError(f"{path.name}, or what it depends on, was changed while it ran; run the command again")
-    draft = file.with_suffix(f".{os.getpid()}.tmp")
-    draft.write_text(json.dumps([c.outputs for c in notebook.cells if c.cell_type == "code"]), encoding="utf-8")
-    draft.replace(file)
+    caching.write(file, json.dumps([c.outputs for c in notebook.cells if c.cell_type == "code"]).encode())
 
 
 def write(path: Path, notebook: Any) -> bool:

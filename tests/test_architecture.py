@@ -100,20 +100,20 @@ def names_defined(nodes):
 
 
 EXTERNAL = {
-    "_CacheLocator",
     "_asdict",
-    "_cache_path",
     "_codegen",
     "_compiled_object",
     "_engine",
     "_ensure_finalized",
     "_fields",
     "_final_module",
-    "_impl",
+    "_index_key",
     "_make",
     "_mpf_",
     "_object_caching_enabled",
     "_print",
+    "_rebuild",
+    "_reduce",
     "_replace",
     "_repr_html_",
     "_repr_markdown_",

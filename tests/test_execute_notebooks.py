@@ -32,6 +32,7 @@ def copy(tmp_path):
         cells = [nbformat.v4.new_markdown_cell("Prose.", id="a"), nbformat.v4.new_code_cell(code, id="b")]
         nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "book" / f"{name}.ipynb")
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "GPBNB_CACHE_DIR": str(tmp_path / "cache")}
+    environment["XDG_CACHE_HOME"] = str(tmp_path / "other")
     paths = [str(tmp_path / "book" / f"{name}.ipynb") for name in CODE]
 
     def run(*options: str, status: int = 0) -> str:
@@ -88,6 +89,14 @@ def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     change(book / "kernels.ipynb", "print(exact.__name__)", "print(6 * 7)")
     assert executed(copy()) == {"kernels", "data"}
     assert '"42\\n"' in (book / "kernels.ipynb").read_text()
+    # Neither damaged outputs are believed, nor any that another user could have written.
+    for path in (copy.root / "cache" / "notebooks").glob("kernels.*.json"):
+        path.write_bytes(path.read_bytes().replace(b"42", b"43"))
+    assert executed(copy("--check")) == {"kernels"}
+    (copy.root / "cache").chmod(0o777)
+    told = copy("--check")
+    assert executed(told) == {"kernels", "data"}
+    assert f"but others can write to {copy.root / 'cache'}; needed a folder that only you can write" in told
 
 
 def test_the_longest_are_named_and_start_first():

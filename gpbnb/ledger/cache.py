@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields
@@ -25,8 +24,10 @@ from gpbnb.caching import (
     environment,
     imported,
     locked,
+    read,
     remove_unused,
     with_data,
+    write,
 )
 from gpbnb.ledger.finding import Finding, Verdict
 from gpbnb.ledger.statements import Statement
@@ -59,12 +60,7 @@ class Findings:
         if self._path is None or not self._changed:
             return
         content = {name: [getattr(each, field) for field in _FIELDS] for name, each in self._known.items()}
-        draft = self._path.with_name(f"{self._path.name}.{os.getpid()}.tmp")
-        try:
-            draft.write_text(json.dumps(content, default=lambda verdict: verdict.value), encoding="utf-8")
-            draft.replace(self._path)
-        except OSError:  # a full disk only costs time
-            draft.unlink(missing_ok=True)
+        write(self._path, json.dumps(content, default=lambda verdict: verdict.value).encode())
 
 
 def known(module: Path) -> Findings:
@@ -117,12 +113,9 @@ def _name(statement: Statement) -> str:
 
 
 def _read(path: Path) -> dict[str, Finding]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        os.utime(path)
-        return {name: _finding(**dict(zip(_FIELDS, values, strict=True))) for name, values in content.items()}
-    except (OSError, ValueError, TypeError):  # the file is missing or damaged, so the checks run again
-        return {}
+    content = read(path)
+    found = {} if content is None else json.loads(content)
+    return {name: _finding(**dict(zip(_FIELDS, values, strict=True))) for name, values in found.items()}
 
 
 def _finding(verdict: str, **others: Any) -> Finding:

@@ -117,10 +117,11 @@ def test_an_altered_statement_has_its_own_finding(folder, ran):
     assert ran == [ROUNDING, ROUNDING]
 
 
-def test_a_damaged_file_is_written_anew(folder, ran):
+@pytest.mark.parametrize("damage", [lambda whole: whole[:50], lambda whole: whole.replace(b"o", b"0")])
+def test_a_damaged_file_is_written_anew(folder, ran, damage):
     before = checking.examine_once(TWO)
     for path in folder.glob("*.json"):
-        path.write_text(path.read_text()[:50])
+        path.write_bytes(damage(path.read_bytes()))
     assert checking.examine_once(TWO) == before
     assert len(ran) == 6
     assert checking.examine_once(TWO) == before

@@ -3,13 +3,13 @@
 Use :func:`compiled` for functions that Python calls, and :func:`inner` for those that only compiled functions call.
 
 numba's own cache checks only the file that defines a function, and misses changes in other files whose functions are
-compiled into it. Here the key of the cache covers all files that the defining file imports. Several processes can fill
-the cache at the same time: they wait for each other and compile nothing twice.
+compiled into it. It ends a run if a file is damaged, and it can return a function for other types after two processes
+have filled it at the same time. Here a file contains one function for one set of types, and its name depends on all
+files that the defining file imports. Several processes wait for each other and compile nothing twice.
 """
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import os
 import pickle
@@ -24,10 +24,12 @@ import llvmlite
 import numba
 import numpy as np
 from numba import njit
-from numba.core import caching
+from numba.core.caching import FunctionCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
 
 from gpbnb.arithmetic.kernels.machine_code import generate_on_demand
-from gpbnb.caching import cache_folder, changed_since_import, digest, imported, lock, remove_unused, unlock, writable
+from gpbnb.caching import cache_folder, changed_since_import, digest, imported, lock, read, remove_unused, unlock, write
 
 _VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
 _LONGEST_WAIT = 240.0  # seconds, for another process that compiles the same function
@@ -44,8 +46,9 @@ def compiled(function: Callable[..., Any]) -> Any:
     """
     dispatcher = njit(nogil=True, no_cfunc_wrapper=True)(function)
     sources = imported(Path(function.__code__.co_filename).resolve())
-    if _folder() is not None and not changed_since_import(sources):
-        dispatcher._cache = _Cache(function)
+    folder = _folder()
+    if folder is not None and not changed_since_import(sources):
+        dispatcher._cache = _Cache(function, folder)
     return dispatcher
 
 
@@ -64,8 +67,7 @@ def inner(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 @lru_cache(maxsize=1)
 def _folder() -> Path | None:
-    chosen = Path(numba.config.CACHE_DIR).absolute()
-    return chosen if numba.config.CACHE_DIR and writable(chosen) else cache_folder("compiled")
+    return cache_folder("compiled", numba.config.CACHE_DIR)
 
 
 @cache
@@ -81,85 +83,49 @@ def _tell(folder: Path) -> None:
     remove_unused(folder)
 
 
-class _Locator(caching._CacheLocator):  # type: ignore[misc]
-    def __init__(self, function: Any, file: str) -> None:
-        self._py_file = file
-        self._lineno = function.__code__.co_firstlineno
-        self._folder = _folder()
+class _Cache(FunctionCache):  # type: ignore[misc]
+    """The cache of one function, with one file for each set of types."""
 
-    def get_cache_path(self) -> str:
+    def __init__(self, function: Any, folder: Path) -> None:
+        self._py_func, self._folder = function, folder
+        self._name = f"{function.__module__}.{function.__name__}"
+        self._stamp = (_stamp(Path(function.__code__.co_filename).resolve()), *_VERSIONS)
+        self._locks: dict[Path, IO[bytes] | None] = {}
+        self.enable()
+
+    @property
+    def cache_path(self) -> str:
         return str(self._folder)
 
-    def get_source_stamp(self) -> str:
-        return _stamp(Path(self._py_file).resolve())
-
-    def get_disambiguator(self) -> str:
-        return str(self._lineno)
-
-    @classmethod
-    def from_function(cls, function: Any, file: str) -> _Locator:
-        return cls(function, file)
-
-
-class _Implementation(caching.CompileResultCacheImpl):  # type: ignore[misc]
-    _locator_classes = (_Locator,)
-
-
-class _Cache(caching.FunctionCache):  # type: ignore[misc]
-    """numba's cache of a function, with one file for each set of types."""
-
-    _impl_class = _Implementation
-
-    def __init__(self, function: Any) -> None:
-        super().__init__(function)
-        self._cache_file = _Files(Path(self._cache_path), f"{function.__module__}.{function.__name__}", _stamp_of(self))
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        try:
-            super().save_overload(sig, data)
-        finally:
-            self._cache_file.release()
-
-
-def _stamp_of(cache: _Cache) -> tuple[str, ...]:
-    return (cache._impl.locator.get_source_stamp(), *_VERSIONS)
-
-
-class _Files:
-    """Cache files with the methods that numba expects: load, save and flush."""
-
-    def __init__(self, folder: Path, name: str, stamp: tuple[str, ...]) -> None:
-        self._folder, self._name, self._stamp = folder, name, stamp
-        self._locks: dict[Path, IO[bytes] | None] = {}
-
-    def load(self, key: Any) -> Any:
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        key = self._index_key(sig, target_context.codegen())
         path = self._path(key)
-        found = self._read(path, key)
+        found = _load(path, key, target_context)
         if found is None:
             if path not in self._locks:  # else it is still locked since a failed compilation
                 self._locks[path] = lock(path, _LONGEST_WAIT)
-            found = self._read(path, key)
+            found = _load(path, key, target_context)
             if found is None:
                 generate_on_demand()
                 _tell(self._folder)
             else:
-                self.release()
+                self._release()
         return found
 
-    def save(self, key: Any, data: Any) -> None:
-        path = self._path(key)
-        draft = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+    def save_overload(self, sig: Any, data: Any) -> None:
         try:
-            draft.write_bytes(caching.dumps((self._stamp, key, data)))
-            draft.replace(path)
-        except OSError:  # a full disk only costs time
-            draft.unlink(missing_ok=True)
+            if not data.library.has_dynamic_globals:
+                key = self._index_key(sig, data.codegen)
+                write(self._path(key), dumps((key, data._reduce())))
+        finally:
+            self._release()
 
     def flush(self) -> None:
         for path in self._folder.glob(f"{self._name}.*.compiled"):
             path.unlink(missing_ok=True)
 
-    def release(self) -> None:
+    def _release(self) -> None:
         """Unlock the files, so that waiting processes can read them."""
         while self._locks:
             unlock(*self._locks.popitem())
@@ -169,15 +135,14 @@ class _Files:
         short = hashlib.sha256(repr((self._stamp, str(key))).encode()).hexdigest()[:24]
         return self._folder / f"{self._name}.{short}.compiled"
 
-    def _read(self, path: Path, key: Any) -> Any:
-        try:
-            stamp, stored, data = pickle.loads(path.read_bytes())
-        except OSError:
-            return None
-        except Exception:  # truncated, or written by another version: compile again
-            return None
-        if stamp != self._stamp or stored != key:
-            return None
-        with contextlib.suppress(OSError):
-            os.utime(path)
-        return data
+
+def _load(path: Path, key: Any, target_context: Any) -> Any:
+    """Load a compiled function, or return None if it must be compiled."""
+    content = read(path)
+    if content is None:
+        return None
+    try:
+        stored, reduced = pickle.loads(content)
+        return CompileResult._rebuild(target_context, *reduced) if stored == key else None
+    except Exception:  # it was written by a library of the same version that differs from this one
+        return None

@@ -13,24 +13,28 @@ from importlib import import_module
 from pathlib import Path
 from types import FunctionType, ModuleType
 
+import numba
 import pytest
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.serialize import dumps
 
 from gpbnb import caching
 from gpbnb.arithmetic.kernels import compiling
 
 # The program loads the libraries once, and compiles a first function, which takes longest. Each line of input names a
 # folder and a number of processes: these load the package from the folder at the same time and say what they compiled.
+# They compute first what they are asked for, if anything.
 PROGRAM = """
 import io, json, os, sys
 import numba, numpy as np
 
 numba.njit(lambda x: x + 1.0)(1.0)
 
-def answer(folder, cache, with_product):
-    os.environ["GPBNB_CACHE_DIR"] = cache
+def answer(folder, environment, with_product, first):
+    os.environ.update(environment)
     sys.path.insert(0, folder)
     sys.stderr = io.StringIO()
+    exec(first)
     from gpbnb.alone import alone
     from gpbnb.outer import outer
 
@@ -108,12 +112,15 @@ def copy(tmp_path, server):
         with_product = False
         told = ""
 
-        def run(self) -> dict:
-            (found,) = self.run_at_once(1)
+        def __init__(self) -> None:
+            self.environment = {"GPBNB_CACHE_DIR": str(tmp_path / "cache"), "XDG_CACHE_HOME": str(tmp_path / "next")}
+
+        def run(self, first: str = "") -> dict:
+            (found,) = self.run_at_once(1, first)
             return found
 
-        def run_at_once(self, count: int) -> list[dict]:
-            server.stdin.write(json.dumps([count, str(tmp_path), str(self.cache.parent), self.with_product]) + "\n")
+        def run_at_once(self, count: int, first: str = "") -> list[dict]:
+            server.stdin.write(json.dumps([count, str(tmp_path), self.environment, self.with_product, first]) + "\n")
             server.stdin.flush()
             found = [json.loads(server.stdout.readline()) for _ in range(count)]
             self.told = "".join(each.pop("stderr") for each in found)
@@ -161,14 +168,122 @@ def test_two_processes_compile_nothing_twice(copy):
     assert not list(copy.cache.glob("*.lock"))
 
 
-def test_a_damaged_file_is_compiled_again(copy):
+def sealed(path: Path, content: bytes) -> bytes:
+    """A file as it would be written with this content, which no damage explains."""
+    return caching._seal(path, content) + content
+
+
+DAMAGES = {
+    "empty": lambda path, whole: b"",
+    "cut in the seal": lambda path, whole: whole[:31],
+    "only a seal": lambda path, whole: whole[:32],
+    "cut": lambda path, whole: whole[:-1],
+    "zeros": lambda path, whole: bytes(len(whole)),
+    "zeros at the end": lambda path, whole: whole[: len(whole) // 2] + bytes(len(whole) - len(whole) // 2),
+    "of the former format": lambda path, whole: whole[32:],
+    "sealed, no pickle": lambda path, whole: sealed(path, b"no pickle"),
+    "sealed, a number": lambda path, whole: sealed(path, pickle.dumps(7)),
+    "sealed, three things": lambda path, whole: sealed(path, pickle.dumps((1, 2, 3))),
+    "sealed, a missing class": lambda path, whole: sealed(path, b"cgpbnb.nowhere\nNothing\n."),
+}
+
+
+@pytest.mark.parametrize("damage", [*DAMAGES, *range(10)])
+def test_a_damaged_file_is_compiled_again(copy, damage):
+    """A number stands for a changed bit in that tenth of the file, where pickled objects and machine code are."""
     copy.run()
-    paths = list(copy.cache.glob("*.compiled"))
+    paths = sorted(copy.cache.glob("*.compiled"))
     assert len(paths) == 2
     for path in paths:
-        path.write_bytes(path.read_bytes()[:100])
+        whole = path.read_bytes()
+        if damage in DAMAGES:
+            path.write_bytes(DAMAGES[damage](path, whole))
+        else:
+            at = (2 * damage + 1) * len(whole) // 20
+            path.write_bytes(whole[:at] + bytes([whole[at] ^ 8]) + whole[at + 1 :])
     assert copy.run() == {"values": VALUES, "compiled": ["outer", "alone"]}
     assert copy.run() == {"values": VALUES, "compiled": []}
+
+
+def test_files_that_changed_places_are_compiled_again(copy):
+    copy.run()
+    one, two = copy.cache.glob("*.compiled")
+    first = one.read_bytes()
+    one.write_bytes(two.read_bytes())
+    two.write_bytes(first)
+    assert copy.run() == {"values": VALUES, "compiled": ["outer", "alone"]}
+
+
+def test_a_folder_in_place_of_a_file_costs_only_time(copy):
+    copy.run()
+    for path in copy.cache.glob("*.compiled"):
+        path.unlink()
+        path.mkdir()
+    assert copy.run() == copy.run() == {"values": VALUES, "compiled": ["outer", "alone"]}
+
+
+class Planted:
+    """An object that writes a file when it is loaded."""
+
+    def __init__(self, marker: Path) -> None:
+        self._marker = marker
+
+    def __reduce__(self):
+        return open, (str(self._marker), "w")
+
+
+@pytest.mark.skipif(caching.pwd is None, reason="no modes of files on this system")
+@pytest.mark.parametrize("variable", ["GPBNB_CACHE_DIR", "XDG_CACHE_HOME", "HOME", "NUMBA_CACHE_DIR"])
+def test_a_file_planted_where_others_write_is_not_loaded(copy, tmp_path, variable):
+    """Each owner and mode of a folder is tried in tests/test_caching.py."""
+    kept = tmp_path / "kept"
+    kept.mkdir(mode=0o700)
+    marker = tmp_path / "marker"
+    copy.environment |= {"GPBNB_CACHE_DIR": "", "XDG_CACHE_HOME": "", "HOME": str(tmp_path / "home")}
+    copy.environment[variable] = str(kept)
+    first = "import numba; numba.config.reload_config()" if variable == "NUMBA_CACHE_DIR" else ""
+    assert copy.run(first)["compiled"] == ["outer", "alone"]
+    paths = sorted(kept.rglob("*.compiled"))
+    assert len(paths) == 2
+    for path in paths:
+        path.write_bytes(sealed(path, pickle.dumps(Planted(marker))))
+    assert copy.run(first) == {"values": VALUES, "compiled": ["outer", "alone"]}
+    assert marker.exists()  # the user's own files are loaded
+    marker.unlink()
+    for path in paths:
+        path.write_bytes(sealed(path, pickle.dumps(Planted(marker))))
+        path.chmod(0o666)
+    assert copy.run(first) == {"values": VALUES, "compiled": ["outer", "alone"]}
+    for path in paths:
+        path.write_bytes(sealed(path, pickle.dumps(Planted(marker))))
+    kept.chmod(0o777)
+    assert copy.run(first) == {"values": VALUES, "compiled": ["outer", "alone"]}
+    assert not marker.exists()
+    told, notice = copy.told.splitlines()
+    assert f"but others can write to {kept}; needed a folder that only you can write" in told
+    assert str(kept) not in notice
+    assert all(path.read_bytes().endswith(pickle.dumps(Planted(marker))) for path in paths)
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_a_process_that_runs_old_code_keeps_nothing(copy, hidden):
+    """It has imported a constant, whose file changes before it first compiles; if `hidden`, keeping the old time."""
+    path = copy.folder / "inner.py"
+    old = path.read_text("utf-8")
+    first = (
+        "import gpbnb.inner, os, pathlib; inner = pathlib.Path(gpbnb.inner.__file__); then = inner.stat()\n"
+        f"inner.write_text({old.replace('2.0', '1000.0')!r})\n"
+    )
+    if hidden:
+        first += "os.utime(inner, (then.st_atime, then.st_mtime))"
+    assert copy.run(first) == {"values": VALUES, "compiled": ["outer", "alone"]}
+    assert copy.run() == {"values": VALUES | {"outer": 1001.0}, "compiled": ["outer"]}
+
+
+def test_the_notice_can_be_turned_off(copy):
+    copy.environment |= {"GPBNB_QUIET": "1"}
+    assert copy.run()["compiled"] == ["outer", "alone"]
+    assert copy.told == ""
 
 
 def test_a_folder_that_cannot_be_written_to_is_left_out(copy, tmp_path):
@@ -226,27 +341,49 @@ def test_every_cache_has_this_key():
             assert "cache=True" not in path.read_text(encoding="utf-8"), f"{path.name}: use `compiled` for a cache"
 
 
-def test_a_file_of_another_version_or_of_other_types_is_not_loaded(tmp_path):
-    """Names of files are shortened digests, which may agree by chance."""
-    files = compiling._Files(tmp_path, "function", ("a version",))
-    path = files._path("types")
-    for stamp, key, data in (
-        (("a version",), "others", None),
-        (("another",), "types", None),
-        (("a version",), "types", 7),
-    ):
-        path.write_bytes(pickle.dumps((stamp, key, 7)))
-        assert files._read(path, "types") == data
+@pytest.fixture
+def one(tmp_path):
+    """The cache of a function, and what another process would save there."""
+
+    def half(x):
+        return 0.5 * x
+
+    dispatcher = numba.njit(half)
+    dispatcher(1.0)
+    caches = [compiling._Cache(half, tmp_path) for _ in range(2)]
+    ((types, result),) = dispatcher.overloads.items()
+    return *caches, types, result
 
 
-def test_what_another_process_compiled_meanwhile_is_loaded(tmp_path, monkeypatch):
+def test_what_another_process_compiled_meanwhile_is_loaded(one, tmp_path, monkeypatch):
     """The other process saves its result while this one waits for the lock."""
-    files, other = (compiling._Files(tmp_path, "function", ("a version",)) for _ in range(2))
+    here, other, types, result = one
     released = []
-    monkeypatch.setattr(compiling, "lock", lambda path, wait: other.save("types", "compiled"))
+    monkeypatch.setattr(compiling, "lock", lambda path, wait: other.save_overload(types, result))
     monkeypatch.setattr(compiling, "unlock", lambda path, file: released.append(path))
     monkeypatch.setattr(compiling, "_tell", lambda folder: pytest.fail("it would be compiled twice"))
-    assert files.load("types") == "compiled"
-    assert released == list(tmp_path.glob("*.compiled"))
-    assert files.load("types") == "compiled"
-    assert len(released) == 1
+    for _ in range(2):
+        assert here.load_overload(types, cpu_target.target_context).entry_point(3.0) == 1.5
+        assert released == list(tmp_path.glob("*.compiled"))
+    here.flush()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_of_other_types_or_with_another_object_is_not_loaded(one):
+    """Names of files are shortened digests, which may agree by chance."""
+    here, _, types, result = one
+    context = cpu_target.target_context
+    key = here._index_key(types, context.codegen())
+    path, whole = here._path(key), result._reduce()
+    name, kind, (code, bits) = whole[0]
+    assert kind == "object"
+    for content, loaded in (
+        ((key, whole), True),
+        (("others", whole), False),
+        ((key, 7), False),
+        ((key, whole[1:]), False),
+        ((key, ((name, kind, (code, b"no bitcode")), *whole[1:])), False),
+        ((key, ((name, "unknown", bits), *whole[1:])), False),
+    ):
+        caching.write(path, dumps(content))
+        assert (compiling._load(path, key, context) is not None) is loaded, content
