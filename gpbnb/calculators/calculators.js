@@ -4,6 +4,7 @@ window.gpbnbCalculators ??= (() => {
   const known = new Map();
   const SVG = "http://www.w3.org/2000/svg";
   const POINTS = 121;
+  const MOST_TICKS = 100;
   const SPOKEN_AFTER = 400; // ms without a change, so that a moved slider does not speak at every step
 
   const superscript = (n) => String(n).replace(/[-\d]/g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
@@ -25,7 +26,8 @@ window.gpbnbCalculators ??= (() => {
     const needed = `needed ${input.whole ? "a whole number" : "a number"} from ${limit(input.least)} to ${limit(input.most)}`;
     const cure = input.cure ? `; ${input.cure}` : "";
     if (!text) throw new Error(`Got nothing; ${needed}.`);
-    if (!/^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i.test(text)) {
+    // Each character can be read in one way only, so that long texts are tested at once.
+    if (!/^[+-]?(\d+(\.\d*)?|\.\d+)(e[+-]?\d+)?$/i.test(text)) {
       const form = /^[\d.,\s]+$/.test(text) ? "with a point as decimal mark and no separators" : "such as 10, 0.5 or 1e-3";
       throw new Error(`Got “${shorten(typed.trim())}”; ${needed}, ${form}.`);
     }
@@ -46,10 +48,10 @@ window.gpbnbCalculators ??= (() => {
     return made;
   }
 
-  // Positions along an axis, and where its ticks are.
-  function scale(low, high, from, to, log, apart) {
-    const [a, b] = log ? [Math.log10(low), Math.log10(high)] : [low, high];
-    const place = (x) => from + (((log ? Math.log10(x) : x) - a) / (b - a || 1)) * (to - from);
+  // Positions along an axis from a to b, and its ticks. A logarithmic axis is given by exponents, because a power of ten
+  // beyond the range of numbers, above the largest or below the smallest result, has no other form.
+  function scale(a, b, from, to, log, apart) {
+    const along = (t) => from + ((t - a) / (b - a || 1)) * (to - from);
     const wanted = Math.max(2, Math.floor(Math.abs(to - from) / apart));
     let step = Math.max(log ? 1 : 10 ** Math.floor(Math.log10((b - a) / wanted || 1)), 1e-9);
     for (const factor of [1, 2, 5, 10, 20, 50, 100]) {
@@ -58,9 +60,16 @@ window.gpbnbCalculators ??= (() => {
         break;
       }
     }
-    const ticks = [];
-    for (let i = Math.ceil(a / step - 1e-9); i * step <= b + 1e-9 * step; i++) ticks.push(Number((i * step).toPrecision(12)));
-    return { place, ticks: ticks.map((t) => (log ? [10 ** t, `10${superscript(t)}`] : [t, String(t)])) };
+    const first = Math.ceil(a / step - 1e-9);
+    const count = Math.min(Math.floor(b / step + 1e-9) - first + 1, MOST_TICKS);
+    const at = new Set();
+    for (let i = 0; i < count; i++) at.add(Number(((first + i) * step).toPrecision(12)));
+    // Where neighbouring ticks agree in 12 digits, the rounded ones may be the same, or beyond the axis.
+    const ticks = [...at].filter((t) => t >= a - 1e-9 * step && t <= b + 1e-9 * step);
+    return {
+      place: (x) => along(log ? Math.log10(x) : x),
+      ticks: ticks.map((t) => [along(t), log ? `10${superscript(t)}` : String(t)]),
+    };
   }
 
   function sweep(spec, values) {
@@ -71,7 +80,7 @@ window.gpbnbCalculators ??= (() => {
     const at = new Set();
     for (let i = 0; i < POINTS; i++) {
       const share = i / (POINTS - 1);
-      const x = input.log ? low * (high / low) ** share : low + (high - low) * share;
+      const x = input.log ? low ** (1 - share) * high ** share : low + (high - low) * share;
       at.add(input.whole ? Math.round(x) : x);
     }
     return [...at].map((x) => ({ x, values: spec.compute({ ...values, [input.name]: x }) }));
@@ -82,22 +91,26 @@ window.gpbnbCalculators ??= (() => {
     const input = spec.inputs.find((each) => each.name === name);
     const width = Math.max(box.clientWidth, 240);
     const height = Math.min(340, Math.max(240, 0.55 * width));
+    box.classList.remove("calculator-old");
     const svg = element("svg", { viewBox: `0 0 ${width} ${height}`, width, height, "aria-hidden": "true" });
     const points = sweep(spec, values);
     const drawn = (v) => Number.isFinite(v) && v > 0;
     const heights = points.flatMap((p) => curves.map(([curve]) => p.values[curve])).filter(drawn);
-    if (!heights.length) return;
-    const bottom = 10 ** Math.floor(Math.log10(Math.min(...heights)));
-    const top = 10 ** Math.ceil(Math.log10(Math.max(...heights)) + 1e-9);
-    const x = scale(points[0].x, points.at(-1).x, 58, width - 14, input.log, 70);
-    const y = scale(bottom, top > bottom ? top : 10 * bottom, height - 44, 28, true, 36);
-    for (const [value, label] of x.ticks) {
-      const at = x.place(value);
+    if (!heights.length) {
+      box.replaceChildren();
+      box.setAttribute("aria-label", `${spec.figure.title}: no result is a positive number, so there is no curve.`);
+      return;
+    }
+    const bottom = Math.floor(Math.log10(Math.min(...heights)));
+    const top = Math.ceil(Math.log10(Math.max(...heights)) + 1e-9);
+    const [low, high] = [points[0].x, points.at(-1).x].map((end) => (input.log ? Math.log10(end) : end));
+    const x = scale(low, high, 58, width - 14, input.log, 70);
+    const y = scale(bottom, top, height - 44, 28, true, 36);
+    for (const [at, label] of x.ticks) {
       svg.append(element("line", { class: "grid", x1: at, x2: at, y1: 28, y2: height - 44 }));
       svg.append(element("text", { x: at, y: height - 26, "text-anchor": "middle" }, label));
     }
-    for (const [value, label] of y.ticks) {
-      const at = y.place(value);
+    for (const [at, label] of y.ticks) {
       svg.append(element("line", { class: "grid", x1: 58, x2: width - 14, y1: at, y2: at }));
       svg.append(element("text", { x: 52, y: at + 4, "text-anchor": "end" }, label));
     }
@@ -123,6 +136,13 @@ window.gpbnbCalculators ??= (() => {
     );
   }
 
+  // The curve of earlier numbers stays, but looks and sounds old.
+  function age(box) {
+    if (box.classList.contains("calculator-old")) return;
+    box.classList.add("calculator-old");
+    box.setAttribute("aria-label", `Figure of earlier numbers, because a field is not valid. ${box.getAttribute("aria-label")}`);
+  }
+
   function legend(spec, list) {
     spec.figure.curves.forEach(([, label], i) => {
       const item = document.createElement("li");
@@ -139,6 +159,7 @@ window.gpbnbCalculators ??= (() => {
     const sentence = form.querySelector("output");
     const of = (name, part = "") => form.querySelector(`#calculator-${spec.id}-${name}${part}`);
     let latest = null;
+    let drawn = null; // the numbers of the figure
     let timer = 0;
 
     const toSlider = (input, value) => (input.log ? Math.log10(value) : value);
@@ -185,11 +206,13 @@ window.gpbnbCalculators ??= (() => {
       }
       if (!latest) {
         form.dataset.state = "waiting";
+        age(box);
         say(`Nothing computed: see what is said below ${wrong.join(" and ")}.`, now);
         return;
       }
       form.dataset.state = "computed";
-      draw(spec, box, latest);
+      drawn = latest;
+      draw(spec, box, drawn);
       say(fill(spec.sentence, latest), now);
     }
 
@@ -217,7 +240,10 @@ window.gpbnbCalculators ??= (() => {
     form.hidden = false;
     legend(spec, form.querySelector(".calculator-legend"));
     update(true);
-    new ResizeObserver(() => latest && draw(spec, box, latest)).observe(box);
+    new ResizeObserver(() => {
+      if (drawn) draw(spec, box, drawn);
+      if (!latest) age(box);
+    }).observe(box);
   }
 
   return {
