@@ -244,14 +244,12 @@ def judge(judges: Judges, name: str, mutant: Mutant) -> dict[str, str]:
             if codes is not None:
                 found = judges.run(chosen, way, how, codes)
             else:
-                compiled, times = set(COMPILED.glob("*")), path.stat()
+                compiled = set(COMPILED.glob("*"))
                 try:
                     path.write_text(other, encoding="utf-8")
                     found = judges.run(chosen, way, how)
                 finally:
                     path.write_text(source, encoding="utf-8")
-                    # With a newer time of the file, tests that are already imported would compile again.
-                    os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
                 if how.stamps is None:  # what was compiled from a fault is of no further use
                     for file in set(COMPILED.glob("*")) - compiled:
                         file.unlink()

@@ -261,6 +261,8 @@ class Collected:
         def task(recorder: _Recorder) -> None:
             for function, code in codes.items():
                 function.__code__ = code
+            # Files that had a fault for a while are again as they were imported.
+            importlib.import_module("gpbnb.caching")._IMPORTED = time.time()
             # Findings of the checks are kept by the sources in files, which do not have the fault.
             importlib.import_module("gpbnb.ledger.cache")._folder = lambda: None
             importlib.import_module("gpbnb.ledger.cache")._file.cache_clear()
