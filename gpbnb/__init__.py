@@ -19,8 +19,7 @@ wordlength. ``gpbnb.ledger`` judges every statement printed in the three documen
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# Imported before all other modules: it notes the time, so that it can tell which of them change later.
-from gpbnb import caching as caching
+from gpbnb import clock as clock  # before all other modules, because it notes the time
 
 if TYPE_CHECKING:
     from gpbnb.arithmetic import linalg

@@ -19,6 +19,8 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
+from gpbnb.clock import IMPORTED
+
 try:
     import fcntl
 except ImportError:  # on Windows, processes do not wait for each other
@@ -37,7 +39,7 @@ _BY_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 _READING = os.O_RDONLY | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOFOLLOW", 0)
 _SEAL = hashlib.sha256().digest_size
 _NO_DATA = (".py", ".pyc", ".tmp", ".lock")
-_IMPORTED = time.time()
+_IMPORTED = IMPORTED
 _KEPT = 30 * 24 * 3600.0  # seconds after the last use
 _MOST_LINKS = 40  # in one path, as in Linux
 _WARNING = (

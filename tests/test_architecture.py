@@ -14,6 +14,7 @@ ROOT = Path(gpbnb.__file__).parent
 LONGEST_FILE = 500
 TOPICS = ("rounding", "inversion", "kalman", "rolling", "integration", "budget", "geometry")
 LAYERS = (
+    ("clock",),
     ("caching",),
     ("arithmetic",),
     ("display", "measurement", "sweeps"),

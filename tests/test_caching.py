@@ -70,7 +70,7 @@ def folder_in(environment: dict[str, str], package: Path) -> str:
 def installed(tmp_path):
     """The package as it is installed: no pyproject.toml beside it."""
     (tmp_path / "site" / "gpbnb").mkdir(parents=True)
-    for name in ("__init__.py", "caching.py"):
+    for name in ("__init__.py", "caching.py", "clock.py"):
         (tmp_path / "site" / "gpbnb" / name).write_bytes((caching.PACKAGE / name).read_bytes())
     return tmp_path / "site"
 

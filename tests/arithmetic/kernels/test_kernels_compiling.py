@@ -98,7 +98,7 @@ def copy(tmp_path, server):
     """A copy of the arithmetic, with three small modules beside it; `copy.run()` says what a process compiled."""
     package = tmp_path / "gpbnb"
     package.mkdir()
-    for name in ("__init__.py", "caching.py"):
+    for name in ("__init__.py", "caching.py", "clock.py"):
         shutil.copy(caching.PACKAGE / name, package)
     shutil.copytree(
         caching.PACKAGE / "arithmetic", package / "arithmetic", ignore=shutil.ignore_patterns("__pycache__")
