@@ -72,7 +72,7 @@ class DerivativeRule:
     def gain(self, angle: ArrayLike) -> Floats:
         r"""Return the response :math:`\sum_iw_{2i}(-\theta^2)^i` of a long sum at :math:`\omega T = \theta`."""
         square = -(np.asarray(angle, dtype=np.float64) ** 2)
-        return np.polynomial.polynomial.polyval(square, [float(w) for w in self.even()])
+        return np.asarray(np.polynomial.polynomial.polyval(square, [float(w) for w in self.even()]), dtype=np.float64)
 
 
 def hermite(derivatives: int) -> DerivativeRule:

@@ -100,8 +100,13 @@ class Lags(Process):
 
     def folded(self, period: float, theta: Fraction = Fraction(0)) -> float:
         r"""Sum the density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`."""
-        sides = [summed(lambda k, s=sign: self.psd(2 * np.pi * (k + s * float(theta)) / period)) for sign in (1, -1)]
-        return sides[0] + sides[1] + (float(self.psd(2 * np.pi * float(theta) / period)) if theta else 0.0)
+
+        def density(k: Floats) -> Floats:
+            return self.psd(2 * np.pi * k / period)
+
+        shift = float(theta)
+        total = summed(lambda k: density(k + shift)) + summed(lambda k: density(k - shift))
+        return total + (float(density(np.array(shift))) if theta else 0.0)
 
 
 def summed(term: Callable[[Floats], Floats], most: int = 2**14) -> float:
