@@ -389,8 +389,8 @@ def derivatives() -> Derivation:
     ]
     folded = sp.expand(kept.subs(angle, 2 * sp.pi * k) ** 2)
     for m, ratio in ((3, sp.Rational(3, 10)), (4, sp.Rational(2, 15)), (5, sp.Rational(3, 25))):
-        terms = [term * k ** (-2 * m) for term in sp.Add.make_args(folded)]
-        sums = together(*(sp.Sum(term, (k, 1, sp.oo)) for term in terms))
+        split = (term.as_independent(k) for term in sp.Add.make_args(folded))
+        sums = together(*(factor * sp.Sum(power * k ** (-2 * m), (k, 1, sp.oo)) for factor, power in split))
         steps.append(Step(f"the share of the variance after {m} lags", over(sums, sp.zeta(2 * m)), ratio))
     return Derivation(tuple(steps))
 
