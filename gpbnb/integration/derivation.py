@@ -319,6 +319,82 @@ def transient() -> Derivation:
     )
 
 
+# -- other rules ----------------------------------------------------------------------------------
+
+
+def least() -> Derivation:
+    r"""Derive the least error variance of n + 1 weighted samples that integrate a constant exactly; T = P = 1.
+
+    The samples leave n times the variance of one cycle's integral. The best weights minimize the variance of a sum
+    of samples whose weights, beyond those of the expected integral, add up to n(1 - h). They are proportional to
+    w, for which the covariances :math:`\varphi^{|i-j|}` of the samples give 1 in each row.
+    """
+    i = sp.Symbol("i", integer=True, positive=True)
+    n = sp.Symbol("n", integer=True, positive=True)
+    end, inner = 1 / (1 + PHI), (1 - PHI) / (1 + PHI)
+    phi = sp.exp(-MU)
+    walk_rate, th, s = walk(), (1 - phi) / (1 + phi), sp.Symbol("s", positive=True)
+    h = 2 * th / MU
+    along = sp.Integral(sp.exp(-MU * s), (s, 0, 1))
+    own = sp.Integral(2 * (1 - s) * sp.exp(-MU * s), (s, 0, 1))
+
+    def powers(count: sp.Expr) -> sp.Expr:
+        return PHI * (1 - PHI**count) / (1 - PHI)
+
+    return Derivation(
+        (
+            Step(
+                "row $i$ between the ends: $\\sum_j\\varphi^{|i-j|}w_j$",
+                together(end * PHI**i, inner * powers(i - 1), inner, inner * powers(n - i - 1), end * PHI ** (n - i)),
+                sp.S.One,
+            ),
+            Step("the first row, and the last", together(end, inner * powers(n - 1), end * PHI**n), sp.S.One),
+            Step(
+                "the sum of $w$, with $\\tanh\\frac\\mu2=\\frac{1-\\varphi}{1+\\varphi}$",
+                together(2 * end, (n - 1) * inner),
+                1 + n * inner,
+            ),
+            Step("the integral over a cycle that two samples of size 1 let expect", over(2 * along, 1 + phi), h),
+            Step("the variance of that integral that the samples leave", together(own, -h * along), h * walk_rate),
+            Step("$1-h=L\\tanh\\frac\\mu2$", 1 - h, walk_rate * th),
+            Step(
+                "the least variance",
+                together(n * L * (1 - L * inner), over((n * L * inner) ** 2, 1 + n * inner)),
+                n * L - L**2 + L**2 / (1 + n * inner),
+            ),
+        )
+    )
+
+
+def derivatives() -> Derivation:
+    r"""Derive the two-point rule with two derivatives, and its random walk relative to the trapezoidal rule; T = 1.
+
+    A component with ωT = 2πk is folded to frequency zero; m lags give it a density proportional to :math:`k^{-2m}`
+    for fast sampling.
+    """
+    c, k = sp.symbols("c_0:6"), sp.Symbol("k", integer=True, positive=True)
+    weights = (sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(1, 120))
+    polynomial = sum(c[d] * TIME**d for d in range(6))
+    slopes = [sp.diff(polynomial, TIME, j) for j in range(3)]
+    rule = [
+        w * (f.subs(TIME, 0) + (-1) ** j * f.subs(TIME, 1))
+        for j, (w, f) in enumerate(zip(weights, slopes, strict=True))
+    ]
+    angle = sp.Symbol("theta", real=True)
+    old, new = (sum(w * (sign * sp.I * angle) ** j for j, w in enumerate(weights)) for sign in (1, -1))
+    kept = 1 - angle**2 / 60
+    steps = [
+        Step("exact for each polynomial of degree 5", sp.Integral(polynomial, (TIME, 0, 1)), together(*rule)),
+        Step("a sample's part in the cycles after and before it, at $\\theta=\\omega T$", together(old, new), kept),
+    ]
+    folded = sp.expand(kept.subs(angle, 2 * sp.pi * k) ** 2)
+    for m, ratio in ((3, sp.Rational(3, 10)), (4, sp.Rational(2, 15)), (5, sp.Rational(3, 25))):
+        split = (term.as_independent(k) for term in sp.Add.make_args(folded))
+        sums = together(*(factor * sp.Sum(power * k ** (-2 * m), (k, 1, sp.oo)) for factor, power in split))
+        steps.append(Step(f"the share of the variance after {m} lags", over(sums, sp.zeta(2 * m)), ratio))
+    return Derivation(tuple(steps))
+
+
 # -- the expansion for small μ, (36)-(39) ---------------------------------------------------------
 
 

@@ -9,7 +9,7 @@ The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
@@ -50,6 +50,98 @@ class Process:
         s = np.asarray(omega, dtype=np.float64)
         total: Any = sum(2 * c * p / (p * p + s * s) for c, p in zip(self.weights, self.poles, strict=True))
         return np.asarray(self.sigma**2 * np.real(total))
+
+    def folded(self, period: float, theta: Fraction = Fraction(0)) -> float:
+        r"""Sum the density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`.
+
+        Poisson's formula, :math:`\sum_kS(2\pi f_c(k+\theta)) = T\sum_nR(nT)\cos2\pi n\theta`, is evaluated in as many
+        digits as it cancels.
+        """
+        mu = max(abs(p) for p in self.poles) * period
+        total = mpmath.mpf(0)
+        with mpmath.workdps(30 + 8 * max(1, math.ceil(abs(math.log10(mu)) + 1))):
+            # Weights rounded to float64 would not cancel; for a resonance, exact ones follow from the drift.
+            for c, p in _exact_modes(self):
+                z = p * mpmath.mpf(period)
+                if theta == 0:
+                    total += mpmath.re(c * (mpmath.coth(z / 2) - 2 / z))
+                else:
+                    angle = 2 * mpmath.pi * theta.numerator / theta.denominator
+                    total += mpmath.re(c * mpmath.sinh(z) / (mpmath.cosh(z) - mpmath.cos(angle)))
+            return float(total * period) * self.sigma**2
+
+
+@dataclass(frozen=True)
+class Lags(Process):
+    r"""White noise that has passed `count` first-order filters of equal bandwidth; :func:`lags` creates it.
+
+    It has `count` - 1 derivatives. The entries of z are the input and combinations of its derivatives.
+    """
+
+    count: int
+
+    def autocovariance(self, tau: ArrayLike) -> Floats:
+        """Return the autocovariance R at the lags `tau` in s, a polynomial times an exponential."""
+        a = self.poles[0].real * np.abs(np.asarray(tau, dtype=np.float64))
+        m = self.count - 1
+        total = sum(
+            math.factorial(m + i) // (math.factorial(i) * math.factorial(m - i)) * (2 * a) ** (m - i)
+            for i in range(m + 1)
+        )
+        share = math.factorial(m) / math.factorial(2 * m)
+        return np.asarray(self.sigma**2 * share * total * np.exp(-a))
+
+    def psd(self, omega: ArrayLike) -> Floats:
+        """Return the two-sided spectral density at `omega` in rad/s; integrated over frequency in Hz, it gives σ²."""
+        bandwidth, m = self.poles[0].real, self.count - 1
+        peak = 2 * 4.0**m / math.comb(2 * m, m) / bandwidth
+        ratio = np.asarray(omega, dtype=np.float64) / bandwidth
+        return np.asarray(self.sigma**2 * peak * (1 + ratio * ratio) ** -self.count)
+
+    def folded(self, period: float, theta: Fraction = Fraction(0)) -> float:
+        r"""Sum the density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`."""
+
+        def density(k: Floats) -> Floats:
+            return self.psd(2 * np.pi * k / period)
+
+        shift = float(theta)
+        total = summed(lambda k: density(k + shift)) + summed(lambda k: density(k - shift))
+        return total + (float(density(np.array(shift))) if theta else 0.0)
+
+
+def summed(term: Callable[[Floats], Floats], most: int = 2**14) -> float:
+    """Sum a term over k = 1, 2, … that falls like a power of k, at least the second, beyond `most`."""
+    k = np.arange(1, most + 1, dtype=np.float64)
+    last, twice = (float(term(np.array([x]))[0]) for x in (most + 0.5, 2 * most + 1.0))
+    # The rest is the integral of a power from the middle of two terms on.
+    return float(np.sum(term(k))) + last * (most + 0.5) / (math.log2(last / twice) - 1)
+
+
+def lags(sigma_x: float, omega_bw: float, count: int) -> Lags:
+    """Return white noise after `count` equal first-order filters; `omega_bw` in rad/s. One filter is the input of (1).
+
+    Raises
+    ------
+    ValueError : a number is not positive, or `count` is not 1 to 9.
+    """
+    sigma_x, omega_bw = positive_number("sigma_x", sigma_x), positive_number("omega_bw", omega_bw)
+    if not 1 <= count <= 9:
+        raise ValueError(f"got {count} lags; needed 1 to 9")
+    # First column of Routh's array of (s + 1)^count: it gives a drift whose steady state has equal variances.
+    upper, lower = ([Fraction(math.comb(count, k)) for k in range(i, count + 1, 2)] for i in (0, 1))
+    first = [upper[0]]
+    while lower:
+        first.append(lower[0])
+        factor, padded = upper[0] / lower[0], [*lower[1:], Fraction(0)]
+        upper, lower = lower, [a - factor * b for a, b in zip(upper[1:], padded, strict=False)]
+    drift = np.zeros((count, count))
+    for k in range(1, count):
+        i = count - 1 - k
+        drift[i, i + 1] = omega_bw * math.sqrt(first[k + 1] / first[k - 1])
+        drift[i + 1, i] = -drift[i, i + 1]
+    drift[-1, -1] = -omega_bw * count
+    rows = tuple(tuple(map(float, row)) for row in drift)
+    return Lags(f"{count} lags", sigma_x, (complex(omega_bw),) * count, (), rows, count)
 
 
 def first_order(sigma_x: float, omega_bw: float) -> Process:
@@ -222,8 +314,7 @@ def walk_rate(process: Process, f_c: float, rule: Rule = RULES["trapezoidal"]) -
         \sum_{m=1}^{p-1} |W_m|^2 \sum_k S\bigl(2\pi f_c(k+\tfrac mp)\bigr)
 
     It is the part of the input's spectrum S that sampling folds down to frequency zero: at multiples of :math:`f_c`
-    for every rule, and between them for a rule that weighs the samples unequally. The sums are evaluated by Poisson's
-    formula, :math:`\sum_kS(2\pi f_c(k+\theta)) = T\sum_nR(nT)\cos2\pi n\theta`, in as many digits as they cancel.
+    for every rule, and between them for a rule that weighs the samples unequally.
 
     Returns
     -------
@@ -235,24 +326,8 @@ def walk_rate(process: Process, f_c: float, rule: Rule = RULES["trapezoidal"]) -
     for m, weight in enumerate(harmonics):
         size = 1.0 if m == 0 else abs(weight) ** 2
         if size > 1e-30:
-            total += size * folded(process, period, Fraction(m, rule.period))
+            total += size * process.folded(period, Fraction(m, rule.period))
     return total
-
-
-def folded(process: Process, period: float, theta: Fraction = Fraction(0)) -> float:
-    r"""Sum the spectral density at :math:`2\pi f_c(k+\theta)` over all k, except k = 0 if :math:`\theta = 0`."""
-    mu = max(abs(p) for p in process.poles) * period
-    total = mpmath.mpf(0)
-    with mpmath.workdps(30 + 8 * max(1, math.ceil(abs(math.log10(mu)) + 1))):
-        # Weights rounded to float64 would not cancel; for a resonance, exact ones follow from the drift.
-        for c, p in _exact_modes(process):
-            z = p * mpmath.mpf(period)
-            if theta == 0:
-                total += mpmath.re(c * (mpmath.coth(z / 2) - 2 / z))
-            else:
-                angle = 2 * mpmath.pi * theta.numerator / theta.denominator
-                total += mpmath.re(c * mpmath.sinh(z) / (mpmath.cosh(z) - mpmath.cos(angle)))
-        return float(total * period) * process.sigma**2
 
 
 def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
@@ -269,7 +344,7 @@ def _exact_modes(process: Process) -> list[tuple[Any, Any]]:
 def best_possible_rate(process: Process, f_c: float) -> float:
     r"""Return the smallest random walk for any weights of the samples, :math:`S(0)A/(S(0)+A)`.
 
-    A is :func:`walk_rate` for the trapezoidal rule, the smallest for rules that integrate a constant correctly. Samples
+    A is :func:`walk_rate` for the trapezoidal rule, the smallest for weights that integrate a constant exactly. Samples
     scaled by :math:`S(0)/(S(0)+A)` reach this bound, but do not integrate a constant correctly.
     """
     walk, low = walk_rate(process, f_c), float(process.psd(0.0))

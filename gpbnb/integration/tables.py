@@ -104,3 +104,38 @@ def design(omega_bw: float, duration: float, precisions: Sequence[int], base: in
         "rounding error, s",
     )
     return Table(f"{len(body)} formats", header, tuple(body))
+
+
+def derivative_rules(most: int, counts: Sequence[int]) -> Table:
+    """Tabulate the random walk of rules with up to `most` derivatives, relative to the trapezoidal one.
+
+    There is a column for each number of lags: the ratio for fast sampling, and the largest μ below which the
+    rule is the better one. An input without the derivatives has no entry.
+    """
+    body: list[tuple[str, ...]] = []
+    for derivatives in range(most + 1):
+        rule = theory.hermite(derivatives)
+        cells = [str(derivatives) if derivatives else "none (trapezoidal)", ", ".join(map(str, rule.weights))]
+        for count in counts:
+            if count <= derivatives:
+                cells.append("")
+                continue
+            share = theory.fast_sampling_ratio(rule.even(), count)
+            below = f", $\\mu<{theory.largest_useful_mu(rule, count):.2g}$" if share < 1 else ""
+            cells.append(f"{math.sqrt(share):.2g}{below}")
+        body.append(tuple(cells))
+    header = ("derivatives", "weights of $T$, $T^2$, …", *(f"{count} lags" for count in counts))
+    return Table(f"{len(body)} rules with derivatives", header, tuple(body))
+
+
+def least_errors(cycles: Sequence[int], ratios: Sequence[float]) -> Table:
+    """Tabulate the rms error of the trapezoidal rule relative to the least of all weights, for cycles and ratios μ."""
+    body = [
+        (
+            f"{n:,}",
+            *(f"{math.sqrt(float(theory.error_variance(n, mu) / theory.least_variance(n, mu))):.3f}" for mu in ratios),
+        )
+        for n in cycles
+    ]
+    header = ("cycles $n$", *(f"$\\mu = {mu:g}$" for mu in ratios))
+    return Table(f"{len(body)} lengths", header, tuple(body))

@@ -1,7 +1,7 @@
 r"""Closed forms for the error of digital integration.
 
-This module gathers the public names of :mod:`~gpbnb.integration.walk`, :mod:`~gpbnb.integration.inputs` and
-:mod:`~gpbnb.integration.precision`.
+This module gathers the public names of :mod:`~gpbnb.integration.walk`, :mod:`~gpbnb.integration.inputs`,
+:mod:`~gpbnb.integration.derivatives` and :mod:`~gpbnb.integration.precision`.
 
 The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input in rad/s, T cycle time in s,
 :math:`f_c = 1/T` iteration rate in Hz, :math:`\mu = \omega_{bw}T`, :math:`\sigma_x` rms of the input in any unit. A
@@ -9,15 +9,26 @@ The letters are those of savage2016: :math:`\omega_{bw}` bandwidth of the input 
 :math:`\mu` entry by entry.
 """
 
+from gpbnb.integration.derivatives import (
+    DerivativeRule,
+    derivative_rule_variance,
+    derivative_walk_rate,
+    fast_sampling_ratio,
+    hermite,
+    largest_useful_mu,
+    least_variance,
+    tolerable_derivative_error,
+)
 from gpbnb.integration.inputs import (
     RULES,
+    Lags,
     Process,
     Rule,
     Step,
     best_possible_rate,
     exact_step,
     first_order,
-    folded,
+    lags,
     resonant,
     rule_variance,
     walk_rate,
@@ -57,8 +68,10 @@ from gpbnb.integration.walk import (
 
 __all__ = [
     "RULES",
+    "DerivativeRule",
     "Discretization",
     "Errors",
+    "Lags",
     "Process",
     "Rule",
     "SavageRecursion",
@@ -67,15 +80,21 @@ __all__ = [
     "best_possible_rate",
     "best_rate",
     "correlation_factor",
+    "derivative_rule_variance",
+    "derivative_walk_rate",
     "discretize",
     "error_variance",
     "error_variance_recursion",
     "exact_step",
     "exponents",
+    "fast_sampling_ratio",
     "first_order",
-    "folded",
+    "hermite",
     "independent_best_rate",
+    "lags",
     "langevin",
+    "largest_useful_mu",
+    "least_variance",
     "mean_chopping",
     "mean_square_rounding",
     "needed_precision",
@@ -91,6 +110,7 @@ __all__ = [
     "series",
     "settling_cycles",
     "stall_rate",
+    "tolerable_derivative_error",
     "two_errors",
     "validity",
     "walk_factor",

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, max_norm
 from gpbnb.kalman import exact_step, report_bounds
@@ -127,6 +128,59 @@ def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -
         _worst(K - true.gain, report_bounds.printed_gain_bound(true.gain, beta)),
         _worst(exact([max_norm(x - true.x)]), exact([bound])),
     )
+
+
+class RandomSteps(NamedTuple):
+    """Numbers of first steps of random filters with one state, and of those that violate (105) and (125)."""
+
+    steps: int
+    covariance: int
+    state: int
+
+
+def random_numbers(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> tuple[FloatArray, ...]:
+    """Draw Φ, H, x, z as normal numbers and P, Q, R as squares of such, (steps,) each, rounded to a format."""
+    drawn = rng.standard_normal((7, steps))
+    drawn[4:] **= 2
+    return tuple(fmt.array(row) for row in drawn)
+
+
+def random_steps(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> RandomSteps:
+    """Take one step with each operation rounded, as :func:`rounded_step`, for random filters with one state.
+
+    The exact step is computed in float64, so the format must be much coarser.
+
+    Raises
+    ------
+    ValueError : the unit roundoff is below 2**-30.
+    """
+    if fmt.unit_roundoff < Fraction(1, 2**30):
+        raise ValueError(f"got {fmt}; needed a unit roundoff of at least 2**-30, so that float64 can serve as exact")
+    numbers = random_numbers(fmt, steps, rng)
+    rounded_x, _, rounded_P = scalar_step(fmt.array(np.ones(steps)), *numbers)
+    Phi, H, x, z, P, Q, R = (each.to_float() for each in numbers)
+    predicted = Phi * P * Phi + Q
+    S = H * predicted * H + R
+    gain, P, transition = predicted * H / S, predicted * R / S, R / S * Phi  # without subtractions
+    x, beta = transition * x + gain * z, float(fmt.unit_roundoff)
+    first, second = (float(count) for count in report_bounds.coefficients(1, 1, 1))
+    bound = beta * (first * abs(x) + second * abs(gain * z))
+    allowed = report_bounds.covariance_count(1, 1) * beta * P
+    return RandomSteps(
+        steps,
+        int(np.sum(abs(rounded_P.to_float() - P) > allowed)),
+        int(np.sum(abs(rounded_x.to_float() - x) > bound)),
+    )
+
+
+def scalar_step(one: FloatArray, *numbers: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x, K and P after one step of filters with one state, in the order of :func:`rounded_step`."""
+    Phi, H, x, z, P, Q, R = numbers
+    predicted = Phi * P * Phi + Q
+    PH = predicted * H
+    K = PH * (one / (H * PH + R))
+    W = one - K * H
+    return W * Phi * x + K * z, K, W * predicted
 
 
 def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, unevaluated
+from gpbnb.display.derivation import Derivation, Step, together, unevaluated
 
 T = sp.Symbol("T", positive=True)
 TIME, THETA = sp.symbols("t theta", real=True)
@@ -117,6 +117,29 @@ def fits() -> Derivation:
                 sp.pi * a * sp.Integral(on_white.doit() ** 2, (v, 0, 1)),
                 8 * a,
             ),
+        )
+    )
+
+
+def varying_phase() -> Derivation:
+    r"""Derive how much a phase error that varies counts in the drift fitted across, to first order, for T = k = 1.
+
+    The fit weights the record by :math:`12(t-\frac12)`, and the drift across is :math:`t\,\theta(t)`.
+    """
+    w, n = 12 * TIME * (TIME - sp.Rational(1, 2)), sp.Symbol("n", integer=True, positive=True)
+    half = sp.Rational(1, 2)
+    first, second = sp.Integral(w, (TIME, 0, half)), sp.Integral(w, (TIME, half, 1))
+    turn = 2 * sp.pi * n * TIME
+    return Derivation(
+        (
+            Step("a constant error of 1", sp.Integral(w, (TIME, 0, 1)), sp.S.One),
+            Step("a ramp from -1 to 1, whose mean is zero", sp.Integral(w * (2 * TIME - 1), (TIME, 0, 1)), sp.S.One),
+            Step("an error of 1 in the first half alone", first, -sp.Rational(1, 4)),
+            Step("in the second half alone", second, sp.Rational(5, 4)),
+            Step("-1, then 1: the signs of the weight, so the most", together(second, -first), sp.Rational(3, 2)),
+            Step("independent errors count with the square", sp.Integral(w**2, (TIME, 0, 1)), sp.Rational(24, 5)),
+            Step("$n$ cycles of a cosine", sp.Integral(w * sp.cos(turn), (TIME, 0, 1)), 6 / (sp.pi * n) ** 2),
+            Step("$n$ cycles of a sine", sp.Integral(w * sp.sin(turn), (TIME, 0, 1)), -3 / (sp.pi * n)),
         )
     )
 

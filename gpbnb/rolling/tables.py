@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.display.tables import Table, arithmetic
 from gpbnb.measurement import YEAR
-from gpbnb.rolling import experiment, theory
+from gpbnb.rolling import experiment, phase, theory
 
 
 def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
@@ -50,6 +50,26 @@ def phase_costs(angles: Mapping[str, float], drift: tuple[float, float] = theory
         body.append((name, f"{100 * math.sin(angle) ** 2:.3g} %", f"{x:.3g}", f"{y:.3g}"))
     header = ("phase error", "power lost, one dimension", "geodetic (mas a year)", "frame dragging (mas a year)")
     return Table("What a phase error costs", header, tuple(body))
+
+
+def varying_phases(limit: float, drift: tuple[float, float] = theory.DRIFTS) -> Table:
+    """Tabulate the cost of phase errors that vary within ± `limit`, rad: their mean, and the false frame dragging.
+
+    The false drift is computed to first order from the weighted mean, and simulated without noise.
+    """
+    body = []
+    for name, shape in phase.SHAPES.items():
+        plain, weighted = phase.means(shape)
+        found = experiment.clean_drift_error(drift, lambda t, s=shape: limit * s(t / YEAR))  # type: ignore[misc]
+        shown = (plain * math.degrees(limit) * 3600, weighted * limit * drift[0], found[1])
+        body.append((name, *(f"{abs(value):.2f}" for value in shown)))
+    header = (
+        f"phase error between ±{math.degrees(limit) * 3600:.0f}″",
+        "its mean (arcseconds)",
+        "false frame dragging (mas a year)",
+        "simulated (mas a year)",
+    )
+    return Table("What phase errors that vary cost", header, tuple(body))
 
 
 def drift_errors(study: experiment.DriftStudy) -> Table:

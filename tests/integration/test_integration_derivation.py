@@ -19,6 +19,8 @@ DERIVATIONS = steps.Derivations(
     derivation.independent,
     derivation.transient,
     derivation.small_mu,
+    derivation.least,
+    derivation.derivatives,
 )
 VALUES = {OMEGA: 3, T: sp.Rational(2, 5), P: sp.Rational(289, 100), MU: sp.Rational(6, 5)}
 
@@ -95,6 +97,24 @@ NAMES = {
         "the next term": "-1/360",
         "(38) to (39)": "sqrt(omega/6)/f_c*sigma_x",
     },
+    "least": {
+        r"row $i$ between the ends: $\sum_j\varphi^{|i-j|}w_j$": "1",
+        "the first row, and the last": "1",
+        r"the sum of $w$, with $\tanh\frac\mu2=\frac{1-\varphi}{1+\varphi}$": "1 + n*(1 - varphi)/(1 + varphi)",
+        "the integral over a cycle that two samples of size 1 let expect": "2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))",
+        "the variance of that integral that the samples leave": (
+            "2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))*((1 + exp(-mu))/(1 - exp(-mu)) - 2/mu)"
+        ),
+        r"$1-h=L\tanh\frac\mu2$": "1 - 2*(1 - exp(-mu))/(mu*(1 + exp(-mu)))",
+        "the least variance": "n*L - L**2*n*(1 - varphi)/(1 + varphi + n*(1 - varphi))",
+    },
+    "derivatives": {
+        "exact for each polynomial of degree 5": "c_0 + c_1/2 + c_2/3 + c_3/4 + c_4/5 + c_5/6",
+        r"a sample's part in the cycles after and before it, at $\theta=\omega T$": "1 - theta**2/60",
+        "the share of the variance after 3 lags": "3/10",
+        "the share of the variance after 4 lags": "2/15",
+        "the share of the variance after 5 lags": "3/25",
+    },
 }
 """What each step derives, beside its name; see `steps.check_names`."""
 
@@ -126,6 +146,8 @@ def test_there_are_as_many_steps_as_the_chapter_shows():
         "independent": 3,
         "transient": 5,
         "small_mu": 5,
+        "least": 7,
+        "derivatives": 5,
     }
 
 

@@ -280,3 +280,28 @@ def test_design_table():
     best = theory.best_rate(628.0, 3600.0, fmt)
     assert float(rows[0][2].replace(",", "")) == pytest.approx(best, rel=1e-2)
     assert float(rows[0][5]) == pytest.approx(theory.two_errors(1.0, 628.0, best, 3600.0, fmt).rounding, rel=0.05)
+
+
+def test_derivative_rules_table():
+    table = tables.derivative_rules(2, [2, 3])
+    assert table.title == "3 rules with derivatives"
+    mu = theory.largest_useful_mu(theory.hermite(2), 3)
+    names = ("derivatives", "weights of $T$, $T^2$, …", "2 lags", "3 lags")
+    assert by_header(table) == [
+        dict(zip(names, ("none (trapezoidal)", "1/2", "1", "1"), strict=True)),
+        dict(zip(names, ("1", "1/2, 1/12", "1", "1"), strict=True)),
+        dict(zip(names, ("2", "1/2, 1/10, 1/120", "", f"0.55, $\\mu<{mu:.2g}$"), strict=True)),
+    ]
+
+
+def test_least_errors_table():
+    table = tables.least_errors([1, 1000], [0.5, 8.0])
+    assert table.title == "2 lengths"
+    # For one cycle the best weights are those of the trapezoidal rule, by symmetry.
+    assert by_header(table)[0] == {"cycles $n$": "1", r"$\mu = 0.5$": "1.000", r"$\mu = 8$": "1.000"}
+    ratio = [math.sqrt(theory.error_variance(1000, mu) / theory.least_variance(1000, mu)) for mu in (0.5, 8.0)]
+    assert by_header(table)[1] == {
+        "cycles $n$": "1,000",
+        r"$\mu = 0.5$": f"{ratio[0]:.3f}",
+        r"$\mu = 8$": f"{ratio[1]:.3f}",
+    }

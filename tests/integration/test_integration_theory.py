@@ -19,6 +19,7 @@ RULES = list(theory.RULES.values())
 each_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
 FIRST = theory.first_order(1.7, 3.0)
 RINGING = theory.resonant(1.3, 3.0, 0.2)
+LAGGED = theory.lags(1.1, 4.0, 3)
 TRAPEZOIDAL = theory.RULES["trapezoidal"]
 CHOP = Rounding.CHOP
 
@@ -297,14 +298,14 @@ def test_spectrum_and_autocovariance_belong_together(process):
 
 
 @pytest.mark.parametrize("theta", [Fraction(0), Fraction(1, 2), Fraction(1, 3)])
-@pytest.mark.parametrize("process", [FIRST, RINGING], ids=["first order", "resonant"])
+@pytest.mark.parametrize("process", [FIRST, RINGING, LAGGED], ids=["first order", "resonant", "lags"])
 def test_folding_is_the_sum_over_the_spectrum(process, theta):
     f_c, k = 2.0, np.arange(-400_000, 400_001)
     if theta == 0:
         k = k[k != 0]
     total = float(np.sum(process.psd(2 * np.pi * f_c * (k + float(theta)))))
     # What is left out falls as 1/k² or faster: below 2·S(k)·k.
-    assert theory.folded(process, 1 / f_c, theta) == pytest.approx(total, rel=1e-5)
+    assert process.folded(1 / f_c, theta) == pytest.approx(total, rel=1e-5)
 
 
 def test_folding_is_right_where_it_cancels_nearly_everything():

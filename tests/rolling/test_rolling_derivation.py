@@ -12,6 +12,7 @@ DERIVATIONS = steps.Derivations(
     derivation.one_dimension,
     derivation.two_dimensions,
     derivation.fits,
+    derivation.varying_phase,
     derivation.filters,
     derivation.ramp_spectrum,
     derivation.roll_rate,
@@ -46,6 +47,16 @@ NAMES = {
         r"the fit's response to a frequency, $z=\pi fT$": "6/T*(sin(z)/z**2 - cos(z)/z)",
         r"so $\int j_1^2/z\,dz = \frac14$, from $j_0^2 + j_1^2 = 1$ at zero": "(sin(z)/z**2 - cos(z)/z)**2/z",
         "noise that begins with the record, with $T=1$: $8A/T^2$": "8*A",
+    },
+    "varying_phase": {
+        "a constant error of 1": "1",
+        "a ramp from -1 to 1, whose mean is zero": "1",
+        "an error of 1 in the first half alone": "-1/4",
+        "in the second half alone": "5/4",
+        "-1, then 1: the signs of the weight, so the most": "3/2",
+        "independent errors count with the square": "24/5",
+        "$n$ cycles of a cosine": "6/(pi*n)**2",
+        "$n$ cycles of a sine": "-3/(pi*n)",
     },
     "filters": {
         "single pole: it lags by τ": "tau",
@@ -87,7 +98,7 @@ def test_each_step_holds_and_is_named_for_what_it_derives(name):
 
 
 def test_the_derivations_are_those_of_the_chapter():
-    assert sum(steps.lengths(DERIVATIONS).values()) == 36
+    assert sum(steps.lengths(DERIVATIONS).values()) == 44
 
 
 def test_the_matrices_are_inverse():
