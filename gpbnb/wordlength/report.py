@@ -121,6 +121,8 @@ def study(
     given = z is not None
     count = steps if steps is not None else 1000 if z is None else len(z)
     if isinstance(model, LinearSystem):
+        if form_named(form) is not Form.INNOVATION:
+            raise ValueError(f"got the {form_named(form)} form; needed none: only a LinearModel has forms")
         questions: list[tuple[str, Basis, AnyForm | None]] = [(basis, basis, None) for basis in bases]
     else:
         first = form_named(form)
