@@ -143,10 +143,13 @@ def _from_system(given: Any, library: str) -> LinearSystem:
 
 
 def _from_toml(path: Path, u: Any) -> LinearModel | LinearSystem:
+    content = path.read_bytes()
     try:
-        found = tomllib.loads(path.read_text(encoding="utf-8"), parse_float=Decimal)
-    except (ValueError, ArithmeticError) as error:  # not UTF-8, or a number too long for Python or Decimal
-        raise ValueError(f"{path.name} is not TOML: {str(error) or 'a number is too long'}") from None
+        found = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
+    except ValueError as error:  # also text that is not UTF-8, and an integer too long for Python
+        raise ValueError(f"{path.name} is not TOML: {error}") from None
+    except ArithmeticError:
+        raise ValueError(f"{path.name}: got an exponent that is too long; needed numbers such as 1e-3") from None
     except RecursionError:
         raise ValueError(f"{path.name} is not TOML: its lists are nested too deeply") from None
     return _from_mapping(found, path.name, u)
