@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.exact import LARGEST_BITS
+from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, integer_text
 
 LARGEST_TEXT = 100_000
 """Largest number of characters of a number that is read, and largest power of ten of a Fraction."""
 
 _SHOWN = reprlib.Repr()
 _SHOWN.maxstring = 60
-_DECIMAL = re.compile(r"\s*([+-]?)(\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
+_DECIMAL = re.compile(r"\s*([+-]?)(\d+(?:\.\d*)?|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
 _RATIO = re.compile(r"\s*([+-]?\d+)\s*/\s*(\d+)\s*", re.ASCII)
 _ACCEPTED = "a str, int, float, Decimal or Fraction"
 
@@ -112,8 +112,8 @@ def exact_fraction(value: Any) -> Fraction:
         return Fraction(p, q)
     if abs(power) > LARGEST_TEXT:
         raise ValueError(
-            f"got a number with the power of ten {power}; needed a power of at most {LARGEST_TEXT} in size, or the "
-            "exact number is too long to compute with; scale it"
+            f"got a number with the power of ten {shown(integer_text(power))[1:-1]}; needed a power of at most "
+            f"{LARGEST_TEXT} in size, or the exact number is too long to compute with; scale it"
         )
     return Fraction(p, q) * Fraction(10) ** power
 
@@ -134,8 +134,6 @@ def _read(text: str) -> tuple[int, int, int]:
     _check_length(len(text))
     if match := _DECIMAL.fullmatch(text):
         sign, digits, exponent = match.groups()
-        if exponent and len(exponent.lstrip("+-0")) > 20:
-            raise ValueError(f"got {shown(text)}; needed an exponent of at most 20 digits")
         whole, _, places = digits.partition(".")
         p = _integer(whole + places)
         return (-p if sign == "-" else p), 1, _integer(exponent or "0") - len(places)

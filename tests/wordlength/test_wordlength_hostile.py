@@ -230,5 +230,5 @@ def test_measurements_that_are_all_missing_leave_a_filter_at_zero(folder, capsys
 
 
 def test_a_key_of_a_mapping_need_not_be_text():
-    with pytest.raises(ValueError, match=r"^the mapping: 3, \(1, 2\) unknown; needed"):
+    with pytest.raises(ValueError, match=r"^the mapping: \(1, 2\), 3 unknown; needed"):
         read_model({"A": [[1]], "B": [[1]], 3: 1, (1, 2): 2})
