@@ -82,26 +82,26 @@ def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
 
 
 def _from_filterpy(given: Any, u: Any) -> LinearModel:
-    kind, held = type(given).__name__, vars(given)
+    kind, attributes = type(given).__name__, vars(given)
     n, m = given.dim_x, given.dim_z
 
     def refused(got: str, needed: str) -> ValueError:
         return ValueError(f"got a {kind} with {got}; needed {needed}")
 
-    for name in held:
+    for name in attributes:
         if callable(getattr(type(given), name, None)):
             raise refused(f"its own {name}", "the method of its class")
-    if any(held.get(name, 1) != 1 for name in ("_alpha_sq", "alpha_sq")):
+    if any(attributes.get(name, 1) != 1 for name in ("_alpha_sq", "alpha_sq")):
         raise refused(
             f"a fading memory, alpha = {given.alpha}",
             "alpha = 1: a LinearModel does not multiply the predicted covariance by alpha²",
         )
     if kind == "KalmanFilter" and np.any(given.M):
         raise refused("a correlation M of process and measurement noise", "M = 0: a LinearModel has independent noises")
-    if held.get("inv", np.linalg.inv) is not np.linalg.inv:
+    if attributes.get("inv", np.linalg.inv) is not np.linalg.inv:
         raise refused(f"inv = {getattr(given.inv, '__name__', given.inv)}", "numpy.linalg.inv, the inverse of S")
     for name in ("_I", "I"):
-        if name in held and not np.array_equal(held[name], np.eye(n)):
+        if name in attributes and not np.array_equal(attributes[name], np.eye(n)):
             raise refused(f"another matrix than the identity in {name}", "the identity")
     matrices: dict[str, Any] = {}
     for letter, shape in {"F": (n, n), "H": (m, n), "Q": (n, n), "R": (m, m), "P": (n, n)}.items():
