@@ -97,9 +97,10 @@ mutants: .venv/made-for ## seed faults and list those that no test catches; FILE
 	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r tests/mutants/environment.txt
 	$(PY) -m tests.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(OPTIONS)
 
+# filterpy has no wheel; scripts/make-venv.sh builds it.
 environment: .venv/made-for ## compile every environment.txt from pyproject.toml; UPGRADE=1 takes newer versions
 	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group book --group test --group pages --group dev \
-		--output-file environment.txt
+		--no-binary filterpy --output-file environment.txt
 	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group bench --no-binary pychop \
 		--constraints environment.txt --output-file benchmarks/environment.txt
 	$(PY) -m $(UV_COMPILE) $(if $(UPGRADE),--upgrade) --group mutants --no-binary yattag \

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import reprlib
 from collections.abc import Iterator, Mapping, Sequence, Set
 from decimal import Decimal
 from fractions import Fraction
@@ -12,7 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-_DECIMAL = re.compile(r"\s*([+-]?)(\d+\.?\d*|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
+from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, integer_text
+
+LARGEST_TEXT = 100_000
+"""Largest number of characters of a number that is read, and largest power of ten of a Fraction."""
+
+_SHOWN = reprlib.Repr()
+_SHOWN.maxstring = 60
+_DECIMAL = re.compile(r"\s*([+-]?)(\d+(?:\.\d*)?|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
 _RATIO = re.compile(r"\s*([+-]?\d+)\s*/\s*(\d+)\s*", re.ASCII)
 _ACCEPTED = "a str, int, float, Decimal or Fraction"
 
@@ -27,7 +35,7 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
     Raises
     ------
     TypeError : `value` is not a number.
-    ValueError : a string that is not a number; NaN or infinity.
+    ValueError : a string that is not a number; NaN or infinity; a number too long to read.
     """
     if type(value) is Fraction:  # the commonest, and its class is slow to ask
         return value.numerator, value.denominator, 0
@@ -49,6 +57,7 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
         sign, digits, exponent = value.as_tuple()
         if not isinstance(exponent, int):
             raise ValueError(_not_finite(value))
+        _check_length(len(digits))
         p = int(Decimal((0, digits, 0)))
         return (-p if sign else p), 1, exponent
     # floats of Python, NumPy, gmpy2 and sympy, and everything else that converts exactly
@@ -85,10 +94,44 @@ def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:
     if home == "mpmath" and value < 0 < significand:
         significand = -significand
     significand, exponent = int(significand), int(exponent)
+    if abs(exponent) > LARGEST_BITS:
+        raise ValueError(f"got a number of about 2**{exponent}; needed an exponent of at most {LARGEST_BITS} in size")
     return (significand << exponent, 1, 0) if exponent >= 0 else (significand, 1 << -exponent, 0)
 
 
+def exact_fraction(value: Any) -> Fraction:
+    """Read a number without rounding it, as a Fraction.
+
+    Raises
+    ------
+    TypeError : `value` is not a number.
+    ValueError : as for :func:`exact_ratio`; a power of ten beyond :data:`LARGEST_TEXT`.
+    """
+    p, q, power = exact_ratio(value)
+    if not p or not power:
+        return Fraction(p, q)
+    if abs(power) > LARGEST_TEXT:
+        raise ValueError(
+            f"got a number with the power of ten {shown(integer_text(power))[1:-1]}; needed a power of at most "
+            f"{LARGEST_TEXT} in size, or the exact number is too long to compute with; scale it"
+        )
+    return Fraction(p, q) * Fraction(10) ** power
+
+
+def shown(text: str) -> str:
+    """Return a text in quotation marks for a message, without its middle if it is long."""
+    return _SHOWN.repr(text)
+
+
+def _check_length(count: int) -> None:
+    if count > LARGEST_TEXT:
+        raise ValueError(
+            f"got a number of {count} characters; needed at most {LARGEST_TEXT}, or reading it takes minutes; round it"
+        )
+
+
 def _read(text: str) -> tuple[int, int, int]:
+    _check_length(len(text))
     if match := _DECIMAL.fullmatch(text):
         sign, digits, exponent = match.groups()
         whole, _, places = digits.partition(".")
@@ -97,12 +140,12 @@ def _read(text: str) -> tuple[int, int, int]:
     if match := _RATIO.fullmatch(text):
         p, q = _integer(match[1]), _integer(match[2])
         if q == 0:
-            raise ValueError(f"got {text!r}; needed a denominator other than zero; correct it")
+            raise ValueError(f"got {shown(text)}; needed a denominator other than zero; correct it")
         return p, q, 0
     if re.fullmatch(r"\s*[+-]?(nan|inf|infinity)\s*", text, re.IGNORECASE):
         raise ValueError(_not_finite(repr(text)))
     raise ValueError(
-        f"got {text!r}; needed a number such as '765.4567', '1e-3' or '1/3', "
+        f"got {shown(text)}; needed a number such as '765.4567', '1e-3' or '1/3', "
         "with a point as decimal mark and no separators"
     )
 

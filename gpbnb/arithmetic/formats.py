@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
 from gpbnb.arithmetic.kernels.limited import limited_kernel
@@ -135,7 +135,7 @@ class FloatFormat:
         nines = (self.base**self.precision - 1) * last
         if self.largest is None:
             return
-        object.__setattr__(self, "largest", Fraction(self.largest))
+        object.__setattr__(self, "largest", exact_fraction(self.largest))
         if (
             not self.base ** (self.precision - 1) * last <= self.largest <= nines
             or (self.largest / last).denominator != 1

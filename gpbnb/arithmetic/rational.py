@@ -13,7 +13,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.conversion import exact_fraction
 
 
 def exact(values: Any) -> NDArray[Any]:
@@ -21,11 +21,13 @@ def exact(values: Any) -> NDArray[Any]:
 
     Raises
     ------
-    ValueError : an entry is NaN or infinite.
-    TypeError : an entry is not a number.
+    ValueError : an entry is NaN or infinite, or too long; see :func:`gpbnb.arithmetic.conversion.exact_fraction`.
+    TypeError : an entry is not a number, or is masked.
     """
     if hasattr(values, "to_fractions"):
         values = values.to_fractions()
+    if np.ma.is_masked(values):
+        raise TypeError("got a masked entry; needed a number; fill it first: a.filled(...)")
     entries: NDArray[Any] = np.asarray(values, dtype=object)
     given = entries.ravel().tolist()
     if set(map(type, given)) == {Fraction}:
@@ -34,12 +36,11 @@ def exact(values: Any) -> NDArray[Any]:
     for i, entry in enumerate(given):
         if not isinstance(entry, Fraction):
             try:
-                p, q, power = exact_ratio(entry)
+                entry = exact_fraction(entry)
             except (TypeError, ValueError) as error:
                 index = np.unravel_index(i, entries.shape)
                 where = f"entry {', '.join(map(str, index))}: " if index else ""
                 raise type(error)(f"{where}{error}") from None
-            entry = Fraction(p, q) * Fraction(10) ** power if power else Fraction(p, q)
         fractions[i] = entry
     return fractions.reshape(entries.shape)
 

@@ -314,7 +314,7 @@ def _as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
             if not np.isfinite(entries).all():
                 raise ValueError("got measurements with NaN or infinity; needed finite numbers")
             return np.stack([entries, np.zeros_like(entries)], axis=-1)
-        return double_doubles(entries)
+        return double_doubles(exact(entries))
     return _packed_array(fmt.array(values))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from flint import fmpq
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation
 from gpbnb.measurement import measurement_rows
@@ -62,7 +63,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     ----------
     hung1982, ch. IV, eqs. (1)-(7); hung1984, ch. II, section 12, example.
     """
-    half_seconds = Fraction(roll) * 2
+    half_seconds = exact_fraction(roll) * 2
     if half_seconds.denominator != 1 or half_seconds <= 20:
         raise ValueError(f"got roll = {roll!r}; needed a period in seconds above 10, a multiple of 0.5, as in '77.5'")
     # A step is 20 half seconds, an orbit 11700.

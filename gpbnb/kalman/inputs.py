@@ -10,13 +10,25 @@ from numpy.typing import NDArray
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.simulation import Simulation, fine_resolution
 
+MOST_SIMULATED = 10**8
+"""Largest number of steps to simulate. A small model takes about a second for a million steps."""
+
 
 def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
     """Simulate measurements (steps, m) of a truth that starts at the first estimate and gets the known inputs.
 
     They are rounded to :func:`gpbnb.kalman.simulation.fine_resolution`. The response to inputs and offsets is added to
     measurements that are simulated without them.
+
+    Raises
+    ------
+    ValueError : more steps than :data:`MOST_SIMULATED`, or than the model describes.
     """
+    if steps > MOST_SIMULATED:
+        raise ValueError(
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; try fewer, and see "
+            "how the answer grows with gpbnb.wordlength.study.required_precision_by_steps"
+        )
     model.check_steps(steps)
     start, resolution = tuple(map(float, model.x0)), fine_resolution(model)
     z = Simulation(model.without_inputs(), start, seed, resolution).measurements(steps)

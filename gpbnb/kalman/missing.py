@@ -14,11 +14,12 @@ from gpbnb.kalman.model import LinearModel
 
 
 def real_numbers(values: Any) -> NDArray[Any]:
-    """Return measurements as an array: floats and whole numbers unchanged, other numbers as exact Fractions.
+    """Return measurements as an array of float64 or whole numbers, or of Fractions if those cannot hold them exactly.
 
     Raises
     ------
-    ValueError, TypeError : an entry is masked, or is not a real number; rows have different lengths.
+    ValueError, TypeError : an entry is masked, or is not a real number; rows have different lengths; a longdouble that
+        float64 does not hold, beside one that is NaN or infinite.
     """
     if np.ma.is_masked(values):
         raise ValueError("got measurements of which some are masked; needed a number for each")
@@ -26,10 +27,15 @@ def real_numbers(values: Any) -> NDArray[Any]:
         given = np.asarray(values)
     except ValueError:
         raise ValueError("got measurements in rows of different lengths; needed (steps, m) numbers") from None
-    if given.dtype.kind in "iuf":
+    if given.dtype.kind in "iu":
         return given
+    if given.dtype.kind == "f":
+        with np.errstate(over="ignore", under="ignore"):
+            nearest = given.astype(np.float64, copy=False)
+        if np.array_equal(nearest, given, equal_nan=True):
+            return nearest
     try:
-        return exact(values)
+        return exact(given if given.dtype.kind == "f" else values)
     except TypeError as error:
         raise TypeError(f"measurements: {error}") from None
     except ValueError as error:
@@ -50,8 +56,14 @@ def without_missing(model: LinearModel, z: Any) -> tuple[LinearModel, Any]:
     -------
     model, z : unchanged if nothing is missing.
     """
-    given = np.ma.getdata(z) if isinstance(z, np.ma.MaskedArray) else real_numbers(z)
-    missing = np.array(np.ma.getmaskarray(z)) if isinstance(z, np.ma.MaskedArray) else np.zeros(given.shape, dtype=bool)
+    if isinstance(z, np.ma.MaskedArray):
+        missing = np.array(np.ma.getmaskarray(z))
+        given = np.array(np.ma.getdata(z))
+        given[missing] = 0
+        given = real_numbers(given)
+    else:
+        given = real_numbers(z)
+        missing = np.zeros(given.shape, dtype=bool)
     if given.dtype.kind == "f":
         missing |= np.isnan(given)
     if given.ndim != 2 or given.shape[1] != model.m or not missing.any():

@@ -121,15 +121,16 @@ class LinearModel:
         n = self.x0.size
         if self.H.ndim != 3 or 0 in self.H.shape or self.H.shape[2] != n:
             raise ValueError(
-                f"got H of shape {self.H.shape[-2:]}; needed (m, {n}), one row per measurement and "
+                f"got H of shape {_of_one(self.H)}; needed (m, {n}), one row per measurement and "
                 "one column per state of x0"
             )
         m = self.H.shape[1]
         for letter, size in (("Phi", n), ("Q", n), ("R", m)):
-            shape = getattr(self, letter).shape
+            given = getattr(self, letter)
+            shape = given.shape
             if len(shape) != 3 or shape[1:] != (size, size) or not shape[0]:
                 raise ValueError(
-                    f"got {letter} of shape {shape[-2:]}; needed ({size}, {size}), or a cycle (p, {size}, {size}): "
+                    f"got {letter} of shape {_of_one(given)}; needed ({size}, {size}), or a cycle (p, {size}, {size}): "
                     f"x0 has {n} states and H {m} measurements"
                 )
         if self.P0.shape != (n, n):
@@ -341,13 +342,23 @@ class LinearModel:
         return made
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
-        """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter."""
+        """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter.
+
+        Raises
+        ------
+        OverflowError : an entry is beyond the range of float64.
+        """
         return {letter: entries.copy() for letter, entries in _floats(self).items()}
 
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 _INPUTS = ("B", "u", "b", "d")
 _COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
+
+
+def _of_one(matrices: NDArray[Any]) -> tuple[int, ...]:
+    """Return the shape of each matrix of a cycle, or of an array that is no cycle."""
+    return matrices.shape[1:] if matrices.ndim == 3 else matrices.shape
 
 
 def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
@@ -358,7 +369,15 @@ def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
 
 @lru_cache(maxsize=16)
 def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
-    return {letter: getattr(model, letter).astype(np.float64) for letter in _LETTERS}
+    found = {}
+    for letter in _LETTERS:
+        try:
+            found[letter] = getattr(model, letter).astype(np.float64)
+        except OverflowError:
+            raise OverflowError(
+                f"got {letter} with an entry beyond the range of float64; needed entries below 1.8e308; scale the model"
+            ) from None
+    return found
 
 
 @lru_cache(maxsize=16)

@@ -30,9 +30,6 @@ from gpbnb.kalman.recursion import Recursion, required_recursion_precision, surv
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, format_like, largest_ratio, listed
 from gpbnb.kalman.system import LinearSystem, required_system_precision
 
-MOST_SIMULATED = 10**8
-"""Largest number of steps to simulate. A small model takes about a second for a million steps."""
-
 
 def required_precision(
     model: LinearModel | LinearSystem | Recursion,
@@ -121,12 +118,6 @@ def required_precision(
             raise ValueError(
                 f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever'
             )
-    if z is None and steps > MOST_SIMULATED:
-        raise ValueError(
-            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; "
-            "try fewer, and see how the answer grows with "
-            "gpbnb.wordlength.study.required_precision_by_steps"
-        )
     if z is None:
         z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
     repairs = tuple(str(each) for each in model.repairs)

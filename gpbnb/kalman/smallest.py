@@ -47,7 +47,7 @@ def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
     r, h, z : other values of R, H and z; numbers or strings.
     """
     one = exact([[1]])
-    small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else Fraction(r)
+    small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else r
     return Case(one, exact([[h]]), one * 0, exact([[small]]), exact([1]), one, exact([z]))
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 
+from gpbnb.arithmetic.conversion import shown
+
 _INTEGER = re.compile(r"[+-]?[0-9]+")
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?inf|nan", re.ASCII)
+_NUMBER = re.compile(r"[+-]?([0-9]+(?:\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?inf|nan", re.ASCII)
 
 
 def plain_integer(text: str) -> int:
@@ -13,7 +15,7 @@ def plain_integer(text: str) -> int:
 
     Raises
     ------
-    ValueError : anything else, such as ``1_0`` or ``٣``.
+    ValueError : anything else, such as ``1_0`` or ``٣``; more than 4300 digits.
 
     Examples
     --------
@@ -21,7 +23,7 @@ def plain_integer(text: str) -> int:
     -12
     """
     if not _INTEGER.fullmatch(text):
-        raise ValueError(f"got {text!r}; needed a whole number such as 12, in the digits 0 to 9")
+        raise ValueError(f"got {shown(text)}; needed a whole number such as 12, in the digits 0 to 9")
     return int(text)
 
 
@@ -38,8 +40,8 @@ def plain_number(text: str) -> float:
     0.0015
     """
     if not _NUMBER.fullmatch(text):
-        raise ValueError(f"got {text!r}; needed a number such as -1.5 or 2e-3, in the digits 0 to 9")
+        raise ValueError(f"got {shown(text)}; needed a number such as -1.5 or 2e-3, in the digits 0 to 9")
     value = float(text)
     if abs(value) == float("inf") and "inf" not in text:
-        raise ValueError(f"got {text!r}; needed a number that float64 holds, below 1.8e308")
+        raise ValueError(f"got {shown(text)}; needed a number that float64 holds, below 1.8e308")
     return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ CHECK = "sha256"
 
 def write_record(file: Path, values: Mapping[str, Any]) -> None:
     """Write a record, either completely or not at all."""
-    draft = file.with_suffix(".draft")
+    draft = file.with_suffix(f".{os.getpid()}.draft")
     whole = {CHECK: _digest(values), **values}
     draft.write_text(json.dumps(whole, indent=1, ensure_ascii=False) + "\n", encoding="utf-8", newline="")
     draft.replace(file)
@@ -44,10 +45,14 @@ def read_record(file: Path, cure: str) -> dict[str, Any]:
         found = json.loads(file.read_bytes().decode("utf-8"))
     except FileNotFoundError:
         raise damaged(1, "the file is missing") from None
+    except OSError as error:
+        raise damaged(1, f"the file cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise damaged(1, f"the file is not UTF-8: {error}") from None
     except json.JSONDecodeError as error:
         raise damaged(error.lineno, f"the file is not JSON: {error.msg}") from None
+    except (ValueError, RecursionError) as error:  # an integer of thousands of digits, or lists nested too deeply
+        raise damaged(1, f"the file cannot be read: {error}") from None
     if not isinstance(found, dict) or CHECK not in found:
         raise damaged(1, f"the entry {CHECK!r} is missing")
     check = found.pop(CHECK)
@@ -57,4 +62,5 @@ def read_record(file: Path, cure: str) -> dict[str, Any]:
 
 
 def _digest(values: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(values, ensure_ascii=False).encode()).hexdigest()
+    text = json.dumps(values, ensure_ascii=False)
+    return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()

@@ -7,9 +7,7 @@ on any machine. Finished cells survive an interruption. The same class recompute
 from __future__ import annotations
 
 import hashlib
-import json
 import operator
-import os
 import platform
 import subprocess
 import time
@@ -23,7 +21,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.sweeps.table import Column, Record, Table, read, write
+from gpbnb.sweeps.record import read_record, write_record
+from gpbnb.sweeps.table import Column, DamagedFileError, Record, Table, read, write
 
 C = TypeVar("C")
 
@@ -190,20 +189,17 @@ class Sweep(Generic[C]):
         return directory / f"{hashlib.sha256(repr(cell).encode()).hexdigest()[:20]}.json"
 
     def _saved(self, cell: C, directory: Path) -> dict[str, Any] | None:
-        file = self._path(cell, directory)
-        if not file.exists():
+        """Return what is saved of a cell; None if there is nothing, or it is damaged and must be computed again."""
+        try:
+            found = read_record(self._path(cell, directory), self.command)
+        except DamagedFileError:
             return None
-        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        return found if found["cell"] == repr(cell) and found["version"] == self.version else None
+        return found if (found.get("cell"), found.get("version")) == (repr(cell), self.version) else None
 
     def _save(self, cell: C, result: Any, seconds: float, directory: Path) -> dict[str, Any]:
         file = self._path(cell, directory)
-        draft = file.with_suffix(f".{os.getpid()}")
-        made = {"cell": repr(cell), "version": self.version, "seconds": seconds, "result": result}
-        draft.write_text(json.dumps(made), encoding="utf-8")
-        draft.replace(file)
-        found: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        return found
+        write_record(file, {"cell": repr(cell), "version": self.version, "seconds": seconds, "result": result})
+        return read_record(file, self.command)
 
     # -- executors --------------------------------------------------------------------------------------
 

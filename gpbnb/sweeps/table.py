@@ -11,6 +11,7 @@ import csv
 import hashlib
 import io
 import math
+import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -126,6 +127,8 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
         text = file.read_bytes().decode("utf-8")
     except FileNotFoundError:
         raise damaged(1, "the file is missing") from None
+    except OSError as error:
+        raise damaged(1, f"the file cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise damaged(1, f"the file is not UTF-8: {error}") from None
     lines = text.split("\n")
@@ -145,9 +148,9 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
     if start >= len(lines) or tuple(lines[start].split(",")) != (*header, CHECK):
         got = lines[start] if start < len(lines) else ""
         raise damaged(start + 1, f"got the columns {got!r}; needed {','.join((*header, CHECK))!r}")
-    if not provenance["rows"].isdigit():
+    if not re.fullmatch("[0-9]{1,12}", provenance["rows"]):
         raise damaged(start, f"got {provenance['rows']!r} rows; needed a whole number")
-    rows, expected = [], int(provenance["rows"])
+    rows, expected = list[Record](), int(provenance["rows"])
     for index, line in enumerate(lines[start + 1 :]):
         number = start + 2 + index
         if index == expected:
@@ -156,7 +159,10 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
             break
         if number == len(lines):
             raise damaged(number, f"the file ends after {index} of {expected} rows")
-        fields = next(csv.reader([line]), [])
+        try:
+            fields = next(csv.reader([line]), [])
+        except csv.Error as error:
+            raise damaged(number, str(error)) from None
         if len(fields) != len(columns) + 1:
             raise damaged(number, f"got {len(fields)} fields; needed {len(columns) + 1}")
         *row, check = fields

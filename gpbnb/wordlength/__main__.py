@@ -15,6 +15,7 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named
 from gpbnb.kalman.requirement import Basis
 from gpbnb.kalman.system import LinearSystem
+from gpbnb.sweeps import plain_number
 from gpbnb.wordlength.models import read_measurements, read_model
 from gpbnb.wordlength.report import study
 
@@ -40,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--tolerance", required=True, help="largest allowed error: one number, or one per state, such as 0.01,inf"
     )
     parser.add_argument(
-        "--measurements", type=Path, help="CSV file with one row per step; default: simulated measurements"
+        "--measurements",
+        type=Path,
+        help="CSV file with one row per step: measurements of a filter, by default simulated, or inputs of a system",
     )
     parser.add_argument("--inputs", type=Path, help="CSV file with the known inputs u of the filter, one row per step")
     parser.add_argument("--steps", type=int, help="number of steps to simulate; default: 1000")
@@ -48,8 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--rounding", default="nearest", help='rounding rule, such as "nearest" or "chop"')
     parser.add_argument(
         "--form",
-        default="innovation",
-        help='form of the covariance update, such as "innovation", "Joseph", "UD" or "Cholesky"',
+        help='form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky"; '
+        "default: innovation",
     )
     parser.add_argument(
         "--basis",
@@ -66,13 +69,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     parser.add_argument("--report", type=Path, help="HTML file to write, with a JSON file of the same name beside it")
     given = parser.parse_args(arguments)
-    command = shlex.join(["python", "-m", "gpbnb.wordlength", *map(str, arguments or sys.argv[1:])])
+    command = _printable(shlex.join(["python", "-m", "gpbnb.wordlength", *map(str, arguments or sys.argv[1:])]))
     try:
         tolerance = _numbers("tolerance", given.tolerance)
-        form_named(given.form), rounding_named(given.rounding)
+        form_named(given.form or "innovation"), rounding_named(given.rounding)
+        _check_files(given.report, [each for each in (given.model, given.measurements, given.inputs) if each])
         model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
         z = read_measurements(given.measurements) if given.measurements else None
         bases: Sequence[Basis] = given.basis or ("emulation", "bound")
+        if isinstance(model, LinearSystem):
+            if given.form:
+                raise ValueError(
+                    f"got --form {given.form} for a linear system; needed none: only a Kalman filter has forms"
+                )
+            if z is None and {"emulation", "bound"} & {*bases}:
+                raise ValueError(
+                    "got a linear system without inputs; needed --measurements, a CSV file with its inputs"
+                )
         sizes = {each: text for each in Limits._fields if (text := getattr(given, each)) is not None}
         within = _limits(model, bases, {each: _numbers(each, text) for each, text in sizes.items()})
         report = study(
@@ -82,9 +95,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             given.steps,
             given.base,
             given.rounding,
-            given.form,
+            given.form or "innovation",
             bases,
-            str(given.measurements) if given.measurements else "",
+            _printable(str(given.measurements)) if given.measurements else "",
             command,
             lambda text: print(text, file=sys.stderr, flush=True),
             within=within,
@@ -99,10 +112,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0 if report.digits is not None else 1
 
 
+def _printable(text: str) -> str:
+    """Return a text of the command line with escapes in place of bytes that are not UTF-8."""
+    return text.encode(errors="surrogateescape").decode(errors="backslashreplace")
+
+
+def _check_files(report: Path | None, sources: Sequence[Path]) -> None:
+    """Reject one file for two purposes, and a report that cannot be written, before anything is computed."""
+    written = []
+    if report:
+        if not report.name or report.suffix.lower() == ".json":
+            raise ValueError(f"got --report {report}; needed the name of an HTML file; JSON is written beside it")
+        written = [report, report.with_suffix(".json")]
+    for path in written:
+        if path.is_dir() or not path.parent.is_dir():
+            what = "is a folder" if path.is_dir() else "is in no folder that exists"
+            raise ValueError(f"got --report {report}, but {path} {what}; needed a file in a folder")
+    files = [*sources, *written]
+    for place, path in enumerate(files):
+        for other in files[:place]:
+            if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
+                raise ValueError(f"got {other} and {path}, which are one file; needed a file for each purpose")
+
+
 def _numbers(option: str, text: str) -> float | list[float]:
     """Read the value of an option, one number or several with commas between."""
     try:
-        found = [float(each) for each in text.split(",")]
+        found = [plain_number(each.strip()) for each in text.split(",")]
     except ValueError:
         raise ValueError(f"got --{option} {text}; needed numbers with commas between: 0.01,inf") from None
     return found if len(found) > 1 else found[0]

@@ -117,15 +117,19 @@ def study(
     ------
     ValueError : for a reason given in :func:`gpbnb.kalman.precision.required_precision`; missing measurements with a
         basis that holds for all of them.
+    OverflowError : for a reason given there.
     """
     given = z is not None
     count = steps if steps is not None else 1000 if z is None else len(z)
     if isinstance(model, LinearSystem):
+        if form_named(form) is not Form.INNOVATION:
+            raise ValueError(f"got the {form_named(form)} form; needed none: only a LinearModel has forms")
         questions: list[tuple[str, Basis, AnyForm | None]] = [(basis, basis, None) for basis in bases]
     else:
         first = form_named(form)
         forms = [first, *(each for each in SIDE_BY_SIDE if each is not first)]
         questions = [(f"{each}, {basis}", basis, each) for each in forms for basis in bases]
+        model.check_sizes()
         if given and {*bases} & {"guarantee", "probable"} and without_missing(model, z)[0] is not model:
             raise ValueError(
                 "got measurements of which some are missing, and a basis that holds for ever; needed measurements "

@@ -108,14 +108,18 @@ class BinaryRange(NamedTuple):
 
 
 def binary_ranges(model: LinearModel, z: NDArray[Any]) -> tuple[BinaryRange, ...]:
-    """Return the ranges of a model, and of its estimates, gains and covariances at sixteen steps per decade."""
+    """Return the ranges of a model, and of its estimates, gains and covariances at sixteen steps per decade.
+
+    Numbers that are all zero have no range.
+    """
     checkpoints = reference(model, z, log_spaced(len(z), 16))
     given = np.concatenate([getattr(model, letter).ravel() for letter in ("Phi", "H", "Q", "R", "P0")])
     numbers = {"model": given, "estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
     result = []
     for name, values in numbers.items():
         powers = [math.frexp(abs(float(value)))[1] - 1 for value in values.ravel() if value]
-        result.append(BinaryRange(name, min(powers), max(powers)))
+        if powers:
+            result.append(BinaryRange(name, min(powers), max(powers)))
     return tuple(result)
 
 

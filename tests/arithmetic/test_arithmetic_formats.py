@@ -9,16 +9,19 @@ from fractions import Fraction
 from itertools import pairwise
 
 import gmpy2
+import mpmath
 import numpy as np
 import oracles
 import pytest
 import sympy
+from flint import arb
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gpbnb.arithmetic.conversion import exact_ratio
+from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.fixed import FixedFormat, scaling
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.rational import exact
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 
@@ -268,3 +271,44 @@ def test_a_number_prints_as_it_is_rounded_unless_another_way_is_named():
     assert prints_as(Fraction("2.64906e8"), "2.6490e8", Rounding.CHOP)
     assert not prints_as(Fraction("2.64904e8"), "2.6491e8", *Rounding.documented())
     assert prints_as(Fraction("-0.77226e-16"), "-.7723e-16")
+
+
+B24, FIXED = FloatFormat(2, 24), FixedFormat(4, 4)
+
+
+@pytest.mark.parametrize(
+    ("read", "value", "message"),
+    [
+        (exact, "1e99999999", "got a number with the power of ten 99999999; needed a power of at most 100000 in size"),
+        (exact, ["1", "1e-99999999"], "entry 1: got a number with the power of ten -99999999"),
+        (exact, Decimal("1e99999999"), "got a number with the power of ten 99999999"),
+        (exact, mpmath.mpf("1e99999999"), r"got a number of about 2\*\*33219\d{4}; needed an exponent of at most"),
+        (exact, mpmath.mpf("1e-99999999"), r"got a number of about 2\*\*-33219"),
+        (exact, arb("1e300") ** 100_000_000, r"got \[.*\]; needed one finite number|got a number of about"),
+        (exact, "9" * 1_000_000, "got a number of 1000000 characters; needed at most 100000"),
+        (exact, Decimal((0, (9,) * 1_000_000, 0)), "got a number of 1000000 characters"),
+        (exact, "1/" + "9" * 1_000_000, "got a number of 1000002 characters"),
+        (exact, "1e" + "9" * 50_000, r"got a number with the power of ten 9+\.\.\.9+; needed a power"),
+        (exact, "x" * 90_000, r"got 'x+\.\.\.x+'; needed a number such as"),
+        (exact, "9" * 90_000 + "x", r"got '9+\.\.\.9+x'; needed a number such as"),
+        (B24.round, "9" * 1_000_000, "got a number of 1000000 characters"),
+        (B24.array, ["." + "0" * 1_000_000 + "1"], r"entry \[0\]: got a number of 1000002 characters"),
+        (B24.split, "1/" + "9" * 1_000_000, "got a number of 1000002 characters"),
+        (FIXED.round, "9" * 1_000_000, "got a number of 1000000 characters"),
+        (lambda text: FloatFormat(2, 8, emin=-9, emax=9, largest=text), "1e99999999", "got a number with the power"),
+        (exact, np.ma.masked_array([1.0, 2.0], [True, False]), "got a masked entry; needed a number"),
+    ],
+)
+def test_a_number_too_long_to_compute_with_is_refused_before_it_is_written_out(read, value, message):
+    with pytest.raises((ValueError, TypeError), match=f"^{message}"):
+        read(value)
+
+
+def test_the_longest_numbers_are_read_exactly():
+    assert exact_fraction("1e100000") == Fraction(10**100_000)
+    assert exact_fraction("-1e-100000") == Fraction(-1, 10**100_000)
+    assert exact_fraction("0e99999999") == 0
+    assert exact_fraction("7" * 100_000) == 7 * (10**100_000 - 1) // 9
+    assert exact_fraction("1e" + "0" * 60 + "1") == 10
+    largest = FloatFormat(2, 4, emin=-6, emax=8, largest="448").largest
+    assert (type(largest), largest) == (Fraction, 448)

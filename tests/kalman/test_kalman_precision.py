@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 from functools import cache
 
@@ -17,7 +18,7 @@ from gpbnb.kalman.filter_run import Run, reference
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.bound import limits
 from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.missing import without_missing
+from gpbnb.kalman.missing import real_numbers, without_missing
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named
 from gpbnb.kalman.precision import required_precision
@@ -478,3 +479,38 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     within = limits(2, 2, state=100, innovation=20)
     with pytest.raises(ValueError, match='got missing measurements and basis "guarantee"'):
         required_precision(two, 12, 1e-4, basis="guarantee", within=within, z=with_nan)
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.longdouble, np.int8, np.uint64, object, "U9"])
+@pytest.mark.parametrize("masked", [False, True], ids=["whole", "masked"])
+def test_measurements_of_any_type_are_read_exactly(dtype, masked):
+    """The same numbers in another type give the same answer, for a filter with and without inputs, and for a system."""
+    z = np.round(Z[:12] * 4).astype(dtype)
+    assert all(float(a) == b for a, b in zip(z.ravel(), np.round(Z[:12].ravel() * 4), strict=True))
+    gaps = (np.arange(12) % 5 == 2).reshape(-1, 1)
+    same = z.astype(np.float64)
+    given, expected = (np.ma.masked_array(each, gaps) if masked else each for each in (z, same))
+    for model in (MODEL, replace(MODEL, d=["0.5"])):
+        for basis in ("emulation", "bound"):
+            answers = [required_precision(model, 12, 1e-3, basis=basis, z=each) for each in (given, expected)]
+            assert answers[0] == answers[1]
+    one, other = (emulate(MODEL, each, FloatFormat(2, 9), checkpoint_steps=[12]) for each in (given, expected))
+    assert np.array_equal(one.state, other.state)
+    if not masked:
+        system = LinearSystem([["0.5"]], [[1]])
+        assert required_precision(system, 12, 1e-3, z=z) == required_precision(system, 12, 1e-3, z=same)
+        assert np.array_equal(reference(MODEL, z, [12]).x, reference(MODEL, same, [12]).x)
+
+
+def test_a_measurement_that_only_longdouble_holds_is_not_rounded_to_float64():
+    fine = np.longdouble(1) + np.finfo(np.longdouble).eps
+    if fine == np.float64(fine):
+        pytest.skip("longdouble is float64 on this processor")
+    z = np.array([[fine], [1]])
+    answers = [required_precision(MODEL, 2, 1e-3, z=each) for each in (z, [[Fraction(*fine.as_integer_ratio())], [1]])]
+    assert answers[0] == answers[1]
+    assert real_numbers(z)[0, 0] == Fraction(*fine.as_integer_ratio()) != 1
+    with pytest.raises(ValueError, match="measurements: entry 1, 0: got nan; needed a finite number"):
+        required_precision(MODEL, 2, 1e-3, z=np.array([[fine], [np.nan]], dtype=np.longdouble))
+    by_nan = required_precision(MODEL, 2, 1e-3, z=np.array([[1], [np.nan]], dtype=np.longdouble))
+    assert by_nan == required_precision(MODEL, 2, 1e-3, z=[[1], [math.nan]])

@@ -56,6 +56,31 @@ def test_a_record_without_a_checksum_is_refused(tmp_path):
         read_record(tmp_path / "a.json", "cure")
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x00\xff",
+        b"\xef\xbb\xbf{}",
+        b"[1, 2]",
+        b"[" * 100_000,
+        b'{"a": ' + b"9" * 5000 + b"}",
+        b'{"sha256": 3, "name": "\\ud800"}',
+    ],
+    ids=["empty", "binary", "marked", "list", "nested", "huge", "surrogate"],
+)
+def test_a_foreign_file_is_a_damaged_record(content, tmp_path):
+    (tmp_path / "a.json").write_bytes(content)
+    with pytest.raises(DamagedFileError, match=r"a.json, line 1: .*compute it again: python -m cure"):
+        read_record(tmp_path / "a.json", "python -m cure")
+
+
+def test_a_folder_is_no_record(tmp_path):
+    (tmp_path / "a.json").mkdir()
+    with pytest.raises(DamagedFileError, match="cannot be read: Is a directory"):
+        read_record(tmp_path / "a.json", "cure")
+
+
 @pytest.mark.parametrize("text", ["1_0", "٣", "", " 1", "1 ", "1e999", "-1e999", "0x1", "1e", ".", "--1", "infinity"])
 def test_what_is_no_plain_number(text):
     with pytest.raises(ValueError, match="needed"):
@@ -74,3 +99,9 @@ def test_plain_numbers(text, value):
 def test_what_is_no_plain_integer(text):
     with pytest.raises(ValueError, match="needed a whole number"):
         plain_integer(text)
+
+
+def test_a_message_does_not_repeat_a_long_text():
+    for read in (plain_number, plain_integer):
+        with pytest.raises(ValueError, match=r"^got 'x+\.\.\.x+'; needed"):
+            read("x" * 200_000)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import subprocess
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -95,6 +96,24 @@ def test_finished_cells_are_not_computed_again(sweep, tmp_path):
     assert tuple(seen) == CELLS
     newer = dataclasses.replace(sweep, version="2")
     assert newer.finished(tmp_path / "some") == []
+
+
+def _with_another_digit(text):
+    """The text of a record with the first digit of its result changed."""
+    begin, result, end = text.partition('"result"')
+    return begin + result + re.sub("[0-9]", lambda digit: str(9 - int(digit[0])), end, count=1)
+
+
+@pytest.mark.parametrize("damage", [lambda text: text[:-9], lambda text: "", lambda text: "[]", _with_another_digit])
+def test_a_damaged_cell_is_computed_again(sweep, tmp_path, damage):
+    expected = sweep.run(tmp_path, progress=False)
+    for file in tmp_path.glob("*.json"):
+        text = file.read_text(encoding="utf-8")
+        assert damage(text) != text
+        file.write_text(damage(text), encoding="utf-8")
+    assert sweep.finished(tmp_path) == []
+    assert sweep.run(tmp_path, progress=False) == expected
+    assert sweep.finished(tmp_path) == expected
 
 
 def test_progress_begins_with_the_finished_cells(sweep, tmp_path, capsys):

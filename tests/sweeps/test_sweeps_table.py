@@ -123,3 +123,24 @@ def test_provenance_is_one_line_each(tmp_path):
         with pytest.raises(ValueError, match="needed one line of text"):
             write(tmp_path / "year.csv", COLUMNS, ROWS, bad)
     assert math.isinf(Column("any").high)
+
+
+@pytest.mark.parametrize("count", ["²", "-1", "9" * 5000, ""])
+def test_a_number_of_rows_that_is_none_is_damage(file, count):
+    text = file.read_text(encoding="utf-8").replace("# rows: 45", f"# rows: {count}")
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(DamagedFileError, match=r"rows; needed a whole number|needed '# key: value'"):
+        read(file, COLUMNS, CURE)
+
+
+def test_a_row_that_no_reader_accepts_is_damage(file):
+    lines = file.read_text(encoding="utf-8").split("\n")
+    lines[8] = '"' + "7" * 200_000
+    file.write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(DamagedFileError, match=r"year\.csv, line 9: field larger than field limit"):
+        read(file, COLUMNS, CURE)
+
+
+def test_a_folder_is_no_table(tmp_path):
+    with pytest.raises(DamagedFileError, match="cannot be read: Is a directory"):
+        read(tmp_path, COLUMNS, CURE)

@@ -15,7 +15,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from markup import Elements
-from scipy import signal
 
 from gpbnb import __main__ as top
 from gpbnb.kalman.guarantee.bound import limits
@@ -270,29 +269,6 @@ def test_names_of_measurements_may_have_digits_and_spaces(header, tmp_path):
         read_measurements(tmp_path / "z.csv")
 
 
-def test_systems_of_other_libraries_are_read():
-    discrete = signal.dlti(*signal.butter(2, 0.3), dt=1)
-    for given in (discrete, discrete.to_ss(), SimpleNamespace(A=[[1]], B=[[1]], C=[[1]], D=[[0]], dt=0.1)):
-        system = read_model(given)
-        assert isinstance(system, LinearSystem)
-    assert read_model(discrete.to_ss()).A.astype(float) == pytest.approx(discrete.to_ss().A)
-    with pytest.raises(ValueError, match="continuous system"):
-        read_model(signal.StateSpace([[-1.0]], [[1.0]], [[1.0]], [[0.0]]))
-    for given in (3, SimpleNamespace(A=[[1]], B=[[1]], C=[[1]], dt=0.1)):
-        with pytest.raises(TypeError, match=f"got a {type(given).__name__}; needed"):
-            read_model(given)
-
-
-def test_a_filter_of_filterpy_is_read():
-    """Its attributes; x is a column there, or a row."""
-    given = SimpleNamespace(
-        F=np.eye(2), H=np.array([[1.0, 0.0]]), Q=np.eye(2), R=np.array([[2.0]]), x=np.array([[1.0], [2.0]]), P=np.eye(2)
-    )
-    model = read_model(given)
-    assert isinstance(model, LinearModel)
-    assert model.x0.tolist() == [1, 2]
-
-
 def test_a_mapping_is_read():
     assert read_model(MATRICES).p == 2
     with pytest.raises(ValueError, match="the mapping: C2 unknown"):
@@ -340,5 +316,5 @@ def test_inputs_without_a_place_for_them_are_refused():
     system = LinearSystem([["0.5"]], [[1]])
     with pytest.raises(ValueError, match="got inputs for a LinearSystem"):
         read_model(system, [[1]])
-    with pytest.raises(ValueError, match="u unknown"):
+    with pytest.raises(ValueError, match="the mapping: got known inputs for a linear system; needed none"):
         read_model(MATRICES, [[1]])

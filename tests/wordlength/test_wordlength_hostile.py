@@ -1,0 +1,234 @@
+"""The command and its readers, given files and options that no friend would write: a message, never a traceback."""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+
+from gpbnb.wordlength.__main__ import main
+from gpbnb.wordlength.models import read_measurements, read_model
+
+FILTER = {
+    "Phi": "[[1, 0.1], [0, 1]]",
+    "H": "[[1, 0]]",
+    "Q": "[[1e-4, 0], [0, 1e-2]]",
+    "R": "[[4]]",
+    "x0": "[0, 0]",
+    "P0": "[[100, 0], [0, 100]]",
+}
+SYSTEM = {"A": "[[0.5]]", "B": "[[1]]"}
+INPUTS = FILTER | {"B": "[[1], [0]]", "u": "[[1], [2]]", "b": "[0, 0]", "d": "[0]", "steps": "2", "repair": "true"}
+
+
+def toml(entries):
+    return "".join(f"{key} = {value}\n" for key, value in entries.items())
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "filter.toml").write_text(toml(FILTER), encoding="utf-8")
+    (tmp_path / "system.toml").write_text(toml(SYSTEM), encoding="utf-8")
+    (tmp_path / "z.csv").write_text("1\n2\n3\n", encoding="utf-8")
+    (tmp_path / "folder").mkdir()
+    return tmp_path
+
+
+def refused(capsys, *arguments):
+    """The message of a refusal, before which nothing was computed."""
+    assert main([*arguments, "--tolerance", "0.1"]) == 2
+    shown = capsys.readouterr()
+    assert not shown.out
+    *progress, message = shown.err.splitlines()
+    assert progress == []
+    assert message.startswith("python -m gpbnb.wordlength: ")
+    return message.removeprefix("python -m gpbnb.wordlength: ")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "model.toml: A, B missing; needed"),
+        (b"\x00\xff\xfe", "model.toml is not TOML: 'utf-8' codec"),
+        (toml(FILTER).encode("utf-16"), "model.toml is not TOML: 'utf-8' codec"),
+        (toml(FILTER).encode() + b"\x00", "model.toml is not TOML: Invalid statement"),
+        (toml(FILTER).encode() + b"R = [[3]]", "model.toml is not TOML: Cannot overwrite a value"),
+        (b"A = " + b"[" * 5000 + b"]" * 5000, "model.toml is not TOML: its lists are nested too deeply"),
+        (toml(SYSTEM | {"A": "[" * 100 + "1" + "]" * 100}).encode(), "model.toml: A: entry 0, 0, 0"),
+        (toml(FILTER | {"R": "[" * 60 + "4" + "]" * 60}).encode(), "model.toml: got R of shape (1, 1, 1, 1, "),
+        (toml(FILTER | {"R": f"[[{'9' * 5000}]]"}).encode(), "model.toml is not TOML: Exceeds the limit"),
+        (toml(FILTER | {"R": "[[1e99999999]]"}).encode(), "model.toml: R: entry 0, 0: got a number with the power of"),
+        (toml(FILTER | {"R": "[[1e-99999999]]"}).encode(), "model.toml: R: entry 0, 0: got a number with the power of"),
+        (toml(FILTER | {"R": f"[[1e{'9' * 40}]]"}).encode(), "model.toml: got an exponent that is too long"),
+        (
+            toml(FILTER | {"R": f"[['{'9' * 200_000}']]"}).encode(),
+            "model.toml: R: entry 0, 0: got a number of 200000 ch",
+        ),
+        (toml(FILTER | {"R": "[[1e9999]]"}).encode(), "got R with an entry near 2**33215; needed 2**-450 to 2**450"),
+        (toml(FILTER | {"x0": f"[{'9' * 4000}, 0]"}).encode(), "got x0 with an entry near 2**13287; needed 2**-450"),
+        (toml(FILTER | {"R": "[[nan]]"}).encode(), "model.toml: R: entry 0, 0: got NaN; needed a finite number"),
+        (toml(FILTER | {"R": "[[inf]]"}).encode(), "model.toml: R: entry 0, 0: got Infinity; needed a finite number"),
+        ((toml(FILTER) + "[u]\na = 1").encode(), "model.toml: got u without B"),
+        ((".".join("a" * 3000) + " = 1").encode(), "model.toml: A, B missing; a unknown"),
+    ],
+)
+def test_a_model_file_that_is_none(folder, capsys, content, message):
+    (folder / "model.toml").write_bytes(content)
+    assert refused(capsys, "model.toml", "--measurements", "z.csv").startswith(message)
+
+
+WRONG = {
+    "truth": "true",
+    "text": "'x'",
+    "empty text": "''",
+    "date": "1979-05-27",
+    "table": "{a = 1}",
+    "empty list": "[]",
+    "empty row": "[[]]",
+    "ragged": "[1, [2]]",
+    "zero below": "[['1/0']]",
+    "truths": "[[true]]",
+    "dates": "[[1979-05-27]]",
+    "tables": "[{a = 1}]",
+    "large": "'1e99999999'",
+    "float": "1e99",
+}
+# Every text is a name, and every truth value repairs or not.
+ALLOWED = {("name", "text"), ("name", "empty text"), ("name", "large"), ("repair", "truth")}
+
+
+@pytest.mark.parametrize("kind", WRONG)
+@pytest.mark.parametrize(
+    ("entries", "key"),
+    [
+        *((INPUTS, key) for key in (*INPUTS, "name")),
+        *((SYSTEM, key) for key in (*SYSTEM, "C", "D", "x0", "name")),
+        (SYSTEM, "unknown"),
+    ],
+)
+def test_a_value_of_a_wrong_type_is_refused_with_its_key(folder, capsys, entries, key, kind):
+    (folder / "model.toml").write_text(toml(entries | {key: WRONG[kind]}), encoding="utf-8")
+    if (key, kind) in ALLOWED:
+        read_model(folder / "model.toml")
+        return
+    message = refused(capsys, "model.toml", "--measurements", "z.csv")
+    assert message.startswith("model.toml: ")
+    assert key in message
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "z.csv: got no rows of numbers"),
+        (b"\n\n", "z.csv: got no rows of numbers"),
+        (b"\x00\xff", "z.csv is not UTF-8"),
+        ("1\n2\n".encode("utf-16"), "z.csv is not UTF-8"),
+        (b"1\n\xe9\n", "z.csv is not UTF-8"),
+        (b"1\n\x00\n", r"z.csv, line 2: got '\x00'; needed a number"),
+        (b"1\n" + b"1" * 200_000, "z.csv, line 2: field larger than field limit (131072)"),
+        (b'1\n"2\n3\n', r"z.csv, line 3: got '2\n3"),
+        (b"1\n" + b"7" * 100_000 + b"x\n", "z.csv, line 2: got '7777777"),
+        (b"1\n1e999\n", "z.csv, line 2: got '1e999'; needed a number that float64 holds"),
+        (b"z,z\n1,2\n3\n", "z.csv, line 3: got 1 cells; needed 2"),
+        (b"z\n1\nz\n", "z.csv, line 3: got 'z'; needed a number"),
+        (b"1;2\n", "z.csv, line 1: got '1;2'; needed a number"),
+        (b"1\n" + "१\n".encode(), "z.csv, line 2: got '१'; needed a number"),
+    ],
+)
+@pytest.mark.parametrize("model", ["filter.toml", "system.toml"])
+def test_measurements_that_are_none(folder, capsys, model, content, message):
+    (folder / "z.csv").write_bytes(content)
+    shown = refused(capsys, model, "--measurements", "z.csv")
+    assert shown.startswith(message)
+    assert len(shown) < 200
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["filter.toml", "--measurements", "folder"], "Is a directory: 'folder'"),
+        (["folder"], "Is a directory: 'folder'"),
+        (["absent.toml"], "No such file or directory: 'absent.toml'"),
+        (["filter.toml", "--inputs", "absent.csv"], "No such file or directory: 'absent.csv'"),
+        (["\0"], "embedded null byte"),
+        (["filter.toml", "--steps", "0"], "got 0 steps; needed a whole number"),
+        (["filter.toml", "--steps", "1000000000000"], "got 1,000,000,000,000 steps to simulate; needed at most"),
+        (["filter.toml", "--base", "7"], "got base 7; needed one with compiled loops"),
+        (["filter.toml", "--tolerance=1_0"], "got --tolerance 1_0; needed numbers"),
+        (["filter.toml", "--tolerance=1e400"], "got --tolerance 1e400; needed numbers"),
+        (["filter.toml", "--inputs", "z.csv"], "filter.toml: got u without B"),
+        (["system.toml"], "got a linear system without inputs; needed --measurements"),
+        (["system.toml", "--basis", "bound"], "got a linear system without inputs; needed --measurements"),
+        (["system.toml", "--inputs", "z.csv"], "system.toml: got known inputs for a linear system; needed none"),
+        (["system.toml", "--measurements", "z.csv", "--form", "UD"], "got --form UD for a linear system; needed none"),
+        (["system.toml", "--measurements", "z.csv", "--form", "innovation"], "got --form innovation for a linear sys"),
+    ],
+)
+def test_options_that_do_not_fit(folder, capsys, arguments, message):
+    tolerance = [] if any(each.startswith("--tolerance") for each in arguments) else ["--tolerance", "0.1"]
+    assert main([*arguments, *tolerance]) == 2
+    shown = capsys.readouterr().err
+    assert message in shown
+    assert "z=" not in shown
+    assert "unknown" not in shown
+
+
+@pytest.mark.parametrize(
+    ("report", "message"),
+    [
+        ("z.csv", "got z.csv and z.csv, which are one file"),
+        ("./folder/../filter.toml", "which are one file"),
+        ("data.html", "got data.json and data.json, which are one file"),
+        ("linked.html", "got z.csv and linked.html, which are one file"),
+        ("hard.html", "got z.csv and hard.html, which are one file"),
+        ("a.json", "got --report a.json; needed the name of an HTML file"),
+        ("a.JSON", "got --report a.JSON; needed the name of an HTML file"),
+        (".", "got --report .; needed the name of an HTML file"),
+        ("", "got --report .; needed the name of an HTML file"),
+        ("folder", "got --report folder, but folder is a folder"),
+        ("absent/a.html", "got --report absent/a.html, but absent/a.html is in no folder that exists"),
+        ("a" * 300, "File name too long"),
+    ],
+)
+def test_a_report_over_a_file_that_is_read_is_refused_before_anything_is_computed(folder, capsys, report, message):
+    (folder / "data.json").write_text("1\n2\n", encoding="utf-8")
+    (folder / "linked.html").symlink_to("z.csv")
+    os.link(folder / "z.csv", folder / "hard.html")
+    before = {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    source = "data.json" if report == "data.html" else "z.csv"
+    assert message in refused(capsys, "filter.toml", "--measurements", source, "--report", report)
+    assert {path: path.read_bytes() for path in folder.iterdir() if path.is_file()} == before
+
+
+def test_one_file_for_two_purposes_is_refused(folder, capsys):
+    (folder / "model.toml").write_text(toml(INPUTS), encoding="utf-8")
+    message = refused(capsys, "model.toml", "--measurements", "z.csv", "--inputs", "./z.csv")
+    assert message == "got z.csv and z.csv, which are one file; needed a file for each purpose"
+
+
+def test_a_report_may_replace_an_older_one_and_names_files_that_are_not_utf8(folder, capsys):
+    name = os.fsdecode(b"z\xff.csv")
+    (folder / "z.csv").rename(name)
+    asked = ["filter.toml", "--tolerance", "0.1", "--basis", "emulation", "--measurements", name, "--report", "a.html"]
+    for _ in range(2):
+        assert main(asked) == 0
+    assert r"z\xff.csv" in (folder / "a.html").read_text(encoding="utf-8")
+    assert r"z\\xff.csv" in (folder / "a.json").read_text(encoding="utf-8")
+
+
+def test_a_model_that_an_editor_marked_as_utf8_is_read(folder):
+    (folder / "marked.toml").write_bytes(b"\xef\xbb\xbf" + (folder / "filter.toml").read_bytes())
+    assert read_model("marked.toml").n == 2
+
+
+def test_measurements_that_are_all_missing_leave_a_filter_at_zero(folder, capsys):
+    (folder / "z.csv").write_text('nan\n""\n', encoding="utf-8")
+    assert read_measurements("z.csv").shape == (2, 1)
+    assert main(["filter.toml", "--tolerance", "0.1", "--basis", "emulation", "--measurements", "z.csv"]) == 0
+    assert "emulation, 2 steps" in capsys.readouterr().out
+
+
+def test_a_key_of_a_mapping_need_not_be_text():
+    with pytest.raises(ValueError, match=r"^the mapping: \(1, 2\), 3 unknown; needed"):
+        read_model({"A": [[1]], "B": [[1]], 3: 1, (1, 2): 2})
