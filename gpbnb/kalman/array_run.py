@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.kalman import array_steps
@@ -45,6 +46,7 @@ class ArrayRun:
         definiteness when their factors are computed in this format.
     """
 
+    @stays
     def __init__(
         self,
         model: LinearModel,

@@ -195,6 +195,7 @@ def required_system_precision(
     basis: Basis = "emulation",
     within: Limits | None = None,
     progress: bool = False,
+    largest_tried: int | None = None,
 ) -> Requirement:
     """Find the smallest precision with which the outputs of a linear system stay within a tolerance.
 
@@ -208,6 +209,7 @@ def required_system_precision(
         measurement. Both bound rounding, and the errors of storing coefficients and inputs. "probable" takes three
         standard deviations for rounding in place of its bound.
     within : result of :func:`gpbnb.kalman.guarantee.bound.limits`; only the limit on the measurement is used.
+    largest_tried : highest precision to try; by default the largest with compiled loops.
 
     Raises
     ------
@@ -240,9 +242,11 @@ def required_system_precision(
         return (ratio, "") if ratio < math.inf else (math.inf, "an output is not finite")
 
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(error, like, CHECKED[like.base], bar.update, bounds=basis != "emulation")
+        found = Search(error, like, CHECKED[like.base], bar.update, basis != "emulation", largest_tried)
     advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
-    return Requirement(found.fmt, basis, steps, found.tried, found.why, None, found.irregular, advice)
+    return Requirement(
+        found.fmt, basis, steps, found.tried, found.why, None, found.irregular, advice, limit=found.limit
+    )
 
 
 def _inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
