@@ -15,6 +15,15 @@ CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
 """Precisions like those of binary32 and binary64, which are always tried if they are above the answer."""
 
 
+MOST_BITS = 200
+"""Highest precision, in bits, that is tried where no compiled loops are needed and a call gives no other limit."""
+
+
+def largest_by_default(base: int) -> int:
+    """Return the highest precision within :data:`MOST_BITS`: 200 bits, 60 decimal or 50 hexadecimal digits."""
+    return math.floor(MOST_BITS / math.log2(base))
+
+
 def smallest_precision(
     meets: Callable[[FloatFormat], bool],
     base: int = 2,

@@ -86,7 +86,7 @@ def required_precision(
     progress : show a progress bar that counts precisions.
     largest : highest precision to try. By default, and at most, it is the largest with compiled loops: 53 bits, 18
         decimal or 13 hexadecimal digits, fewer with some roundings. A function runs in any precision; by default
-        those up to :data:`gpbnb.kalman.recursion.LARGEST` are tried: 200 bits, 60 decimal or 50 hexadecimal digits.
+        those up to 200 bits, 60 decimal or 50 hexadecimal digits are tried.
 
     Raises
     ------

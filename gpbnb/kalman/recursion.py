@@ -14,7 +14,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.exits import kept_in, lifted
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.search import CHECKED, Search
+from gpbnb.arithmetic.search import CHECKED, Search, largest_by_default
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import whole_number
 from gpbnb.kalman.requirement import ANY_BINARY, Basis, Requirement, checked_tolerance, largest_ratio
@@ -22,11 +22,8 @@ from gpbnb.kalman.requirement import ANY_BINARY, Basis, Requirement, checked_tol
 Recursion = Callable[..., Any]
 """A function ``run(fmt, z)``, or ``run(fmt)`` without z, that returns the outputs of all steps in the format."""
 
-LARGEST = {2: 200, 10: 60, 16: 50}
-"""Highest precision of functions that is tried unless the call gives another, in each base."""
-
-SPARE = {2: 37, 10: 12, 16: 10}
-"""Digits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
+SPARE_BITS = 37
+"""Bits that the reference has beyond the highest precision; a second run that checks it has half as many again."""
 
 _STOPS = (ZeroDivisionError, OverflowError, NegativeRootError, np.linalg.LinAlgError)
 
@@ -55,10 +52,10 @@ def required_recursion_precision(
     tolerance : largest error of each output, in its unit; one number, or (p,).
     z : inputs, one row for each step.
     like : a format of any precision, with base, rounding and range of those to try.
-    basis : only "emulation", where errors are differences from the same function in a reference with :data:`SPARE`
-        digits beyond `largest`.
-    largest : highest precision to try, by default that of :data:`LARGEST`. An answer that needs no more digits than
-        compiled loops have, 53 bits or 18 decimal digits, is found without trying higher ones.
+    basis : only "emulation", where errors are differences from the same function in a reference with :data:`SPARE_BITS`
+        beyond `largest`.
+    largest : highest precision to try, by default :func:`gpbnb.arithmetic.search.largest_by_default`. An answer that
+        needs no more digits than compiled loops have, 53 bits or 18 decimal digits, is found without trying more.
 
     Raises
     ------
@@ -78,7 +75,7 @@ def required_recursion_precision(
     >>> print(required_recursion_precision(smoother, 4, 0.01, z=[1, 2, 3, 4]))
     7 digits of base 2, nearest: 0.15 of the tolerance (emulation, 4 steps)
     """
-    largest = LARGEST[like.base] if largest is None else whole_number("largest", largest, 2)
+    largest = largest_by_default(like.base) if largest is None else whole_number("largest", largest, 2)
     error = _question(run, steps, tolerance, z, like.base, basis, largest)
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
         found = Search(error, like, CHECKED[like.base], bar.update, largest=largest)
@@ -107,7 +104,7 @@ def _question(
     inputs = None if z is None else real_numbers(z)
     if inputs is not None and steps is not None and (not inputs.ndim or len(inputs) != steps):
         raise ValueError(f"got inputs of shape {inputs.shape}; needed one row for each of the {steps} steps")
-    digits = max(largest, LARGEST[base]) + SPARE[base]
+    digits = max(largest, largest_by_default(base)) + math.ceil(SPARE_BITS / math.log2(base))
     short, true = (_reference(run, FloatFormat(base, each), inputs, steps) for each in (digits, digits * 3 // 2))
     tolerances = checked_tolerance(tolerance, true.shape[1], "outputs", base, basis)
     asked = np.isfinite(tolerances)
