@@ -37,6 +37,7 @@ class Requirement:
     irregular : precisions that meet the tolerance although a higher one that was run misses it; usually empty.
     advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
     repairs : changes of the model's covariances, each as text.
+    cause : why there is no answer in any precision; the limit of the search then does not matter.
     limit : why no higher precision than the last of `tried` was tried; it is shown if there is no answer.
     """
 
@@ -50,6 +51,7 @@ class Requirement:
     advice: str = ""
     repairs: tuple[str, ...] = ()
     limit: str = ""
+    cause: str = ""
 
     @property
     def precision(self) -> int | None:
@@ -64,6 +66,8 @@ class Requirement:
         if self.advice:
             notes.append(self.advice)
         end = "".join(f"; {note}" for note in notes)
+        if self.fmt is None and self.cause:
+            return f"no precision meets the tolerance ({self.basis}, {self.steps} steps): {self.cause}{end}"
         if self.fmt is None:
             most, why = f"{self.tried[-1][0]} digits", f"; {self.why}" if self.why else ""
             if self.limit:
