@@ -22,7 +22,7 @@ from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import Contraction, contraction_start
 from gpbnb.kalman.factors import combined_gain, covariance_of_factors
-from gpbnb.kalman.filter_run import Checkpoints, Run, check_compiled
+from gpbnb.kalman.filter_run import Checkpoints, Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
@@ -60,7 +60,7 @@ class ArrayRun:
                 f"got known inputs in the {form} form, which is not defined with them; needed another "
                 'form, such as "innovation"'
             )
-        check_compiled(fmt)
+        fmt.check_compiled()
         self.model, self.fmt, self.form = model, fmt, form
         self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
         self.steps, self.reason = 0, ""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.arithmetic.search import CHECKED, Search
@@ -136,8 +136,6 @@ class LinearSystem:
             tag: Any = DoubleDouble()
             coefficients, z, x = (double_doubles(exact(each)) for each in (given.coefficients, inputs, start))
         else:
-            if not isinstance(fmt.backend, Compiled):
-                raise ValueError(f"got {fmt}; needed a format with compiled loops: base 2, 10 or 16")
             tag = fmt.run_tag()
             fmt.restart()
             coefficients, z, x = (pack(fmt, each) for each in (given.coefficients, inputs, start))
