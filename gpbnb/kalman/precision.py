@@ -29,7 +29,7 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, format_like, largest_ratio, listed
-from gpbnb.kalman.system import LinearSystem, required_system_precision
+from gpbnb.kalman.system import LinearSystem, required_system_precision, unobserved
 
 MOST_SIMULATED = 10**8
 """Largest number of steps to simulate. A small model takes about a second for a million steps."""
@@ -159,8 +159,11 @@ def required_precision(
             advice = _better_form(errors_of, form, search)
     if found.fmt is not None:
         repairs += tuple(map(str, _opened(model, found.fmt, form, (), False).repairs[len(model.repairs) :]))
+    cause = "" if found.fmt is not None or model.cycle != 1 else unobserved(model.Phi[0], model.H[0])
+    if cause and not for_ever:
+        cause, advice = "", "; ".join([*filter(None, [advice]), f"{cause}, so that its errors never decay"])
     return Requirement(
-        found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs, found.limit
+        found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs, found.limit, cause
     )
 
 

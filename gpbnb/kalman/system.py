@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, cast
 
 import numpy as np
@@ -305,6 +306,30 @@ def is_stable(A: NDArray[Any]) -> bool:
         share = first / last
         p = [high - share * low for high, low in zip(p[1:], p[-2::-1], strict=True)]
     return True
+
+
+def unobserved(Phi: NDArray[Any], H: NDArray[Any]) -> str:
+    """Return in words that no measurement observes a state which does not decay; empty if there is none.
+
+    The unobserved states are those that H Φᵏ maps to zero for every k; Φ maps them to each other. The test is exact.
+    """
+    n, rows = len(Phi), [H]
+    for _ in range(n - 1):
+        rows.append(rows[-1] @ Phi)
+    reduced, rank = rationals(np.concatenate(rows)).rref()
+    pivots = [next(j for j in range(n) if reduced[i, j]) for i in range(rank)]
+    free = [j for j in range(n) if j not in pivots]
+    if not free:
+        return ""
+    basis = np.full((n, len(free)), Fraction(0), dtype=object)
+    for at, j in enumerate(free):
+        basis[j, at] = Fraction(1)
+        for i, pivot in enumerate(pivots):
+            basis[pivot, at] = -Fraction(int(reduced[i, j].p), int(reduced[i, j].q))
+    moved = (Phi @ basis)[free]  # the coordinates in this basis are the free entries
+    if is_stable(moved):
+        return ""
+    return f"no measurement observes a part of the state that does not decay, with {_eigenvalue(moved)}"
 
 
 def _eigenvalue(A: NDArray[Any]) -> str:

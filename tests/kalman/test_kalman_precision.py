@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman import precision
 from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.emulation import emulate
@@ -23,7 +24,7 @@ from gpbnb.kalman.named import form_named
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import listed
 from gpbnb.kalman.simulation import Simulation, fine_resolution
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.kalman.system import LinearSystem, unobserved
 
 STEPS = 60
 MODEL = LinearModel(
@@ -481,3 +482,38 @@ def test_a_missing_measurement_changes_nothing_but_the_prediction():
     within = limits(2, 2, state=100, innovation=20)
     with pytest.raises(ValueError, match='got missing measurements and basis "guarantee"'):
         required_precision(two, 12, 1e-4, basis="guarantee", within=within, z=with_nan)
+
+
+@pytest.mark.parametrize(
+    ("Phi", "H", "text"),
+    [
+        ([["1.1"]], [[0]], "eigenvalue of size 1.1"),
+        (
+            [[1, "0.1"], [0, 1]],
+            [[0, 1]],
+            "eigenvalue of size 1 or more",
+        ),  # a position of which only the speed is measured
+        ([[1, "0.1"], [0, 1]], [[1, 0]], ""),
+        ([["0.9", 0], [0, 1]], [[0, 1]], ""),
+        ([["0.9", 0], [0, 1]], [[1, 0]], "eigenvalue of size 1 or more"),
+        # the difference of two equal states is not observed, and decays if both do
+        ([[2, 0], [0, 2]], [[1, 1]], "eigenvalue of size 2"),
+        ([["1/2", 0], [0, "1/2"]], [[1, 1]], ""),
+    ],
+)
+def test_a_part_of_the_state_that_no_measurement_observes_is_found_exactly(Phi, H, text):
+    found = unobserved(exact(Phi), exact(H))
+    assert (text in found) if text else found == ""
+
+
+@pytest.mark.parametrize("basis", ["emulation", "guarantee", "probable"])
+def test_an_unobserved_state_that_grows_is_the_cause_where_there_is_no_answer(basis):
+    model = LinearModel([["1.1"]], [[0]], [[1]], [[1]], [0], [[1]])
+    within = None if basis == "emulation" else limits(1, 1, state=10, innovation=10)
+    found = required_precision(model, 4000, 1e-3, z=np.zeros((4000, 1)), basis=basis, within=within)
+    assert found.precision is None
+    cause = "no measurement observes a part of the state that does not decay, with an eigenvalue of size 1.1"
+    if basis == "emulation":
+        assert str(found).endswith(f"; {cause}, so that its errors never decay")
+    else:
+        assert str(found) == f"no precision meets the tolerance ({basis}, 4000 steps): {cause}"
