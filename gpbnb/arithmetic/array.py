@@ -42,8 +42,8 @@ class FloatArray(NumPyProtocols):
 
     Conversion to other number types is explicit. ``x.to_float()`` gives the nearest float64, ``x.to_fractions()`` the
     exact value. Whatever asks for an array or a float by itself, as ``np.asarray(x)``, ``float(x[0])``,
-    ``math.sqrt(x[0])``, ``np.save`` or ``scipy.linalg.solve``, gets float64 if that is exact, or else an error. While the
-    precision of a function is searched, neither leads out of the format: see :mod:`gpbnb.arithmetic.exits`.
+    ``math.sqrt(x[0])``, ``np.save`` or ``scipy.linalg.solve``, gets float64 if that is exact, or else an error.
+    While the precision of a function is searched, all of these are errors; see :mod:`gpbnb.arithmetic.exits`.
 
     Raises
     ------
