@@ -10,6 +10,7 @@ The public interface::
     LinearSystem               a linear filter, controller or observer with known inputs
     required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
     survey_records             many measurement records in many formats at once
+    peek                       look at numbers of a function while its precision is searched
     read_model                 a model from a TOML file, SciPy, python-control or FilterPy
 
 Each chapter of the book has a sub-package: rounding, inversion, kalman, rolling, integration, budget, geometry and
@@ -24,6 +25,7 @@ from gpbnb import clock as clock  # before all other modules, because it notes t
 if TYPE_CHECKING:
     from gpbnb.arithmetic import linalg
     from gpbnb.arithmetic.array import FloatArray
+    from gpbnb.arithmetic.exits import peek
     from gpbnb.arithmetic.fixed import FixedFormat
     from gpbnb.arithmetic.formats import FloatFormat, Rounding
     from gpbnb.arithmetic.named import (
@@ -58,8 +60,8 @@ NAMED_FORMATS = (
 __all__ = [
     "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP8_E4M3",
     "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32", "FixedFormat", "FloatArray",
-    "FloatFormat", "LinearModel", "LinearSystem", "Rounding", "linalg", "read_model", "required_precision",
-    "survey_records",
+    "FloatFormat", "LinearModel", "LinearSystem", "Rounding", "linalg", "peek", "read_model",
+    "required_precision", "survey_records",
 ]
 # fmt: on
 
@@ -70,6 +72,7 @@ _HOME = {
     "LinearModel": "gpbnb.kalman.model",
     "LinearSystem": "gpbnb.kalman.system",
     "Rounding": "gpbnb.arithmetic.formats",
+    "peek": "gpbnb.arithmetic.exits",
     "read_model": "gpbnb.wordlength.models",
     "required_precision": "gpbnb.kalman.precision",
     "survey_records": "gpbnb.wordlength.records",

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.conversion import entries, exact_ratio
+from gpbnb.arithmetic.exits import check_exit, entering
 from gpbnb.arithmetic.functions import kept, lines, power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
-from gpbnb.arithmetic.text import decimal_text, in_columns
+from gpbnb.arithmetic.text import at_entry, decimal_text, in_columns, place
 
 if TYPE_CHECKING:
     from typing import Self
@@ -42,6 +43,7 @@ class FloatArray(NumPyProtocols):
     Conversion to other number types is explicit. ``x.to_float()`` gives the nearest float64, ``x.to_fractions()`` the
     exact value. Whatever asks for an array or a float by itself, as ``np.asarray(x)``, ``float(x[0])``,
     ``math.sqrt(x[0])``, ``np.save`` or ``scipy.linalg.solve``, gets float64 if that is exact, or else an error.
+    While the precision of a function is searched, all of these are errors; see :mod:`gpbnb.arithmetic.exits`.
 
     Raises
     ------
@@ -100,6 +102,7 @@ class FloatArray(NumPyProtocols):
 
     def to_pairs(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return significands and exponents as Python integers; each entry is ``m * base**e``, normalized."""
+        check_exit(self, "to_pairs()")
         m, e = self.on_exact_backend().components
         return m, e
 
@@ -114,12 +117,14 @@ class FloatArray(NumPyProtocols):
             if values.format == fmt and isinstance(values, cls):
                 return values
             if values.format.base == fmt.base:
-                pairs = values.to_pairs()
+                with entering(fmt):
+                    pairs = values.to_pairs()
                 m, e = np.frompyfunc(fmt.kernel.from_ratio, 3, 2)(pairs[0], 1, pairs[1])
                 return cls.from_pairs(m, e, fmt)
         if type(values) is np.ndarray and (components := fmt.backend.from_numbers(values, exactly)) is not None:
             return cls.from_components(fmt.backend, components, fmt)
-        given = entries(values)
+        with entering(fmt):
+            given = entries(values)
         read = []
         # Large cycles of matrices have few different entries. Random roundings differ for equal ones, too.
         known: dict[Any, Any] = {}
@@ -130,7 +135,7 @@ class FloatArray(NumPyProtocols):
                 if random or ratio not in known:
                     known[ratio] = cls._rounded(value, ratio, fmt, exactly)
             except (TypeError, ValueError, OverflowError) as error:
-                raise type(error)(f"{_entry(np.unravel_index(i, given.shape))}{error}") from None
+                raise type(error)(f"{at_entry(np.unravel_index(i, given.shape))}{error}") from None
             read.append(known[ratio])
         found = np.array(read, object).reshape(-1, 2).T
         m, e = (np.ascontiguousarray(part).reshape(given.shape) for part in found)
@@ -146,7 +151,8 @@ class FloatArray(NumPyProtocols):
         return pair
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self).from_pairs, (*self.to_pairs(), self.format)
+        check_exit(self, "pickle")
+        return type(self).from_pairs, (*self.on_exact_backend().components, self.format)
 
     # -- shape ---------------------------------------------------------------------------------
 
@@ -229,7 +235,7 @@ class FloatArray(NumPyProtocols):
         a, b = self.operand(left), self.operand(right)
         broadcast(name, a.shape, b.shape)
         if name == "divide" and (zero := _first(b.components[0] == 0)) is not None:
-            at = f" at {_place(zero)} of the divisor" if zero else ""
+            at = f" at {place(zero)} of the divisor" if zero else ""
             raise ZeroDivisionError(
                 f"got a division by zero{at}; needed a divisor other than zero; test x == 0 before dividing"
             )
@@ -255,7 +261,7 @@ class FloatArray(NumPyProtocols):
 
     def _unary(self, name: str) -> FloatArray:
         if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
-            at = f" at {_place(negative)}" if negative else ""
+            at = f" at {place(negative)}" if negative else ""
             raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
             )
@@ -399,6 +405,7 @@ class FloatArray(NumPyProtocols):
         ------
         OverflowError : an entry would become infinite, or a nonzero entry would become zero.
         """
+        check_exit(self, "to_float()")
         return self.backend.to_float(self.components)[()]
 
     def to_fractions(self) -> Any:
@@ -408,9 +415,10 @@ class FloatArray(NumPyProtocols):
         ------
         OverflowError : an entry is too long to write out.
         """
+        check_exit(self, "to_fractions()")
         to_fraction = self.format.kernel.to_fraction
         convert = np.frompyfunc(cache(to_fraction) if self.size > MANY else to_fraction, 2, 1)
-        return np.asarray(convert(*self.to_pairs()), dtype=object)[()]
+        return np.asarray(convert(*self.on_exact_backend().components), dtype=object)[()]
 
     # -- text ----------------------------------------------------------------------------------
 
@@ -425,10 +433,11 @@ class FloatArray(NumPyProtocols):
 
     def _text(self, quote: str, separator: str, prefix: str) -> str:
         """Return decimal digits, in columns, from which ``fmt.array`` makes the same numbers again."""
+        check_exit(self, "text")
         flat = self.reshape(-1)
 
         def text(i: int) -> str:
-            m, e = flat[i].to_pairs()
+            m, e = flat[i].on_exact_backend().components
             return f"{quote}{decimal_text(m.item(), e.item(), self.format.kernel)}{quote}"
 
         return in_columns(text, self.shape, separator, prefix)
@@ -455,14 +464,6 @@ def _first(condition: Any) -> tuple[int, ...] | None:
     if not condition.any():
         return None
     return tuple(int(i) for i in np.argwhere(condition)[0])
-
-
-def _place(index: tuple[int, ...]) -> str:
-    return f"[{', '.join(map(str, index))}]"
-
-
-def _entry(index: tuple[Any, ...]) -> str:
-    return f"entry {_place(index)}: " if index else ""
 
 
 def _matmul(a: FloatArray, b: FloatArray) -> FloatArray:

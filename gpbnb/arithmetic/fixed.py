@@ -18,6 +18,7 @@ from gpbnb.arithmetic.kernels.limited import limited_kernel
 from gpbnb.arithmetic.kernels.limited_backends import (
     Accumulator,
     LimitedExact,
+    check_compiled,
     limited_backend,
     limited_exact,
     mixed_tag,
@@ -148,6 +149,10 @@ class FixedFormat:
         if sums is not None:
             return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
         return run_tag(self.backend, self._rules, fused, order, block)
+
+    def check_compiled(self) -> None:
+        """Reject a format without compiled loops; see :meth:`gpbnb.arithmetic.formats.FloatFormat.check_compiled`."""
+        check_compiled(self.backend, self._rules)
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""

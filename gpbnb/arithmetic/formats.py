@@ -20,6 +20,7 @@ from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
 from gpbnb.arithmetic.kernels.limited import limited_kernel
 from gpbnb.arithmetic.kernels.limited_backends import (
     Accumulator,
+    check_compiled,
     limited_backend,
     limited_exact,
     mixed_tag,
@@ -198,6 +199,15 @@ class FloatFormat:
         return run_tag(
             self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused, order, block
         )
+
+    def check_compiled(self) -> None:
+        """Reject a format without compiled loops.
+
+        Raises
+        ------
+        ValueError : it has none; the message names the setting that prevents them, and what to set instead.
+        """
+        check_compiled(self.backend, self._rules or Rules(self.base, self.precision, self.rounding))
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""

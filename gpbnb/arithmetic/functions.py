@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from flint import arb, ctx
 
+from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.rational import exact
 
 ELEMENTARY = (
@@ -27,6 +28,7 @@ _ARB_NAMES = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 _MOST_BITS = 1 << 16
 
 
+@stays
 def elementary(name: str, x: Any) -> Any:
     """Apply a function of :data:`ELEMENTARY` to each entry, correctly rounded.
 
@@ -145,6 +147,7 @@ def argmin(x: Any, axis: int | None = None, keepdims: bool = False) -> Any:
     return np.argmin(x != smallest(x, axis, keepdims=True), axis=axis, keepdims=keepdims)
 
 
+@stays
 def argsort(x: Any, axis: int | None = -1) -> Any:
     """Return the indices that sort entries in ascending order; equal entries keep their order."""
     return np.argsort(np.asarray(x.to_fractions(), dtype=object), axis=axis, kind="stable")
@@ -193,6 +196,7 @@ def diff(x: Any, times: int = 1, axis: int = -1) -> Any:
     return given.moved(lambda a: np.moveaxis(a, 0, axis))
 
 
+@stays
 def isclose(a: Any, b: Any, rtol: Any = 1e-5, atol: Any = 1e-8) -> Any:
     r"""Whether :math:`|a-b| \le \text{atol} + \text{rtol}\,|b|` at each place, computed exactly from any numbers.
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.exits import lifted
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.limited_backends import check_order
 from gpbnb.arithmetic.kernels.rules import Order
@@ -110,7 +111,8 @@ def matmul(
             raise ValueError(
                 f"sums: got {sums} with operands in {a.format}; needed the same base and at least as many digits"
             )
-        return a.format.array(matmul(sums.array(a), sums.array(b), order, fused, block))
+        with lifted():
+            return a.format.array(matmul(sums.array(a), sums.array(b), order, fused, block))
     n = a.shape[-1] if a.ndim else 0
     if not b.ndim or n == 0 or (order == "left" and not fused) or n != b.shape[max(b.ndim - 2, 0)]:
         return a @ b  # this error also names shapes that do not fit

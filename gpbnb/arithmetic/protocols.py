@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import functions
 from gpbnb.arithmetic.conversion import single
+from gpbnb.arithmetic.exits import check_exit, lifted
 
 _EXACT = {2: 53, 16: 13}  # digits of float64
 _LEAST_NORMAL = 2.0**-1022
@@ -99,6 +100,12 @@ class NumPyProtocols:
         """Return the array itself, which is immutable and needs no copy."""
         return self
 
+    def __copy__(self) -> Any:
+        return self
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        return self
+
     def ravel(self) -> Any:
         """Return the entries in one row."""
         return self.moved(np.ravel)
@@ -118,11 +125,13 @@ class NumPyProtocols:
 
     def tolist(self) -> Any:
         """Return exact Fractions in nested lists, or one Fraction."""
+        check_exit(self, "tolist()")
         found = self.to_fractions()
         return found.tolist() if isinstance(found, np.ndarray) else found
 
     def item(self, *index: Any) -> Any:
         """Return one entry as an exact Fraction."""
+        check_exit(self, "item()")
         found = np.asarray(self.to_fractions(), dtype=object)
         return found.item(*index)
 
@@ -164,12 +173,25 @@ class NumPyProtocols:
         return nearest
 
     def __float__(self) -> float:
+        check_exit(self, "float()")
         given: Any = self
         if given.size != 1:
             raise TypeError(
                 f"got float() of a {type(self).__name__} of shape {given.shape}; needed one number; use x.to_float()"
             )
         return float(given.reshape(())._exact_float("float()").item())
+
+    def __int__(self) -> int:
+        check_exit(self, "int()")
+        raise TypeError(f"got int() of a {type(self).__name__}; needed its exact value: int(x.to_fractions())")
+
+    def __index__(self) -> int:
+        check_exit(self, "an index")
+        raise TypeError(f"got a {type(self).__name__} as an index; needed an int: int(x.to_fractions())")
+
+    def __round__(self, digits: int | None = None) -> Any:
+        check_exit(self, "round()")
+        raise TypeError(f"got round() of a {type(self).__name__}; needed its exact value: round(x.to_fractions())")
 
     def astype(self, dtype: Any) -> NDArray[Any]:
         """Return a NumPy array of the nearest float64 numbers, or of exact Fractions for dtype object.
@@ -179,6 +201,7 @@ class NumPyProtocols:
         TypeError : another dtype.
         OverflowError : as ``to_float``.
         """
+        check_exit(self, "astype()")
         dtype = np.dtype(dtype)
         if dtype == np.float64:
             return np.asarray(self.to_float(), dtype=np.float64)
@@ -191,6 +214,7 @@ class NumPyProtocols:
         )
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        check_exit(self, "a NumPy array")
         if copy is False:
             raise ValueError(
                 f"got copy=False; needed True or None; converting a {type(self).__name__} always copies it"
@@ -200,6 +224,7 @@ class NumPyProtocols:
         return self.astype(dtype)
 
     def __format__(self, spec: str) -> str:
+        check_exit(self, "text")
         return format(float(self.to_float()), spec) if spec else str(self)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
@@ -368,8 +393,9 @@ def _append(x: NumPyProtocols, a: Any, values: Any, axis: int | None) -> Any:
 
 def _exponent(value: Any) -> Any:
     """Return a plain exponent, which NumPy passes as an array of a format."""
-    if not value.ndim and (exact := value.to_fractions()).denominator == 1:
-        return int(exact)
+    with lifted():
+        if not value.ndim and (exact := value.to_fractions()).denominator == 1:
+            return int(exact)
     raise TypeError("got an exponent that is not a single whole number; needed one, as in np.power(x, 3)")
 
 

@@ -15,6 +15,15 @@ CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
 """Precisions like those of binary32 and binary64, which are always tried if they are above the answer."""
 
 
+MOST_BITS = 200
+"""Highest precision, in bits, that is tried where no compiled loops are needed and a call gives no other limit."""
+
+
+def largest_by_default(base: int) -> int:
+    """Return the highest precision within :data:`MOST_BITS`: 200 bits, 60 decimal or 50 hexadecimal digits."""
+    return math.floor(MOST_BITS / math.log2(base))
+
+
 def smallest_precision(
     meets: Callable[[FloatFormat], bool],
     base: int = 2,
@@ -75,6 +84,14 @@ def _smallest(suffices: Callable[[int], bool], least: int, largest: int | None, 
     return answer if suffices(answer) else None
 
 
+def largest_compiled(like: FloatFormat) -> int:
+    """Return the largest precision of formats such as `like` that have compiled loops; at least 2."""
+    largest = LARGEST_PRECISION[like.base]
+    while largest > 2 and not isinstance(replace(like, precision=largest).backend, Compiled):
+        largest -= 1  # stochastic rounding has fewer digits
+    return largest
+
+
 class Search:
     """The smallest precision that meets a tolerance, and above which every precision tried meets it.
 
@@ -86,6 +103,12 @@ class Search:
     tick : called after each run.
     bounds : whether the errors are bounds, which may not exist. Precisions above the answer that have no bound are
         then listed as undecided and do not invalidate the answer.
+    largest : highest precision to try; by default the largest with compiled loops, see :func:`largest_compiled`.
+        Precisions without compiled loops are tried only if none below qualifies.
+
+    Raises
+    ------
+    ValueError : `largest` is below 2.
     """
 
     def __init__(
@@ -95,15 +118,21 @@ class Search:
         checks: Sequence[int],
         tick: Callable[[], object] = lambda: None,
         bounds: bool = False,
+        largest: int | None = None,
     ) -> None:
         self._ratios, self._why = dict[int, float](), dict[int, str]()
+        self._like, self._given = like, largest is not None
         #: Precisions above the answer for which there is no bound.
         self.undecided: tuple[int, ...] = ()
         #: Precisions that met the tolerance although a higher one missed it; usually empty.
         self.irregular: tuple[int, ...] = ()
-        largest = LARGEST_PRECISION[like.base]
-        while largest > 2 and not isinstance(replace(like, precision=largest).backend, Compiled):
-            largest -= 1  # stochastic rounding has fewer digits
+        #: The answer, or None.
+        self.fmt: FloatFormat | None = None
+        fast = largest_compiled(like)
+        #: The highest precision that may be tried.
+        self.largest = fast if largest is None else largest
+        if self.largest < 2:
+            raise ValueError(f"got largest={largest}; needed a precision of at least 2 digits")
 
         def meets(digits: int) -> bool:
             if digits not in self._ratios:
@@ -111,22 +140,39 @@ class Search:
                 tick()
             return self._ratios[digits] <= 1
 
-        answer = _smallest(meets, 2, largest, monotone=False)
-        #: The answer, or None.
-        self.fmt = None if answer is None else replace(like, precision=answer)
+        least = 2
+        for top in sorted({min(fast, self.largest), self.largest}):
+            answer = self._answer(meets, least, top, checks, bounds)
+            if answer is not None and (answer < top or top == self.largest):
+                self.fmt = replace(like, precision=answer)
+                return
+            least = top
+
+    def _answer(
+        self, meets: Callable[[int], bool], least: int, largest: int, checks: Sequence[int], bounds: bool
+    ) -> int | None:
+        """Return the smallest precision from `least` to `largest` that qualifies, and test the precisions above it."""
+        answer = _smallest(meets, least, largest, monotone=False)
         if answer is None or not checks:
-            return
+            return answer
         above = {digits for digits in (answer + 2, *checks) if answer < digits <= largest}
         missed = [digits for digits in sorted(above) if not meets(digits)]
         if not missed:
-            return
+            return answer
         if bounds and all(math.isinf(self._ratios[digits]) for digits in missed):
             self.undecided = tuple(missed)
-            return
+            return answer
         most = max(digits for digits in range(answer, largest + 1) if not meets(digits))
         self.irregular = tuple(digits for digits, ratio in self.tried if ratio <= 1 and digits < most)
         # a single precision above could be chance
-        self.fmt = replace(like, precision=most + 1) if most + 1 < largest else None
+        return most + 1 if most + 1 < largest else None
+
+    @property
+    def limit(self) -> str:
+        """Return what sets the highest precision that may be tried."""
+        if self._given:
+            return f"where largest={self.largest} ends the search"
+        return f"the most with compiled loops in base {self._like.base}, rounded {self._like.rounding.value}"
 
     @property
     def tried(self) -> tuple[tuple[int, float], ...]:

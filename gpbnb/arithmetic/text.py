@@ -80,3 +80,13 @@ def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int]:
     if not form.nearest and decimal.to_fraction(digits, exponent) < value:
         digits += 1
     return integer_text(digits), exponent
+
+
+def place(index: tuple[Any, ...]) -> str:
+    """Write the index of an entry, as ``[0, 1]``."""
+    return f"[{', '.join(map(str, index))}]"
+
+
+def at_entry(index: tuple[Any, ...]) -> str:
+    """Begin a message about an entry with its index; empty for a single number."""
+    return f"entry {place(index)}: " if index else ""

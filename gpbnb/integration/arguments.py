@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from numbers import Number
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,9 +11,22 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
+def _numbers(name: str, values: ArrayLike) -> Floats:
+    """Return numbers as float64; text and truth values are no numbers, although NumPy converts them."""
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind in "iuf" or (
+            given.dtype.kind == "O" and all(isinstance(each, Number) for each in given.ravel().tolist())
+        ):
+            return given.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise ValueError(f"got {name} = {values!r}; needed a number, or an array of numbers")
+
+
 def positive_array(name: str, values: ArrayLike) -> Floats:
     """Return positive, finite numbers as an array; raise ValueError otherwise."""
-    array = np.asarray(values, dtype=np.float64)
+    array = _numbers(name, values)
     if not np.all((array > 0) & (array < np.inf)):
         bad = array[~((array > 0) & (array < np.inf))].flat[0]
         raise ValueError(f"got {name} = {bad}; needed a positive, finite number; check its unit and sign")
@@ -37,7 +51,7 @@ def bandwidth_ratio(omega_bw: float, f_c: float) -> float:
 
 def cycle_counts(n: ArrayLike) -> Floats:
     """Return numbers of cycles, at least 0 and finite; raise ValueError otherwise."""
-    array = np.asarray(n, dtype=np.float64)
+    array = _numbers("n", n)
     if not np.all((array >= 0) & (array < np.inf)):
         raise ValueError(f"got n = {n!r}; needed cycles, at least 0 and finite")
     return array

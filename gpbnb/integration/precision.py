@@ -16,6 +16,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.rules import rounding_named
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.integration.arguments import Floats, bandwidth_ratio, positive_array, positive_number
 from gpbnb.integration.walk import discretize, error_variance
@@ -95,8 +96,13 @@ def two_errors(sigma_x: float, omega_bw: float, f_c: float, duration: float, fmt
 
     Raises
     ------
-    ValueError : an argument is not positive and finite, or `duration` is shorter than two cycles.
+    ValueError : an argument is not positive and finite, `duration` is shorter than two cycles, or the format rounds
+        neither to nearest with ties away from zero nor by chopping.
     """
+    if fmt.rounding not in Rounding.documented():
+        raise ValueError(
+            f"got rounding {fmt.rounding.value!r}; needed 'nearest' or 'chop', which the formulas describe"
+        )
     sigma_x, mu = positive_number("sigma_x", sigma_x), bandwidth_ratio(omega_bw, f_c)
     period, n = 1 / f_c, positive_number("duration", duration) * f_c
     if n < 2:
@@ -180,7 +186,7 @@ def needed_precision(
     f_c: float,
     duration: float,
     base: int = 2,
-    rounding: Rounding = Rounding.NEAREST,
+    rounding: Rounding | str = Rounding.NEAREST,
     share: float = 0.1,
 ) -> int:
     """Return the fewest digits for which the rounding error is at most `share` of the discretization error.
@@ -188,16 +194,16 @@ def needed_precision(
     Raises
     ------
     ValueError : `share` is not positive, or :func:`two_errors` rejects an argument.
+    TypeError : a base or rounding that a ``FloatFormat`` rejects.
     """
-    if not 0 < share < math.inf:
-        raise ValueError(f"got share = {share}; needed a positive number, such as 0.1 for a tenth")
+    share, like = positive_number("share", share), FloatFormat(base, 2, rounding_named(rounding))
 
     def enough(fmt: FloatFormat) -> bool:
         errors = two_errors(1.0, omega_bw, f_c, duration, fmt)
         return errors.rounding <= share * errors.discretization
 
-    most = math.ceil(400 / math.log2(base))
-    found = smallest_precision(enough, base, rounding, largest=most, monotone=True)
+    most = math.ceil(400 / math.log2(like.base))
+    found = smallest_precision(enough, like.base, like.rounding, largest=most, monotone=True)
     if found is None:
         raise ValueError(
             f"got share = {share}, {f_c:g} Hz, {duration:g} s; needed at most {most} digits; allow a larger share"

@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from numbers import Real
 from typing import Any
 
 import flint
@@ -273,10 +274,10 @@ class Guarantee:
 def smallest_precision(
     a: Any,
     tolerance: float,
-    base: int = 10,
+    base: int = 2,
     rounding: Rounding = Rounding.NEAREST,
     pivot: bool = True,
-    largest: int = 60,
+    largest: int | None = None,
 ) -> Guarantee:
     r"""Find the fewest digits in which the computed inverse of a matrix is proved to be within a tolerance.
 
@@ -290,7 +291,8 @@ def smallest_precision(
     tolerance : relative error, above 0.
     base, rounding : base and rounding of the formats.
     pivot : whether to use partial pivoting.
-    largest : highest precision to try.
+    largest : highest precision to try; by default :func:`gpbnb.arithmetic.search.largest_by_default`, 200 bits or 60
+        decimal digits.
 
     Returns
     -------
@@ -302,8 +304,9 @@ def smallest_precision(
     ValueError : `tolerance` is not above 0, `a` is not square, or no precision up to `largest` is enough.
     numpy.linalg.LinAlgError : `a` is singular, so no precision helps.
     """
-    if not (isinstance(tolerance, (int, float, Fraction)) and tolerance > 0 and math.isfinite(tolerance)):
-        raise ValueError(f"tolerance must be a relative error above 0, such as 1e-6; got {tolerance!r}")
+    check_relative(tolerance)
+    if largest is None:
+        largest = search.largest_by_default(base)
     if largest < 1:
         raise ValueError(f"largest must be a precision of at least 1; got {largest}")
     given = exact(a)
@@ -311,12 +314,14 @@ def smallest_precision(
         raise ValueError(f"a must be a square matrix (n, n) with n at least 1; got shape {given.shape}")
     true_inverse(given)
     tried: dict[FloatFormat, Guarantee] = {}
+    why: dict[int, str] = {}
 
     def meets(fmt: FloatFormat) -> bool:
         try:
             x = linalg.inv(fmt.array(given), pivot)
             tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
-        except (np.linalg.LinAlgError, ValueError):  # the matrix is singular in so few digits, or no bound was proved
+        except (np.linalg.LinAlgError, ValueError) as error:  # it is singular in so few digits, or no bound was proved
+            why[fmt.precision] = str(error)
             return False
         return tried[fmt].bound <= tolerance
 
@@ -324,11 +329,25 @@ def smallest_precision(
     if found is not None:
         return tried[found]
     best = min((each.bound for each in tried.values()), default=math.inf)
-    reached = f"the best proved bound is {best:.3g}" if best < math.inf else "no precision gives a bound at all"
+    reached = f"the best proved bound is {best:.3g}"
+    if best == math.inf:
+        reached = f"no precision gives a bound at all: in {max(why)} digits {why[max(why)]}"
     raise ValueError(
         f"got no inverse in at most {largest} base-{base} digits with a proved relative error of at "
         f"most {float(tolerance):.3g}; {reached}. Increase largest or the tolerance."
     )
+
+
+def check_relative(tolerance: Any) -> None:
+    """Reject a tolerance that is not a relative error, a finite number above 0.
+
+    Raises
+    ------
+    ValueError : text, a truth value, NaN, infinity, or a number that is not above 0.
+    """
+    number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
+    if not number or not 0 < tolerance < math.inf:
+        raise ValueError(f"got tolerance {tolerance!r}; needed a relative error above 0, such as 1e-6")
 
 
 def _relative(bound: float, x: FloatArray) -> float:

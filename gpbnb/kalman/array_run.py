@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.kalman import array_steps
@@ -21,7 +22,7 @@ from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.bounded_steps import advance_bound
 from gpbnb.kalman.contraction import Contraction, contraction_start
 from gpbnb.kalman.factors import combined_gain, covariance_of_factors
-from gpbnb.kalman.filter_run import Checkpoints, Run, check_compiled
+from gpbnb.kalman.filter_run import Checkpoints, Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
 
@@ -45,6 +46,7 @@ class ArrayRun:
         definiteness when their factors are computed in this format.
     """
 
+    @stays
     def __init__(
         self,
         model: LinearModel,
@@ -58,7 +60,7 @@ class ArrayRun:
                 f"got known inputs in the {form} form, which is not defined with them; needed another "
                 'form, such as "innovation"'
             )
-        check_compiled(fmt)
+        fmt.check_compiled()
         self.model, self.fmt, self.form = model, fmt, form
         self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
         self.steps, self.reason = 0, ""

@@ -92,7 +92,7 @@ class Run:
                 f"got checkpoint steps {list(checkpoint_steps)[:5]} …; needed increasing steps of 1 or more"
             )
         if fmt is not None:
-            check_compiled(fmt)
+            fmt.check_compiled()
         if sums is not None and not isinstance(sums, (FloatFormat, FixedFormat)):
             raise TypeError(f"sums: got {sums!r}; needed a FloatFormat or a FixedFormat")
         if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
@@ -315,13 +315,22 @@ def _as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
                 raise ValueError("got measurements with NaN or infinity; needed finite numbers")
             return np.stack([entries, np.zeros_like(entries)], axis=-1)
         return double_doubles(exact(entries))
-    return _packed_array(fmt.array(values))
+    return packed_array(fmt.array(values))
 
 
-def _packed_array(array: FloatArray) -> NDArray[Any]:
+def packed_array(array: FloatArray) -> NDArray[Any]:
+    """Convert an array to the form that the compiled loops of its format expect.
+
+    Raises
+    ------
+    ValueError : the format has no compiled loops.
+    OverflowError : an entry is beyond their range.
+    """
     if not isinstance(array.backend, Compiled):
+        array.format.check_compiled()
+        cure = "" if array.format.base == 10 else ", or use base 10"
         raise OverflowError(
-            f"got numbers beyond the range of the compiled loops of {array.format}; scale the states, or use base 10"
+            f"got numbers beyond the range of the compiled loops of {array.format}; scale the states{cure}"
         )
     return array.backend.pack(array.components)
 
@@ -334,26 +343,13 @@ def _packed(model: LinearModel, fmt: FloatFormat | None) -> list[NDArray[Any]]:
     arrays, packed = model.arrays(fmt), []
     for letter in letters:
         try:
-            packed.append(_packed_array(arrays[letter]))
+            packed.append(packed_array(arrays[letter]))
         except OverflowError as error:
             raise OverflowError(f"{letter}: {error}") from None
     return packed
 
 
 _packed_once = lru_cache(maxsize=8)(_packed)
-
-
-def check_compiled(fmt: FloatFormat) -> None:
-    """Reject a format without compiled loops.
-
-    Raises
-    ------
-    ValueError : the base or the number of digits has none.
-    """
-    if not isinstance(fmt.backend, Compiled):
-        raise ValueError(
-            f"got {fmt}; needed a format with compiled loops: base 2 up to 53 digits, 10 up to 18 or 16 up to 13"
-        )
 
 
 def widened(packed: NDArray[Any]) -> NDArray[np.float64]:

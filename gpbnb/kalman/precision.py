@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
-from gpbnb.arithmetic.search import CHECKED, Search
+from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.search import CHECKED, Search, largest_compiled
 from gpbnb.kalman.array_forms import AnyForm, ArrayForm
 from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.bounded_run import BoundedRun
@@ -28,7 +29,7 @@ from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import form_named, rounding_named, whole_number
 from gpbnb.kalman.recursion import Recursion, required_recursion_precision, survey_recursion
 from gpbnb.kalman.requirement import Basis, Requirement, checked_tolerance, format_like, largest_ratio, listed
-from gpbnb.kalman.system import LinearSystem, required_system_precision
+from gpbnb.kalman.system import LinearSystem, required_system_precision, unobserved
 
 
 def required_precision(
@@ -46,6 +47,7 @@ def required_precision(
     emin: int | None = None,
     emax: int | None = None,
     subnormal: bool = True,
+    largest: int | None = None,
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a tolerance.
 
@@ -79,12 +81,15 @@ def required_precision(
         estimate, and rounded to :func:`gpbnb.kalman.simulation.fine_resolution`.
     seed : seed of the simulation.
     progress : show a progress bar that counts precisions.
+    largest : highest precision to try. By default, and at most, it is the largest with compiled loops: 53 bits, 18
+        decimal or 13 hexadecimal digits, fewer with some roundings. A function runs in any precision; by default
+        those up to 200 bits, 60 decimal or 50 hexadecimal digits are tried.
 
     Raises
     ------
-    ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops; more
-        or fewer measurements than steps; a model with known inputs, or an ``ArrayForm``, where a basis does not cover
-        them.
+    ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops, or
+        for a model a largest precision without them; more or fewer measurements than steps; a model with known inputs,
+        or an ``ArrayForm``, where a basis does not cover them.
     TypeError : another kind of model, or of limits.
     OverflowError : an output of a linear system, or its reference, leaves the range of float64; the entries of a model
         are too large or too small for compiled loops.
@@ -100,9 +105,10 @@ def required_precision(
         if within is not None:
             raise ValueError("got limits for a function; needed none: they are for models")
         steps = whole_number("steps", steps)
-        return required_recursion_precision(model, steps, tolerance, z, like, basis, progress)
+        return required_recursion_precision(model, steps, tolerance, z, like, basis, progress, largest)
+    largest = _checked_largest(largest, like)
     if isinstance(model, LinearSystem):
-        return required_system_precision(model, steps, tolerance, z, like, basis, within, progress)
+        return required_system_precision(model, steps, tolerance, z, like, basis, within, progress, largest)
     tolerances = _checked(model, tolerance, base, basis)
     if like.limits is None:
         model.check_sizes()
@@ -137,26 +143,29 @@ def required_precision(
 
     checks = () if for_ever else CHECKED[base]
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(errors_of(form), like, checks, bar.update, bounds=basis == "bound")
+        search = partial(Search, like=like, checks=checks, tick=bar.update, bounds=basis == "bound", largest=largest)
+        found = search(errors_of(form))
         advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
         if not for_ever and (found.irregular or found.fmt is None):
-            advice = _better_form(errors_of, form, like, checks, bar.update, basis == "bound")
+            advice = _better_form(errors_of, form, search)
     if found.fmt is not None:
         repairs += tuple(map(str, _opened(model, found.fmt, form, (), False).repairs[len(model.repairs) :]))
-    return Requirement(found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs)
+    cause = "" if found.fmt is not None or model.cycle != 1 else unobserved(model.Phi[0], model.H[0])
+    if cause and not for_ever:
+        cause, advice = "", "; ".join([*filter(None, [advice]), f"{cause}, so that its errors never decay"])
+    return Requirement(
+        found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs, found.limit, cause
+    )
 
 
 def _better_form(
     errors_of: Callable[[AnyForm], Callable[[FloatFormat], tuple[float, str]]],
     form: AnyForm,
-    like: FloatFormat,
-    checks: Sequence[int],
-    tick: Callable[[], Any],
-    bounds: bool,
+    search: Callable[[Callable[[FloatFormat], tuple[float, str]]], Search],
 ) -> str:
     """Name the form that meets the tolerance with the fewest digits, as advice; empty if there is none."""
     others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not form]
-    answers = [(other, Search(errors_of(other), like, checks, tick, bounds).fmt) for other in others]
+    answers = [(other, search(errors_of(other)).fmt) for other in others]
     met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
     return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
 
@@ -182,14 +191,18 @@ def survey(
 
     Raises
     ------
-    ValueError : for a reason given in :func:`required_precision`; a precision without compiled loops.
+    ValueError : for a reason given in :func:`required_precision`; for a model, a precision without compiled loops.
     """
     form, like = form_named(form), format_like(base, rounding_named(rounding), emin, emax, subnormal)
-    formats = _formats(like, precisions)
+    formats = [replace(like, precision=precision) for precision in precisions]
+    if not formats:
+        raise ValueError("got no precisions; needed at least one")
     if not isinstance(model, LinearModel) and callable(model):
         if form is not Form.INNOVATION:
             raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
         return survey_recursion(model, z, tolerance, formats, basis)
+    if beyond := [fmt.precision for fmt in formats if not isinstance(fmt.backend, Compiled)]:
+        raise ValueError(f"got {beyond} digits of base {base}; needed at most {largest_compiled(like)}")
     found = survey_formats(model, z, tolerance, formats, form, basis)
     return tuple((fmt.precision, ratio) for fmt, (ratio, _) in zip(formats, found, strict=True))
 
@@ -222,13 +235,17 @@ def largest_errors(
     return np.abs((run.states(fmt.array(z)) - reference_states(model, z)).sum(axis=2)).max(axis=0)
 
 
-def _formats(like: FloatFormat, precisions: Sequence[int]) -> list[FloatFormat]:
-    formats = [replace(like, precision=precision) for precision in precisions]
-    if beyond := [fmt.precision for fmt in formats if not isinstance(fmt.backend, Compiled)]:
-        raise ValueError(f"got {beyond} digits of base {like.base}; needed at most {LARGEST_PRECISION[like.base]}")
-    if not formats:
-        raise ValueError("got no precisions; needed at least one")
-    return formats
+def _checked_largest(largest: int | None, like: FloatFormat) -> int | None:
+    """Check the highest precision to try for a model; None stands for the largest with compiled loops."""
+    if largest is None:
+        return None
+    largest, most = whole_number("largest", largest, 2), largest_compiled(like)
+    if largest > most:
+        raise ValueError(
+            f"got largest={largest} for a model; needed at most {most}, the most digits with compiled loops in base "
+            f"{like.base}, rounded {like.rounding.value}; a filter written as a function of a format runs in more"
+        )
+    return largest
 
 
 def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ class Requirement:
 
     Parameters
     ----------
-    fmt : None if no format with compiled loops meets the tolerance, or if the largest precision tried misses it.
+    fmt : None if no precision up to the limit of the search meets the tolerance.
     basis : "emulation", for the observed errors with these measurements; or "bound", for the largest possible errors.
     steps : steps of the filter.
     tried : precision, and largest error / tolerance over states and steps; infinite if the run stopped, a
@@ -37,6 +37,8 @@ class Requirement:
     irregular : precisions that meet the tolerance although a higher one that was run misses it; usually empty.
     advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
     repairs : changes of the model's covariances, each as text.
+    cause : why there is no answer in any precision; the limit of the search then does not matter.
+    limit : why no higher precision than the last of `tried` was tried; it is shown if there is no answer.
     """
 
     fmt: FloatFormat | None
@@ -48,6 +50,8 @@ class Requirement:
     irregular: tuple[int, ...] = ()
     advice: str = ""
     repairs: tuple[str, ...] = ()
+    limit: str = ""
+    cause: str = ""
 
     @property
     def precision(self) -> int | None:
@@ -62,10 +66,14 @@ class Requirement:
         if self.advice:
             notes.append(self.advice)
         end = "".join(f"; {note}" for note in notes)
+        if self.fmt is None and self.cause:
+            return f"no precision meets the tolerance ({self.basis}, {self.steps} steps): {self.cause}{end}"
         if self.fmt is None:
-            most, why = self.tried[-1][0], f"; {self.why}" if self.why else ""
+            most, why = f"{self.tried[-1][0]} digits", f"; {self.why}" if self.why else ""
+            if self.limit:
+                most += f", {self.limit},"
             met = "meets the tolerance reliably" if self.irregular else "meets the tolerance"
-            return f"no precision up to {most} digits {met} ({self.basis}, {self.steps} steps){why}{end}"
+            return f"no precision up to {most} {met} ({self.basis}, {self.steps} steps){why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
         return (

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, cast
 
 import numpy as np
@@ -17,9 +18,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
-from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rational import exact, rationals
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.guarantee.bound import from_schedule, limits
 from gpbnb.kalman.guarantee.envelope import Limits
@@ -136,8 +137,6 @@ class LinearSystem:
             tag: Any = DoubleDouble()
             coefficients, z, x = (double_doubles(exact(each)) for each in (given.coefficients, inputs, start))
         else:
-            if not isinstance(fmt.backend, Compiled):
-                raise ValueError(f"got {fmt}; needed a format with compiled loops: base 2, 10 or 16")
             tag = fmt.run_tag()
             fmt.restart()
             coefficients, z, x = (pack(fmt, each) for each in (given.coefficients, inputs, start))
@@ -145,10 +144,36 @@ class LinearSystem:
         first = x.copy()
         try:
             advance(tag, program.operations, program.outputs, coefficients[None], 0, z, x, out)
-        except OverflowError as error:
-            raise OverflowError(f"{self._overflow(tag, program, coefficients, z, first)}: {error}") from None
+        except OverflowError:
+            place = self._overflow(tag, program, coefficients, z, first)
+            raise OverflowError(f"{place}: {self._beyond(fmt)}") from None
         outputs = np.ascontiguousarray(out[:, self.n :])
         return outputs if fmt is None else self._widened(outputs)
+
+    def unstable(self, fmt: FloatFormat | None = None) -> str:
+        """Return in words that the system, as given or as stored in a format, is not stable; empty if both are stable.
+
+        The test is exact, and calls a system with an eigenvalue of size 1 not stable.
+        """
+        if not is_stable(self.A):
+            return f"the system as given is not stable, since A has {_eigenvalue(self.A)}"
+        if fmt is not None and not is_stable(stored := np.asarray(fmt.array(self.A).to_fractions(), dtype=object)):
+            return f"the system is stable, but as stored in {fmt} it is not, since A has {_eigenvalue(stored)}"
+        return ""
+
+    def _beyond(self, fmt: FloatFormat | None) -> str:
+        """Return why a number cannot be stored, and what to do about it."""
+        what = "a number beyond the range of float64"
+        if fmt is not None and (fmt.limits is not None or fmt.base == 10):
+            what = f"a number beyond the range of {fmt}"
+        if cause := self.unstable(fmt):
+            return f"got {what}; {cause}, so numbers grow without end; scaling delays that, no precision prevents it"
+        cure = "scale the numbers"
+        if fmt is not None and fmt.limits is not None:
+            cure += ", or use a format with a larger range"
+        elif fmt is not None and fmt.base != 10:
+            cure += ", or use base 10"
+        return f"got {what}; {cure}"
 
     def _overflow(self, tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> str:
         """Return the first state or output that cannot be stored, and its step; `x` is the first state."""
@@ -180,9 +205,7 @@ class LinearSystem:
                 try:
                     widened_array(outputs[k : k + 1, i : i + 1])
                 except OverflowError:
-                    raise OverflowError(
-                        f"output {i} at step {k + 1}: got a number beyond the range of float64; scale the numbers"
-                    ) from None
+                    raise OverflowError(f"output {i} at step {k + 1}: {self._beyond(None)}") from None
             raise
 
 
@@ -195,6 +218,7 @@ def required_system_precision(
     basis: Basis = "emulation",
     within: Limits | None = None,
     progress: bool = False,
+    largest_tried: int | None = None,
 ) -> Requirement:
     """Find the smallest precision with which the outputs of a linear system stay within a tolerance.
 
@@ -208,6 +232,7 @@ def required_system_precision(
         measurement. Both bound rounding, and the errors of storing coefficients and inputs. "probable" takes three
         standard deviations for rounding in place of its bound.
     within : result of :func:`gpbnb.kalman.guarantee.bound.limits`; only the limit on the measurement is used.
+    largest_tried : highest precision to try; by default the largest with compiled loops.
 
     Raises
     ------
@@ -233,16 +258,86 @@ def required_system_precision(
 
     def error(fmt: FloatFormat) -> tuple[float, str]:
         try:
+            if true is None and (cause := system.unstable(fmt)):
+                return math.inf, cause
             errors = _observed(system, u, fmt, true) if true is not None else _bounded(system, fmt, largest, basis)
         except (ValueError, OverflowError) as fault:
             return math.inf, str(fault)
         ratio = largest_ratio(errors, tolerances)
-        return (ratio, "") if ratio < math.inf else (math.inf, "an output is not finite")
+        if ratio < math.inf:
+            return ratio, ""
+        what = "an error over its tolerance" if np.isfinite(errors).all() else "an output or a bound"
+        return math.inf, f"{what} is beyond the range of float64"
 
     with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        found = Search(error, like, CHECKED[like.base], bar.update, bounds=basis != "emulation")
+        found = Search(error, like, CHECKED[like.base], bar.update, basis != "emulation", largest_tried)
     advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
-    return Requirement(found.fmt, basis, steps, found.tried, found.why, None, found.irregular, advice)
+    cause = "" if found.fmt is not None else system.unstable()
+    if cause and basis == "emulation":
+        cause, advice = "", f"{cause}, so that errors grow with every step, whatever the precision: take fewer steps"
+    elif cause:
+        cause += ", so that an error of rounding never decays"
+    return Requirement(
+        found.fmt,
+        basis,
+        steps,
+        found.tried,
+        found.why,
+        None,
+        found.irregular,
+        advice,
+        limit=found.limit,
+        cause=cause,
+    )
+
+
+def is_stable(A: NDArray[Any]) -> bool:
+    r"""Whether all eigenvalues of an exact matrix lie inside the unit circle, by the exact test of Schur and Cohn.
+
+    A polynomial p with the coefficients :math:`a_0 \dots a_n` is stable if :math:`|a_0| < |a_n|` and
+    :math:`(a_n\,p(x) - a_0\,x^n p(1/x))/x` is stable.
+    """
+    polynomial = rationals(A).charpoly()
+    p = [polynomial[i] for i in range(len(A) + 1)]
+    while len(p) > 1:
+        first, last = p[0], p[-1]
+        if not abs(first) < abs(last):
+            return False
+        share = first / last
+        p = [high - share * low for high, low in zip(p[1:], p[-2::-1], strict=True)]
+    return True
+
+
+def unobserved(Phi: NDArray[Any], H: NDArray[Any]) -> str:
+    """Return in words that no measurement observes a state which does not decay; empty if there is none.
+
+    The unobserved states are those that H Φᵏ maps to zero for every k; Φ maps them to each other. The test is exact.
+    """
+    n, rows = len(Phi), [H]
+    for _ in range(n - 1):
+        rows.append(rows[-1] @ Phi)
+    reduced, rank = rationals(np.concatenate(rows)).rref()
+    pivots = [next(j for j in range(n) if reduced[i, j]) for i in range(rank)]
+    free = [j for j in range(n) if j not in pivots]
+    if not free:
+        return ""
+    basis = np.full((n, len(free)), Fraction(0), dtype=object)
+    for at, j in enumerate(free):
+        basis[j, at] = Fraction(1)
+        for i, pivot in enumerate(pivots):
+            basis[pivot, at] = -Fraction(int(reduced[i, j].p), int(reduced[i, j].q))
+    moved = (Phi @ basis)[free]  # the coordinates in this basis are the free entries
+    if is_stable(moved):
+        return ""
+    return f"no measurement observes a part of the state that does not decay, with {_eigenvalue(moved)}"
+
+
+def _eigenvalue(A: NDArray[Any]) -> str:
+    """Name the size of the largest eigenvalue of a matrix that is not stable."""
+    with np.errstate(all="ignore"):
+        entries = A.astype(np.float64)
+        size = float(np.abs(np.linalg.eigvals(entries)).max()) if np.isfinite(entries).all() else math.nan
+    return f"an eigenvalue of size {size:.6g}" if size > 1 + 1e-6 else "an eigenvalue of size 1 or more"
 
 
 def _inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
@@ -273,15 +368,32 @@ def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64
     zero = exact(np.zeros((system.n, system.n), dtype=int))
     both = np.block([[system.A, zero], [zero, A]])
     beta = float(fmt.unit_roundoff)
-    difference = peak_gain(both, np.vstack([system.B, B]), np.hstack([system.C, -C]), system.D - D).high
-    stored = peak_gain(A, B, C, D).high
+    difference = _gain(both, np.vstack([system.B, B]), np.hstack([system.C, -C]), system.D - D)
+    stored = _gain(A, B, C, D)
     sizes = largest * (1 + beta)
     unit = exact(np.eye(system.n, dtype=int))
-    state = np.concatenate([peak_gain(A, B, unit).high, stored]) @ sizes * (1 + 2.0**-40)
+    state = np.concatenate([_gain(A, B, unit), stored]) @ sizes * (1 + 2.0**-40)
+    if not np.isfinite(state).all():
+        raise OverflowError("a state or an output may be beyond the range of float64; scale the numbers")
     within = limits(system.n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
     found = from_schedule(system.as_filter().schedule(fmt), within, 1)
     if not found.for_ever:
         raise ValueError(found.why)
+    if not np.isfinite(found.bound).all():
+        raise ValueError(
+            "no bound was found: in so few digits, errors may grow by their own roundings; use more digits"
+        )
     rounding = found.bound if basis != "probable" else 3 * probable_error(found)
     # two sums of m products in float64, each with an error below 2**-40
     return np.asarray((rounding[system.n :] + (difference + stored * beta) @ largest) * (1 + 2.0**-40))
+
+
+def _gain(*matrices: NDArray[Any]) -> NDArray[np.float64]:
+    """Return upper bounds of the peak gains of a system that is known to be stable."""
+    try:
+        return peak_gain(*matrices).high
+    except ValueError:
+        raise ValueError(
+            "the system is stable, but decays too slowly for its peak gain to be enclosed in balls of 8192 bits; write "
+            'it as a cascade of sections, or use basis "emulation"'
+        ) from None

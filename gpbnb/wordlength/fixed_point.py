@@ -32,6 +32,7 @@ from gpbnb.kalman.filter_run import log_spaced, reference
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain
 from gpbnb.kalman.guarantee.program import MULTIPLY, SUBTRACT, Program, innovation_program
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.system import is_stable
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
@@ -231,14 +232,25 @@ def required_fraction_bits(
             last = f"{fraction} fraction bits give {ratio:.3g} times the tolerance"
         except OverflowError as error_:
             ratio, last = math.inf, f"{fraction} fraction bits are refused: {error_}"
-        except ValueError as error_:
-            return FixedAnswer(None, basis, tuple(tried), str(error_))
+        except ValueError:
+            return FixedAnswer(None, basis, tuple(tried), _without_bound(given, coefficient_bits))
         tried.append((fraction, ratio))
         if len(tried) > 1 and ratio <= 1 and tried[-2][1] <= 1:
             return FixedAnswer(FixedFormat(before, fraction - 1, rounding), basis, tuple(tried), why or last)
         if ratio > 1:
             why = last
-    return FixedAnswer(None, basis, tuple(tried), why)
+    return FixedAnswer(None, basis, tuple(tried), f"{why}; {LARGEST_FRACTION - 1} fraction bits are the most tried")
+
+
+def _without_bound(given: ScaledFilter, coefficient_bits: int) -> str:
+    """Return in words why a filter has no bound for all time."""
+    program, coefficients = given.filter.program, given.filter.coefficients
+    if not is_stable(_state_space(program, coefficients)[0]):
+        return "the filter as given is not stable, so that errors of rounding never decay, whatever the word"
+    if not is_stable(_state_space(program, stored_coefficients(given.filter, coefficient_bits))[0]):
+        stored = f"stored in {coefficient_bits} bits"
+        return f"the filter is stable, but not with its coefficients {stored}; raise coefficient_bits"
+    return "the filter is stable, but decays too slowly for its peak gain to be enclosed in balls of 8192 bits"
 
 
 def stored_coefficients(made: LinearFilter, bits: int) -> NDArray[Any]:

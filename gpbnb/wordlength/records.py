@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.kalman.array_forms import AnyForm
-from gpbnb.kalman.filter_run import check_compiled
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import real_numbers
@@ -122,7 +121,7 @@ def survey_records(
     for fmt in given:
         if not isinstance(fmt, FloatFormat):
             raise ValueError(f"got {fmt!r}; needed a FloatFormat")
-        check_compiled(fmt)
+        fmt.check_compiled()
     tolerances = checked_tolerance(tolerance, model.n, "states", given[0].base, basis)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"')

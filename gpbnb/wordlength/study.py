@@ -16,7 +16,7 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 from gpbnb.arithmetic import search
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
-from gpbnb.inversion.bounds import smallest_precision
+from gpbnb.inversion.bounds import check_relative, smallest_precision
 from gpbnb.kalman import report_bounds
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.contraction import companion_bound
@@ -329,16 +329,26 @@ def inverse_precision(
     Raises
     ------
     ValueError : a matrix that is not symmetric, or without a positive diagonal; a tolerance that is not above 0.
+    numpy.linalg.LinAlgError : a singular matrix.
     """
     matrix = exact(matrix)
-    square = matrix.ndim == 2 and matrix.shape[0] == matrix.shape[1]
-    if not square or np.any(matrix != matrix.T) or not (matrix.diagonal() > 0).all():
-        raise ValueError(f"{name}: got shape {matrix.shape}; needed a symmetric matrix with a positive diagonal")
-    if not 0 < tolerance < math.inf:
-        raise ValueError(f"{name}: got tolerance {tolerance}; needed a relative error above 0")
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
+        raise ValueError(f"{name}: got shape {matrix.shape}; needed a square matrix (n, n) with n at least 1")
+    check_relative(tolerance)
+    try:
+        inverse = true_inverse(matrix)
+    except np.linalg.LinAlgError as error:
+        raise np.linalg.LinAlgError(f"{name}: {error}") from None
+    for i, j in np.argwhere(matrix != matrix.T)[:1]:
+        raise ValueError(
+            f"{name}: got {matrix[i, j]} at [{i}, {j}] and {matrix[j, i]} at [{j}, {i}]; needed a symmetric matrix"
+        )
+    for (i,) in np.argwhere(matrix.diagonal() <= 0)[:1]:
+        raise ValueError(f"{name}: got {matrix[i, i]} at [{i}, {i}]; needed a positive diagonal")
     scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
     scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
-    conditions = [column_sum_norm(rationals(a)) * column_sum_norm(true_inverse(a)) for a in (matrix, scaled)]
+    pairs = ((matrix, inverse), (scaled, true_inverse(scaled)))
+    conditions = [column_sum_norm(rationals(a)) * column_sum_norm(b) for a, b in pairs]
     expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
     proved = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
     return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, proved)

@@ -414,6 +414,18 @@ BAD = [
     (lambda: theory.best_rate(628.0, 3600.0, FloatFormat(2, 16, CHOP)), "at some rate; use more digits"),
     (lambda: theory.needed_precision(1.0, 1.0, 100.0, share=0.0), "got share = 0.0"),
     (lambda: theory.needed_precision(1.0, 1.0, 1e3, share=1e-200), "needed at most 400 digits; allow a larger share"),
+    (lambda: theory.needed_precision("50", 1000.0, 3600.0), "got omega_bw = '50'; needed a number"),
+    (lambda: theory.needed_precision(50, "1000", 3600.0), "got f_c = '1000'; needed a number"),
+    (lambda: theory.needed_precision(50, 1000.0, "3600"), "got duration = '3600'; needed a number"),
+    (lambda: theory.needed_precision(50, 1000.0, True), "got duration = True; needed a number"),
+    (lambda: theory.needed_precision(50, 1000.0, None), "got duration = None; needed a number"),
+    (lambda: theory.needed_precision(50, 1000.0, 3600.0, share="0.1"), "got share = '0.1'; needed a number"),
+    (
+        lambda: theory.needed_precision(50, 1000.0, 3600.0, rounding="up"),
+        "got rounding 'up'; needed 'nearest' or 'chop'",
+    ),
+    (lambda: theory.best_rate(["50", 3], 3600.0, FloatFormat(2, 24)), "got omega_bw = .*; needed a number"),
+    (lambda: theory.error_variance("3", 1.0), "got n = '3'; needed a number"),
     (lambda: theory.stall_rate(1.0, -1.0, FloatFormat(2, 24)), "got duration = -1.0"),
 ]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from fractions import Fraction
 
@@ -9,7 +10,8 @@ import flint
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic import linalg
+from gpbnb import required_precision
+from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import bounds
 
@@ -289,14 +291,14 @@ class TestSmallestPrecision:
         assert list(proved.values()) == [False, True, True]
 
     def test_smaller_tolerances_need_more_digits(self):
-        needed = [bounds.smallest_precision(self.HILBERT, 10.0**-k).fmt.precision for k in (1, 4, 8, 12)]
+        needed = [bounds.smallest_precision(self.HILBERT, 10.0**-k, 10).fmt.precision for k in (1, 4, 8, 12)]
         assert needed == sorted(needed)
         assert needed[-1] - needed[0] >= 10
 
     def test_strings_count_as_written_and_floats_as_they_are(self):
         # 0.1 as a float is not 1/10: in 16 digits and more the two matrices differ.
-        text = bounds.smallest_precision([["0.1", "0.3"], ["0.2", "0.7"]], 1e-25)
-        floats = bounds.smallest_precision([[0.1, 0.3], [0.2, 0.7]], 1e-25)
+        text = bounds.smallest_precision([["0.1", "0.3"], ["0.2", "0.7"]], 1e-25, 10)
+        floats = bounds.smallest_precision([[0.1, 0.3], [0.2, 0.7]], 1e-25, 10)
         assert text.inverse.to_fractions().tolist() == [[70, -30], [-20, 10]]
         assert text.fmt.precision < 16 < floats.fmt.precision
 
@@ -309,8 +311,8 @@ class TestSmallestPrecision:
     def test_refused(self):
         with pytest.raises(np.linalg.LinAlgError, match="no inverse in any precision"):
             bounds.smallest_precision([[1, 2], [2, 4]], 1e-3)
-        for tolerance in (0, -1, math.nan, math.inf, "small"):
-            with pytest.raises(ValueError, match="tolerance must be a relative error above 0"):
+        for tolerance in (0, -1, math.nan, math.inf, "small", "0.1", True):
+            with pytest.raises(ValueError, match=r"got tolerance .*; needed a relative error above 0"):
                 bounds.smallest_precision([[1]], tolerance)
         with pytest.raises(ValueError, match="must be a square matrix"):
             bounds.smallest_precision([[1, 2]], 0.1)
@@ -321,9 +323,18 @@ class TestSmallestPrecision:
         with pytest.raises(
             ValueError, match=r"at most 8 base-10 digits .* relative error of at most 1e-12; the best proved bound is"
         ):
-            bounds.smallest_precision(self.HILBERT, 1e-12, largest=8)
-        with pytest.raises(ValueError, match="no precision gives a bound at all"):
-            bounds.smallest_precision(self.HILBERT, 1e-12, largest=2)
+            bounds.smallest_precision(self.HILBERT, 1e-12, 10, largest=8)
+        with pytest.raises(ValueError, match=r"no precision gives a bound at all: in 2 digits .*‖I - AX‖ must be"):
+            bounds.smallest_precision(self.HILBERT, 1e-12, 10, largest=2)
         # The default limit is 60 digits; these two rows differ only in the 70th.
-        with pytest.raises(ValueError, match="at most 60 base-10 digits"):
-            bounds.smallest_precision([["1", "1"], ["1", "1." + 69 * "0" + "1"]], 1e-3)
+        for base, digits in ((10, 60), (2, 200), (16, 50)):
+            with pytest.raises(
+                ValueError, match=f"at most {digits} base-{base} digits .* in {digits} digits got a zero piv"
+            ):
+                bounds.smallest_precision([["1", "1"], ["1", "1." + 69 * "0" + "1"]], 1e-3, base)
+
+    def test_without_a_base_it_answers_in_bits_as_the_search_for_filters_does(self):
+        found = bounds.smallest_precision(self.HILBERT, 1e-6)
+        assert found.fmt == bounds.smallest_precision(self.HILBERT, 1e-6, 2).fmt
+        both = (bounds.smallest_precision, search.smallest_precision, required_precision)
+        assert {inspect.signature(each).parameters["base"].default for each in both} == {2}

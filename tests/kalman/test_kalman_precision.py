@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact
 from gpbnb.kalman import precision
 from gpbnb.kalman.bounded_run import emulate_with_bound
 from gpbnb.kalman.emulation import emulate
@@ -24,7 +25,7 @@ from gpbnb.kalman.named import form_named
 from gpbnb.kalman.precision import required_precision
 from gpbnb.kalman.requirement import listed
 from gpbnb.kalman.simulation import Simulation, fine_resolution
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.kalman.system import LinearSystem, unobserved
 
 STEPS = 60
 MODEL = LinearModel(
@@ -207,7 +208,10 @@ def test_no_precision_may_be_enough(model, base, most):
     found = required_precision(model, 3, 1e-30, base, z=Z[:3])
     assert found.fmt is None
     assert found.tried[-1][0] == most
-    assert str(found) == f"no precision up to {most} digits meets the tolerance (emulation, 3 steps)"
+    assert str(found) == (
+        f"no precision up to {most} digits, the most with compiled loops in base {base}, rounded nearest, meets the "
+        "tolerance (emulation, 3 steps)"
+    )
 
 
 def test_a_run_that_loses_its_covariance_does_not_meet_a_tolerance():
@@ -514,3 +518,38 @@ def test_a_measurement_that_only_longdouble_holds_is_not_rounded_to_float64():
         required_precision(MODEL, 2, 1e-3, z=np.array([[fine], [np.nan]], dtype=np.longdouble))
     by_nan = required_precision(MODEL, 2, 1e-3, z=np.array([[1], [np.nan]], dtype=np.longdouble))
     assert by_nan == required_precision(MODEL, 2, 1e-3, z=[[1], [math.nan]])
+
+
+@pytest.mark.parametrize(
+    ("Phi", "H", "text"),
+    [
+        ([["1.1"]], [[0]], "eigenvalue of size 1.1"),
+        (
+            [[1, "0.1"], [0, 1]],
+            [[0, 1]],
+            "eigenvalue of size 1 or more",
+        ),  # a position of which only the speed is measured
+        ([[1, "0.1"], [0, 1]], [[1, 0]], ""),
+        ([["0.9", 0], [0, 1]], [[0, 1]], ""),
+        ([["0.9", 0], [0, 1]], [[1, 0]], "eigenvalue of size 1 or more"),
+        # the difference of two equal states is not observed, and decays if both do
+        ([[2, 0], [0, 2]], [[1, 1]], "eigenvalue of size 2"),
+        ([["1/2", 0], [0, "1/2"]], [[1, 1]], ""),
+    ],
+)
+def test_a_part_of_the_state_that_no_measurement_observes_is_found_exactly(Phi, H, text):
+    found = unobserved(exact(Phi), exact(H))
+    assert (text in found) if text else found == ""
+
+
+@pytest.mark.parametrize("basis", ["emulation", "guarantee", "probable"])
+def test_an_unobserved_state_that_grows_is_the_cause_where_there_is_no_answer(basis):
+    model = LinearModel([["1.1"]], [[0]], [[1]], [[1]], [0], [[1]])
+    within = None if basis == "emulation" else limits(1, 1, state=10, innovation=10)
+    found = required_precision(model, 4000, 1e-3, z=np.zeros((4000, 1)), basis=basis, within=within)
+    assert found.precision is None
+    cause = "no measurement observes a part of the state that does not decay, with an eigenvalue of size 1.1"
+    if basis == "emulation":
+        assert str(found).endswith(f"; {cause}, so that its errors never decay")
+    else:
+        assert str(found) == f"no precision meets the tolerance ({basis}, 4000 steps): {cause}"

@@ -16,6 +16,10 @@ NONE = Requirement(None, "emulation", 60, ((52, 3.0), (53, 2.0)))
 def test_an_answer_says_its_format_its_error_and_its_basis():
     assert str(FOUND) == "9 digits of base 10, chop: 0.46 of the tolerance (bound, 60 steps)"
     assert str(NONE) == "no precision up to 53 digits meets the tolerance (emulation, 60 steps)"
+    ended = replace(NONE, limit="where largest=53 ends the search")
+    assert str(ended) == (
+        "no precision up to 53 digits, where largest=53 ends the search, meets the tolerance (emulation, 60 steps)"
+    )
 
 
 def test_the_reason_is_told_where_it_prevented_a_smaller_answer():

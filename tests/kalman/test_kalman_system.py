@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -16,7 +17,7 @@ from gpbnb.kalman.guarantee.bound import from_schedule, limits
 from gpbnb.kalman.guarantee.linear import peak_gain
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.precision import required_precision
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.kalman.system import LinearSystem, is_stable
 
 BUTTERWORTH = LinearSystem(*signal.tf2ss(*signal.butter(4, 0.05)), name="Butterworth")
 SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])
@@ -99,7 +100,7 @@ def test_only_errors_beyond_float64_are_said_not_to_be_finite():
     assert missed.why == ""
     beyond = required_precision(SMALL, 8, 1e-320, z=U[:8] * 2.0**30)
     assert beyond.fmt is None
-    assert beyond.why.endswith("an output is not finite")
+    assert beyond.why.endswith("an error over its tolerance is beyond the range of float64")
 
 
 def test_a_peak_gain_of_a_filter_in_companion_form_is_found():
@@ -169,7 +170,7 @@ def test_an_unstable_system_has_no_bound():
     growing = LinearSystem([["1.01"]], [[1]])
     found = required_precision(growing, 80, 1e-3, z=U, basis="bound")
     assert found.fmt is None
-    assert "needed a stable filter" in str(found)
+    assert "the system as given is not stable, since A has an eigenvalue of size 1.01," in str(found)
     assert required_precision(growing, 80, 1e-3, z=U).fmt is not None
 
 
@@ -206,3 +207,145 @@ def test_a_name_is_text(named):
     for wrong in (5, None, b"mine"):
         with pytest.raises(TypeError, match=r"got name .* of type .*; needed text"):
             named(wrong)
+
+
+# -- why there is no answer ------------------------------------------------------------------------------------------
+
+
+def companion(roots):
+    """Return a companion matrix with the given eigenvalues, exact."""
+    p = [Fraction(1)]
+    for root in roots:
+        p = [a - Fraction(root) * b for a, b in zip([*p, 0], [0, *p], strict=True)]
+    A = np.full((len(roots), len(roots)), Fraction(0), dtype=object)
+    A[0] = [-each for each in p[1:]]
+    for i in range(1, len(roots)):
+        A[i, i - 1] = Fraction(1)
+    return A
+
+
+def rotation(size):
+    """Return a rotation by an angle with rational sine and cosine, times a size."""
+    return np.array([["3/5", "-4/5"], ["4/5", "3/5"]], dtype=object), Fraction(size)
+
+
+@pytest.mark.parametrize(
+    ("roots", "stable"),
+    [
+        ((0, 0, 0), True),
+        (("1/2", "-1/2", "1/3"), True),
+        ((1,), False),
+        ((-1, "1/2"), False),
+        (("1/2", "3/2"), False),
+        ((Fraction(2**60 - 1, 2**60), "-99/100", "1/2", 0), True),
+        ((Fraction(2**60 + 1, 2**60), "-99/100", "1/2", 0), False),
+        ((2, "1/2"), False),  # a root and its inverse: the first and the last coefficient are equal
+    ],
+)
+def test_stability_is_decided_exactly(roots, stable):
+    assert is_stable(companion(roots)) == stable
+
+
+@pytest.mark.parametrize(
+    ("size", "stable"), [(1, False), (1 - Fraction(1, 10**30), True), (1 + Fraction(1, 10**30), False)]
+)
+def test_stability_of_oscillations_is_decided_exactly(size, stable):
+    given, factor = rotation(size)
+    assert is_stable(np.vectorize(Fraction, otypes=[object])(given) * factor) == stable
+
+
+UNSTABLE = LinearSystem([["1.1"]], [[1]])
+SHORT = FloatFormat(2, 24, emin=-6, emax=7)
+ACCUMULATOR = LinearSystem([[1]], [[1]])
+# Both poles are 1 - 1e-20: the rounded coefficients have a pole at 1 or beyond in every precision with compiled loops.
+NEAR = LinearSystem(companion([1 - Fraction(1, 10**20)] * 2), [[1], [0]])
+
+
+@pytest.mark.parametrize("basis", ["bound", "guarantee", "probable"])
+@pytest.mark.parametrize(("system", "size"), [(UNSTABLE, "1.1"), (ACCUMULATOR, "1 or more")])
+def test_an_unstable_system_has_no_bound_in_any_precision_and_the_answer_says_why(basis, system, size):
+    within = None if basis == "bound" else limits(1, 1, measurement=1)
+    found = required_precision(system, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
+    assert found.precision is None
+    assert str(found) == (
+        f"no precision meets the tolerance ({basis}, 20 steps): the system as given is not stable, since A has an "
+        f"eigenvalue of size {size}, so that an error of rounding never decays"
+    )
+
+
+@pytest.mark.parametrize("basis", ["bound", "probable"])
+def test_a_system_that_is_unstable_only_as_stored_is_said_to_be(basis):
+    within = None if basis == "bound" else limits(2, 1, measurement=1)
+    found = required_precision(NEAR, 20, 1e-3, z=np.ones((20, 1)), basis=basis, within=within)
+    assert found.precision is None
+    assert "no precision up to 53 digits, the most with compiled loops" in str(found)
+    assert "in 53 digits the system is stable, but as stored in FloatFormat(base=2, precision=53" in found.why
+    assert "eigenvalue of size 1 or more" in found.why
+
+
+def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_digits():
+    system = LinearSystem(companion(["0.99", "0.98"]), [[1], [0]])
+    stable = [t for t in range(2, 19) if is_stable(FloatFormat(2, t).array(system.A).to_fractions())]
+    radii = [np.abs(np.linalg.eigvals(FloatFormat(2, t).array(system.A).to_float())).max() for t in range(2, 19)]
+    assert stable == [t for t, radius in zip(range(2, 19), radii, strict=True) if radius < 1 - 1e-6]
+    assert 12 not in stable
+    assert 14 in stable
+    asked = {"steps": 20, "tolerance": 1e3, "z": np.ones((20, 1)), "basis": "bound"}
+    at_12 = required_precision(system, **asked, largest=12)
+    assert at_12.why == f"in 12 digits {system.unstable(FloatFormat(2, 12))}"
+    assert "the system is stable, but as stored in FloatFormat" in at_12.why
+    assert at_12.cause == ""
+    found = required_precision(system, **asked)
+    assert found.why.startswith(
+        "in 14 digits no bound was found: in so few digits, errors may grow by their own roundings"
+    )
+    assert found.precision == 18
+    assert system.unstable(found.fmt) == ""
+
+
+def test_a_stable_system_without_a_proof_is_not_said_to_be_unstable():
+    system = LinearSystem(companion(["0.999", "0.998"]), [[1], [0]])
+    found = required_precision(system, 20, 1e3, z=np.ones((20, 1)), basis="bound", largest=27)
+    assert found.precision is None
+    assert found.cause == ""
+    assert "in 27 digits the system is stable, but decays too slowly for its peak gain to be enclosed" in found.why
+
+
+def test_errors_that_grow_in_every_step_are_named_where_no_precision_is_enough():
+    found = required_precision(LinearSystem([[2]], [[1]]), 200, 1e-3, z=np.full((200, 1), 0.1))
+    assert found.precision is None
+    assert (
+        "the system as given is not stable, since A has an eigenvalue of size 2, so that errors grow with every"
+        in str(found)
+    )
+    assert "whatever the precision: take fewer steps" in found.advice
+    stable = required_precision(LinearSystem([["0.9"]], [["0.1"]]), 5, 1e-30, z=np.ones((5, 1)))
+    assert stable.precision is None
+    assert stable.advice == stable.cause == ""
+
+
+@pytest.mark.parametrize(
+    ("A", "b", "fmt", "message"),
+    [
+        (2, 1, None, r"range of float64; the system as given is not stable, .* of size 2, .* scaling delays"),
+        ("0.9", "1e305", None, "got a number beyond the range of float64; scale the numbers$"),
+        ("0.9", "3e307", FloatFormat(2, 24), "beyond the range of float64; scale the numbers, or use base 10$"),
+        ("0.9", 100, SHORT, "emax=7.; scale the numbers, or use a format with a larger range$"),
+        (1, 100, SHORT, r"emax=7.; the system as given is not stable, .* 1 or more"),
+        ("15/16", 100, replace(SHORT, precision=2), r"stable, but as stored .* it is not, .* of size 1 or more"),
+    ],
+)
+def test_an_overflow_names_its_cause_and_a_cure_that_helps(A, b, fmt, message):
+    with pytest.raises(OverflowError, match=message) as caught:
+        LinearSystem([[A]], [[b]]).outputs(np.full((3000, 1), 1.5), fmt)
+    assert "at step" in str(caught.value)
+
+
+def test_sizes_beyond_float64_are_named():
+    for basis, within in (("bound", None), ("probable", limits(1, 1, measurement=1))):
+        found = required_precision(
+            LinearSystem([["0.9"]], [["1e308"]]), 5, 1e300, z=np.ones((5, 1)), basis=basis, within=within
+        )
+        assert (
+            "in 53 digits got a filter whose largest gain is beyond the range of float64; scale its inputs" in found.why
+        )

@@ -106,7 +106,7 @@ def test_an_integrator_has_no_bound_for_ever() -> None:
     given = fixed_point.unscaled(controller("1", "0.01", "0", "0"))
     answer = fixed_point.required_fraction_bits(given, np.ones((20, 1)), 0.1, "guarantee")
     assert answer.fmt is None
-    assert "contract" in answer.why
+    assert "the filter as given is not stable" in answer.why
 
 
 def test_answers_count_fraction_bits() -> None:
@@ -176,3 +176,45 @@ def test_fixed_point_has_two_bases(basis: Any) -> None:
     given, z = tracked()
     with pytest.raises(ValueError, match=rf"got basis {basis!r}; needed \"emulation\" or \"guarantee\""):
         fixed_point.required_fraction_bits(given, z, 0.1, basis)
+
+
+NEAR = biquad("0.3", 0, 0, "-1.99999", "0.9999900001")
+
+
+@pytest.mark.parametrize(
+    ("made", "bits", "message"),
+    [
+        (
+            state_space([["1.1"]], [[1]]),
+            15,
+            "the filter as given is not stable, so that errors of rounding never decay",
+        ),
+        (
+            state_space([["1"]], [["0.3"]]),
+            15,
+            "the filter as given is not stable, so that errors of rounding never decay",
+        ),
+        (NEAR, 15, "the filter is stable, but not with its coefficients stored in 15 bits; raise coefficient_bits"),
+        (NEAR, 40, "the filter is stable, but decays too slowly for its peak gain to be enclosed"),
+    ],
+)
+def test_without_a_guarantee_the_answer_names_the_cause(made, bits, message):  # type: ignore[no-untyped-def]
+    z = np.full((20, 1), 0.1)
+    answer = fixed_point.required_fraction_bits(fixed_point.unscaled(made), z, 1e-3, "guarantee", coefficient_bits=bits)
+    assert answer.fmt is None
+    assert str(answer).startswith(f"no format, by guarantee: {message}")
+
+
+def test_an_accumulator_without_rounding_errors_needs_no_stability() -> None:
+    made = fixed_point.unscaled(state_space([[1]], [[1]]))
+    answer = fixed_point.required_fraction_bits(made, np.ones((20, 1)), 1e-3, "guarantee")
+    assert answer.fmt is not None
+    assert dict(answer.tried)[answer.fmt.fraction_bits] == 0
+
+
+def test_without_an_answer_the_most_that_was_tried_is_named() -> None:
+    made = fixed_point.unscaled(biquad("0.3", 0, 0, "-1.6", "0.64"))
+    z = np.random.default_rng(0).uniform(-1, 1, (20, 1))
+    answer = fixed_point.required_fraction_bits(made, z, 1e-300)
+    assert answer.fmt is None
+    assert str(answer).endswith("; 59 fraction bits are the most tried")

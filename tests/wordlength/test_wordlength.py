@@ -225,10 +225,18 @@ def test_a_companion_where_the_running_bound_says_nothing():
 
 
 def test_what_the_inverse_refuses():
-    for matrix in ([[2, 1], [0, 2]], [[1, 2, 3], [2, 1, 3]], [[0, 1], [1, 2]]):
-        with pytest.raises(ValueError, match=r"fit: got shape .* needed a symmetric matrix with a positive diagonal"):
+    for matrix, kind, message in (
+        ([[1, 2, 3], [2, 1, 3]], ValueError, r"fit: got shape \(2, 3\); needed a square matrix"),
+        ([1, 2], ValueError, r"fit: got shape \(2,\); needed a square matrix"),
+        ([[2, 1], [0, 2]], ValueError, r"fit: got 1 at \[0, 1\] and 0 at \[1, 0\]; needed a symmetric matrix"),
+        ([[2, 1], [1, "-1/2"]], ValueError, r"fit: got -1/2 at \[1, 1\]; needed a positive diagonal"),
+        ([[0, 1], [1, 2]], ValueError, r"fit: got 0 at \[0, 0\]; needed a positive diagonal"),
+        ([[0, 0], [0, 0]], np.linalg.LinAlgError, "fit: got a singular matrix, which has no inverse in any precision"),
+        ([[4, 2], [2, 1]], np.linalg.LinAlgError, "fit: got a singular matrix, which has no inverse in any precision"),
+    ):
+        with pytest.raises(kind, match=message):
             study.inverse_precision("fit", matrix, 1e-3)
-    for tolerance in (0, -1.0, math.nan, math.inf):
+    for tolerance in (0, -1.0, math.nan, math.inf, "0.1", True, None):
         with pytest.raises(ValueError, match="needed a relative error above 0"):
             study.inverse_precision("fit", [[2, 1], [1, 2]], tolerance)
 

@@ -170,17 +170,65 @@ def restart(kernel: ExactKernel, backend: Backend) -> None:
             part.restart()
 
 
+def check_compiled(backend: Backend, rules: Rules) -> None:
+    """Reject a format without compiled loops.
+
+    Raises
+    ------
+    ValueError : it has none; the message names the setting that prevents them, and what to set instead.
+    """
+    if isinstance(backend, Compiled):
+        return
+    base, precision, rounding, limits, _ = rules
+    if base not in LARGEST_PRECISION:
+        why = f"base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}"
+    elif rounding is Rounding.STOCHASTIC and base != 2:
+        why = f"stochastic rounding in base {base}; needed base 2 for compiled loops"
+    elif limits is not None and limits.overflow == "wrap":
+        why = "overflow that wraps around; needed 'raise' or 'saturate' for compiled loops"
+    elif precision > (most := _longest(base, rounding, limits is not None) - (limits is not None and limits.fixed)):
+        why = f"{_described(rules)}; needed at most {most} for compiled loops"
+    elif precision == 1:
+        why = "one digit; needed at least 2 for compiled loops"
+    elif base == 10:
+        why = "a largest number that does not end in nines; needed one that does, for compiled loops of base 10"
+    else:
+        why = (
+            f"a range down to the exponent {limits.emin if limits else None} and up to {_emax(rules)}; needed numbers, "
+            f"with all digits, between 2**-{_REACH} and 2**{_REACH} for compiled loops"
+        )
+    raise ValueError(f"got {why}")
+
+
+def _described(rules: Rules) -> str:
+    """Describe digits, base and what else limits the digits of compiled loops."""
+    text = f"{rules.precision} digits of base {rules.base}"
+    if rules.rounding not in Rounding.documented():
+        text += f", rounded {rules.rounding.value}"
+    if rules.limits is not None:
+        text += " in fixed point" if rules.limits.fixed else " with a limited range"
+    return text
+
+
+def _longest(base: int, rounding: Rounding, limited: bool) -> int:
+    """Return the largest precision with compiled loops, where nothing else prevents them."""
+    if base != 2:
+        return LARGEST_PRECISION[base]
+    if rounding is Rounding.STOCHASTIC:
+        return 53 - DRAW_BITS
+    return 52 if limited or rounding not in Rounding.documented() else LARGEST_PRECISION[2]
+
+
 def run_tag(backend: Backend, rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
     """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
     check_order(order, fused, block)
-    if not isinstance(backend, Compiled):
-        raise ValueError(f"got {rules}; needed a format with compiled loops")
+    check_compiled(backend, rules)
     if not fused and order == "left":
-        return backend.run_tag()
+        return cast(Compiled, backend).run_tag()
     tag = _float_tag(rules, hardware=False) if rules.base in (2, 16) else None
     if tag is None:
         what = "fused multiply-add" if fused else f"{order} sums"
-        raise ValueError(f"got {what} in {rules}; needed base 2 up to 52 digits, or 16 up to 13")
+        raise ValueError(f"got {what} in {_described(rules)}; needed base 2 up to 52 digits, or 16 up to 13")
     products: Any = tags.Fused() if fused else tags.Separate()
     sums = {"left": products, "pairwise": tags.Pairwise(), "blocked": tags.Blocked(block, products)}[order]
     return cast(tags.Limited, tag._replace(sums=sums))
@@ -236,7 +284,7 @@ def _float_tag(rules: Rules, hardware: bool = True) -> Any:
     """Return the tag for float64 storage, or None if float64 cannot hold the digits that decide a rounding."""
     base, precision, rounding, limits, seed = rules
     random = rounding is Rounding.STOCHASTIC
-    longest = 53 - DRAW_BITS if random else 52 if base == 2 else 13
+    longest = min(_longest(base, rounding, True), 53 - DRAW_BITS if random else 53)
     # A single binary digit is implicit in float64: no stored bit is even or odd.
     hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
     digits = tags.Two() if base == 2 else tags.Sixteen()

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.kalman.bounded_run import BoundedRun
-from gpbnb.kalman.filter_run import Run
+from gpbnb.kalman.filter_run import Run, packed_array
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.enclosure import enclose
 from gpbnb.kalman.guarantee.program import Program, innovation_program, loop_program, sequential_program
@@ -236,10 +236,7 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
 
 def pack(fmt: FloatFormat | FixedFormat, values: Any) -> NDArray[Any]:
     """Convert numbers to the form that the compiled loops of a format expect."""
-    array = fmt.array(values)
-    if not isinstance(array.backend, Compiled):
-        raise OverflowError(f"got numbers beyond the range of the compiled loops of {fmt}; scale the states")
-    return array.backend.pack(array.components)
+    return packed_array(fmt.array(values))
 
 
 def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:

@@ -130,6 +130,7 @@ def peak_gain(A: Any, B: Any, C: Any, D: Any = None) -> Enclosure:
     Raises
     ------
     ValueError : no power up to 2**20 has a norm below 1, in balls of up to 2**13 bits.
+    OverflowError : a gain is beyond the range of float64.
     """
     bits = 256
     while bits <= 2**13:
@@ -186,6 +187,8 @@ def _peak_gain(A: Any, B: Any, C: Any, D: Any, bits: int) -> tuple[Enclosure | N
             steps += 64
         low = np.array([[float(s.lower()) * (1 - 2.0**-50) for s in line] for line in sums])
         high = np.array([[float((s + tail).upper()) * (1 + 2.0**-50) for s in line] for line in sums])
+        if not np.isfinite(high).all():
+            raise OverflowError("got a filter whose largest gain is beyond the range of float64; scale its inputs")
         return Enclosure(low, high), float(first) * 2.0**-100
     finally:
         ctx.prec = before
