@@ -122,8 +122,9 @@ def schedule(
     ValueError : the format or the form has no compiled loops, or a covariance is not definite in it.
     """
     form = compiled_form(form)
-    stored = replace(model.rounded(fmt), x0=np.array([Fraction(0)] * model.n, dtype=object))
-    run, repeat, period = _emulated(stored, fmt, form, most)
+    stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)
+    x0, stored = stored.x0, replace(stored, x0=nothing)
+    run, repeat, period = _emulated(replace(model, x0=nothing), fmt, form, most)
     bad = run.stopped or run.indefinite
     if run.stopped:
         why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
@@ -155,7 +156,6 @@ def schedule(
     cycle = np.lcm(len(stored.H), len(stored.Phi))
     products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
     HPhi = double_doubles(products)[phases % cycle]
-    x0 = model.rounded(fmt).x0
     coefficients = widened_array(packed)
     enclosed = wide = None
     if enclosure is not None:
@@ -178,18 +178,18 @@ def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int6
 
 
 def _emulated(
-    stored: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
+    model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
 ) -> tuple[Run, int | None, int | None]:
     """Return a run that keeps every gain, and the number of steps after which the computed covariance first repeats."""
-    steps = min(most, max(128, 2 * stored.cycle))
+    steps = min(most, max(128, 2 * model.cycle))
     while True:
-        run = Run(stored, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
+        run = Run(model, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
         start = np.array(run.P)
-        run.take(np.zeros((steps, stored.m)))
+        run.take(np.zeros((steps, model.m)))
         done = run.steps
         seen: dict[tuple[int, bytes], int] = {(0, start.tobytes()): 0}
         for k in range(1, done + 1):
-            key = (k % stored.cycle, (run.C[k - 1] + 0).tobytes())
+            key = (k % model.cycle, (run.C[k - 1] + 0).tobytes())
             if key in seen:
                 return run, seen[key], k - seen[key]
             seen[key] = k

@@ -111,7 +111,7 @@ def bounds_in_blocks(
     n, m, cycle = stored.n, stored.m, stored.cycle
     block = cycle if block is None else block
     run, true = (
-        Run(stored, fmt, form, range(1, block + 1)),
+        Run(model, fmt, form, range(1, block + 1)),
         BoundedRun(stored, None, Form.INNOVATION, range(1, block + 1)),
     )
     products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
