@@ -21,6 +21,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
+from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.filter_run import Run
@@ -105,6 +106,21 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
                 store(fmt, D[k], (i, j), s)
 
 
+def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
+    """Reject stochastic rounding of a filter that computes its gain.
+
+    Raises
+    ------
+    ValueError : the format rounds at random.
+    """
+    if fmt.rounding is Rounding.STOCHASTIC:
+        raise ValueError(
+            "got stochastic rounding for a Kalman filter; needed another rounding: its computed gain depends on the "
+            "random numbers, and a covariance that occurs again does not repeat. A LinearSystem, whose coefficients "
+            "are fixed, may round at random"
+        )
+
+
 def schedule(
     model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
 ) -> Schedule:
@@ -114,17 +130,19 @@ def schedule(
     ----------
     model, fmt, form : as for a run of the filter. The exact filter uses model and measurements as the format stores
         them.
-    most : largest number of steps to try.
+    most : largest number of steps to try. A model with `steps` is continued with the cycles of its matrices.
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
 
     Raises
     ------
-    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it.
+    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it; stochastic
+        rounding.
     """
     form = compiled_form(form)
+    check_deterministic(fmt)
     stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)
-    x0, stored = stored.x0, replace(stored, x0=nothing)
-    run, repeat, period = _emulated(replace(model, x0=nothing), fmt, form, most)
+    x0, stored = stored.x0, replace(stored, x0=nothing, steps=None)
+    run, repeat, period = _emulated(replace(model, x0=nothing, steps=None), fmt, form, most)
     bad = run.stopped or run.indefinite
     if run.stopped:
         why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
