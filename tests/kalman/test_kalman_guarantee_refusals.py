@@ -14,10 +14,12 @@ from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
-from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns, stored_sizes, storing_errors
+from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns
 from gpbnb.kalman.guarantee.gains import schedule
 from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
 from gpbnb.kalman.guarantee.linear import state_space
+from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.guarantee.storing import stored_sizes, storing_errors
 from gpbnb.kalman.precision import required_precision
 
 FORMAT = FloatFormat(2, 11)
@@ -301,3 +303,15 @@ def test_inputs_beyond_the_range_are_refused() -> None:
     found = required_precision(system, 10, 0.1, basis="guarantee", within=within, emin=-14, emax=15)
     assert found.fmt is None
     assert "needed inputs within the range" in found.why
+
+
+def test_a_filter_whose_roundings_grow_with_its_error_has_no_bound() -> None:
+    """In two bits, the products and sums of a slow filter add more than it forgets."""
+    filter_ = state_space([["0.75", "0.5"], ["-0.5", "0.5"]], [[1], [1]])
+    found = from_schedule(filter_.schedule(FloatFormat(2, 2, Rounding.CHOP)), limits(2, 1, measurement=1))
+    assert found.radius < 1
+    assert not found.for_ever
+    assert found.steps == 0
+    assert "as large as itself" in found.why
+    with pytest.raises(ValueError, match="as large as itself"):
+        probable_error(found)

@@ -1,8 +1,9 @@
 """Find a filter's coefficients for all time: emulate the covariance until it repeats, and enclose the exact gain.
 
-In t digits, the recursion of the covariance maps a finite set of numbers into itself and does not depend on
-measurements. Once the computed covariance equals, digit for digit, the one a whole number of model cycles earlier,
-everything repeats from then on. This is a proof by exhaustion.
+As long as the rounding is deterministic, a computed covariance and the phase of the model's cycle determine the next
+covariance. The measurements have no influence on it. Once the computed covariance equals, digit for digit, the one a
+whole number of model cycles earlier, everything repeats from then on. With unlimited exponents, nothing forces a
+covariance to occur again; the emulation shows whether one does.
 """
 
 from __future__ import annotations
