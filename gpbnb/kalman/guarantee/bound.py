@@ -201,7 +201,7 @@ def guarantee(
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
-    check_limits(within, model.n, model.m, model.x0)
+    check_limits(within, model.n, model.m)
     if model.steps is not None:
         most, horizon = min(most, model.steps), min(horizon, model.steps)
     found = from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
@@ -407,6 +407,8 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     HPhi = np.ascontiguousarray(given.HPhi[..., 0])
     early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
     for _ in range(60):
+        if not all(np.isfinite(each).all() for each in (X, V, given.dK)):
+            break
         limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
         slack = tiny * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
         slack += (tiny * np.abs(found.loop) + found.spread) @ X
