@@ -194,7 +194,7 @@ def test_budgets(text):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"z": "1e999999"}, "measurements: got a number with the power of ten 999999; needed a power of at most 100000"),
+        ({"z": "1e999999"}, "measurements: got a number with the power of ten 999999; needed a power of at most"),
         ({"z": "1e99999"}, "got a single number; needed one measurement for each of the 3 steps"),
         ({"z": np.full((3, 1), np.inf)}, "got inf for measurement 0 of step 1"),
     ],

@@ -20,8 +20,9 @@ from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import guarantee
+from gpbnb.kalman.guarantee.bound import check_limits, guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
+from gpbnb.kalman.guarantee.gains import check_deterministic
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
@@ -71,7 +72,8 @@ def required_precision(
         contraction bound of :mod:`gpbnb.kalman.contraction`, which is proved for the arithmetic of this run and
         requires more digits. "guarantee" bounds the error for every measurement sequence within limits, and forever
         (``guarantee``); "probable" takes three standard deviations of the error that independent
-        roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
+        roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked. Both
+        assume sums from left to right without fused multiply-add, and refuse stochastic rounding of a Kalman filter.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
     emin, emax, subnormal : range of the formats, as of a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
@@ -89,7 +91,8 @@ def required_precision(
     ------
     ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops, or
         for a model a largest precision without them; more or fewer measurements than steps; a model with known inputs,
-        or an ``ArrayForm``, where a basis does not cover them.
+        or an ``ArrayForm``, where a basis does not cover them; limits for another filter, or that the first estimate
+        exceeds; stochastic rounding with a basis that holds for ever.
     TypeError : another kind of model, or of limits.
     OverflowError : an output of a linear system, or its reference, leaves the range of float64; the entries of a model
         are too large or too small for compiled loops.
@@ -118,6 +121,8 @@ def required_precision(
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
     if for_ever:
         model.refuse_inputs(f'basis "{basis}"')
+        check_deterministic(like)
+        check_limits(within, model.n, model.m, model.x0)
         if isinstance(form, ArrayForm):
             raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
         if model.steps is not None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from gpbnb.kalman.guarantee.gains import pack, widened_array
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import Program, advance
+from gpbnb.kalman.guarantee.storing import stored_sizes, storing_errors
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import checked_name, whole_number
 from gpbnb.kalman.requirement import ANY_BINARY, Basis, Requirement, checked_tolerance, largest_ratio, listed
@@ -252,6 +253,11 @@ def required_system_precision(
         if within is None:
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(..., measurement=...)')
         largest = np.asarray(within.measurement, dtype=np.float64)
+        if largest.shape != (system.m,):
+            raise ValueError(
+                f"got limits of shape {largest.shape} on the measurement; needed ({system.m},), one for each input: "
+                f"write limits({system.n}, {system.m}, measurement=...)"
+            )
     if basis != "emulation" and any(system.x0):
         raise ValueError(f'got a first state {system.x0.tolist()} and basis "{basis}"; needed x0 = 0 for a bound')
     true = system.outputs(u) if basis == "emulation" else None
@@ -359,24 +365,26 @@ def _observed(system: LinearSystem, u: Any, fmt: FloatFormat, true: NDArray[np.f
 def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64], basis: str) -> NDArray[np.float64]:
     """Bound the error of each output, (p,), due to rounding and to storing coefficients and inputs.
 
-    With stored matrices marked by a hat, outputs differ by at most the peak gain of the difference of both systems
-    times the largest input, and the peak gain of the stored system times the errors of the stored inputs.
+    Outputs differ by at most the peak gain of the difference of the given and the stored system times the largest
+    input, and the peak gain of the stored system times the largest error of storing an input, underflow included.
     """
-    A, B, C, D = (
-        cast(NDArray[Any], fmt.array(each).to_fractions()) for each in (system.A, system.B, system.C, system.D)
-    )
-    zero = exact(np.zeros((system.n, system.n), dtype=int))
+    given, n = system.as_filter(), system.n
+    stored, count = given.stored(fmt), (n + system.p) ** 2
+    AC, BD = stored[:count].reshape(n + system.p, -1)[:, :n], stored[count:].reshape(n + system.p, -1)
+    A, B, C, D = AC[:n], BD[:n], AC[n:], BD[n:]
+    zero = exact(np.zeros((n, n), dtype=int))
     both = np.block([[system.A, zero], [zero, A]])
-    beta = float(fmt.unit_roundoff)
     difference = _gain(both, np.vstack([system.B, B]), np.hstack([system.C, -C]), system.D - D)
-    stored = _gain(A, B, C, D)
-    sizes = largest * (1 + beta)
-    unit = exact(np.eye(system.n, dtype=int))
-    state = np.concatenate([_gain(A, B, unit), stored]) @ sizes * (1 + 2.0**-40)
+    inputs = _gain(A, B, C, D)
+    storing, sizes = storing_errors(fmt, largest), stored_sizes(fmt, largest)
+    if not np.isfinite(storing).all():
+        raise ValueError(f"got inputs of up to {largest}; needed inputs within the range of {fmt}")
+    unit = exact(np.eye(n, dtype=int))
+    state = np.concatenate([_gain(A, B, unit), inputs]) @ sizes * (1 + 2.0**-40)
     if not np.isfinite(state).all():
         raise OverflowError("a state or an output may be beyond the range of float64; scale the numbers")
-    within = limits(system.n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
-    found = from_schedule(system.as_filter().schedule(fmt), within, 1)
+    within = limits(n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
+    found = from_schedule(given.schedule(fmt), within, 1)
     if not found.for_ever:
         raise ValueError(found.why)
     if not np.isfinite(found.bound).all():
@@ -384,8 +392,8 @@ def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64
             "no bound was found: in so few digits, errors may grow by their own roundings; use more digits"
         )
     rounding = found.bound if basis != "probable" else 3 * probable_error(found)
-    # two sums of m products in float64, each with an error below 2**-40
-    return np.asarray((rounding[system.n :] + (difference + stored * beta) @ largest) * (1 + 2.0**-40))
+    # sums of m products in float64, with an error below 2**-40
+    return np.asarray((rounding[n:] + difference @ largest + inputs @ storing) * (1 + 2.0**-40))
 
 
 def _gain(*matrices: NDArray[Any]) -> NDArray[np.float64]:

@@ -98,6 +98,14 @@ def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
     return total
 
 
+@inner
+def _share(size: float, limit: float) -> float:
+    """Return a size as a share of its limit, which may be zero."""
+    if size == 0.0:
+        return 0.0
+    return size / limit if limit > 0.0 else 1e10
+
+
 @compiled
 def greedy(
     fmt: Any,
@@ -174,13 +182,13 @@ def greedy(
                 put(fmt, z, r, c)
                 c_exact = widened(fmt, c)
                 put(exactly, nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
-                excess = max(excess, abs(nu[r, 0]) / limits.innovation[r])
-                excess = max(excess, abs(c_exact[0]) / limits.measurement[r])
+                excess = max(excess, _share(abs(nu[r, 0]), limits.innovation[r]))
+                excess = max(excess, _share(abs(c_exact[0]), limits.measurement[r]))
             _times(K[at], nu, following)
             for i in range(n):
                 s = doubledouble.add(exactly, load(exactly, predicted, i), load(exactly, following, i))
                 put(exactly, following, i, s)
-                excess = max(excess, abs(s[0]) / limits.state[i])
+                excess = max(excess, _share(abs(s[0]), limits.state[i]))
             trial[:] = x
             execute(fmt, operations, outputs, coefficients[at], trial, z, values)
             if excess > 1.0:
@@ -258,7 +266,7 @@ def attack(
     n, m = given.program.n, given.program.m
     by_range = not np.isfinite(found.limits.measurement).all()
     errors, best, best_z, allowed, runs = np.zeros(n), 0.0, np.zeros((steps, m)), True, 0
-    at: tuple[Any, ...] = (0, 0)
+    at: tuple[Any, ...] = ()
     F = closed_loops(given)
     for state in range(n) if states is None else states:
         rows = responses(given, F, state, steps)
@@ -272,11 +280,17 @@ def attack(
             if outcome[0]:
                 continue
             errors = np.maximum(errors, np.abs(outcome[2]).max(axis=0))
-            reached = np.abs(outcome[2]) / found.bound
-            if reached.max() > best:
+            reached = _over(np.abs(outcome[2]), found.bound)
+            if reached.max() > best or not at:
                 best, best_z, at = float(reached.max()), outcome[1], np.unravel_index(reached.argmax(), reached.shape)
-    ratios = errors / found.bound
-    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(at[1]), int(at[0]) + 1, allowed)
+    ratios, (step, state) = _over(errors, found.bound), at or (0, 0)
+    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(state), int(step) + 1, allowed)
+
+
+def _over(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return errors over their bounds; an error of zero is no share of a bound of zero."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(errors == 0, 0.0, errors / bound)
 
 
 def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:

@@ -1,8 +1,9 @@
 """Find a filter's coefficients for all time: emulate the covariance until it repeats, and enclose the exact gain.
 
-In t digits, the recursion of the covariance maps a finite set of numbers into itself and does not depend on
-measurements. Once the computed covariance equals, digit for digit, the one a whole number of model cycles earlier,
-everything repeats from then on. This is a proof by exhaustion.
+As long as the rounding is deterministic, a computed covariance and the phase of the model's cycle determine the next
+covariance. The measurements have no influence on it. Once the computed covariance equals, digit for digit, the one a
+whole number of model cycles earlier, everything repeats from then on. With unlimited exponents, nothing forces a
+covariance to occur again; the emulation shows whether one does.
 """
 
 from __future__ import annotations
@@ -21,14 +22,16 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
+from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.kalman.bounded_run import BoundedRun
-from gpbnb.kalman.filter_run import Run, packed_array
+from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.enclosure import enclose
 from gpbnb.kalman.guarantee.program import Program, innovation_program, loop_program, sequential_program
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import compiled_form
+from gpbnb.kalman.opening import packed_array
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +108,21 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
                 store(fmt, D[k], (i, j), s)
 
 
+def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
+    """Reject stochastic rounding of a filter that computes its gain.
+
+    Raises
+    ------
+    ValueError : the format rounds at random.
+    """
+    if fmt.rounding is Rounding.STOCHASTIC:
+        raise ValueError(
+            "got stochastic rounding for a Kalman filter; needed another rounding: its computed gain depends on the "
+            "random numbers, and a covariance that occurs again does not repeat. A LinearSystem, whose coefficients "
+            "are fixed, may round at random"
+        )
+
+
 def schedule(
     model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
 ) -> Schedule:
@@ -114,16 +132,19 @@ def schedule(
     ----------
     model, fmt, form : as for a run of the filter. The exact filter uses model and measurements as the format stores
         them.
-    most : largest number of steps to try.
+    most : largest number of steps to try. A model with `steps` is continued with the cycles of its matrices.
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
 
     Raises
     ------
-    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it.
+    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it; stochastic
+        rounding.
     """
     form = compiled_form(form)
-    stored = replace(model.rounded(fmt), x0=np.array([Fraction(0)] * model.n, dtype=object))
-    run, repeat, period = _emulated(stored, fmt, form, most)
+    check_deterministic(fmt)
+    stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)
+    x0, stored = stored.x0, replace(stored, x0=nothing, steps=None)
+    run, repeat, period = _emulated(replace(model, x0=nothing, steps=None), fmt, form, most)
     bad = run.stopped or run.indefinite
     if run.stopped:
         why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
@@ -140,14 +161,18 @@ def schedule(
     if enclosure is not None:
         repeat, period, why = enclosure.start - stored.cycle, stored.cycle, ""
     if repeat is None or period is None or why:
-        end = end if horizon is None else min(end, horizon)
-        K, dK, settled, first = _exact_gains(stored, end, None, most, fmt)[:4]
         repeat = period = None
+        K, dK, settled, first = _exact_gains(stored, end if horizon is None else min(end, horizon), None, most, fmt)
     else:
-        K, dK, settled, first = _exact_gains(stored, repeat, period, most, fmt)
-        if not settled:
-            why = f"the exact gain did not settle within {len(K)} steps"
+        try:
+            K, dK, settled, first = _exact_gains(stored, repeat, period, most, fmt)
+            why = "" if settled else f"the exact gain did not settle within {len(K)} steps"
+        except ArithmeticError as error:
+            why = str(error)
+            K, dK, settled, first = _exact_gains(stored, end if horizon is None else horizon, None, most, fmt)
     steps = len(K)
+    if not steps:
+        raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed exactly")
     rows = _rows(steps, repeat, period)
     program, packed = packed_coefficients(run, rows)
     phases = np.arange(steps)
@@ -155,7 +180,6 @@ def schedule(
     cycle = np.lcm(len(stored.H), len(stored.Phi))
     products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
     HPhi = double_doubles(products)[phases % cycle]
-    x0 = model.rounded(fmt).x0
     coefficients = widened_array(packed)
     enclosed = wide = None
     if enclosure is not None:
@@ -178,18 +202,18 @@ def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int6
 
 
 def _emulated(
-    stored: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
+    model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
 ) -> tuple[Run, int | None, int | None]:
     """Return a run that keeps every gain, and the number of steps after which the computed covariance first repeats."""
-    steps = min(most, max(128, 2 * stored.cycle))
+    steps = min(most, max(128, 2 * model.cycle))
     while True:
-        run = Run(stored, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
+        run = Run(model, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
         start = np.array(run.P)
-        run.take(np.zeros((steps, stored.m)))
+        run.take(np.zeros((steps, model.m)))
         done = run.steps
         seen: dict[tuple[int, bytes], int] = {(0, start.tobytes()): 0}
         for k in range(1, done + 1):
-            key = (k % stored.cycle, (run.C[k - 1] + 0).tobytes())
+            key = (k % model.cycle, (run.C[k - 1] + 0).tobytes())
             if key in seen:
                 return run, seen[key], k - seen[key]
             seen[key] = k
@@ -270,8 +294,9 @@ def _exact_gains(
     """
     n, m = stored.n, stored.m
     if period is None:
-        run = _bounded_run(stored, repeat)
-        return run.G.reshape(repeat, n, m, 2), run.bounds[1], False, repeat
+        run = _bounded_run(stored, repeat, to_the_end=False)
+        done = run.steps
+        return run.G[:done].reshape(done, n, m, 2), run.bounds[1][:done], False, done
     unit = float(fmt.unit if isinstance(fmt, FixedFormat) else fmt.unit_roundoff)
     steps = repeat + 2 * period
     while True:
@@ -297,14 +322,14 @@ def _exact_gains(
         steps = repeat + (steps - repeat) // period * period
         run = _bounded_run(stored, steps)
         first = steps - period
-    return K, run.bounds[1], False, len(K)
+    return run.G.reshape(run.steps, n, m, 2), run.bounds[1], False, run.steps
 
 
-def _bounded_run(stored: LinearModel, steps: int) -> BoundedRun:
+def _bounded_run(stored: LinearModel, steps: int, to_the_end: bool = True) -> BoundedRun:
     run = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     run.take(np.zeros((steps, stored.m)))
-    if run.stopped:
-        raise ArithmeticError(f"{stored.name}: the exact filter stopped at step {run.stopped}; scale the model")
+    if run.stopped and to_the_end:
+        raise ArithmeticError(f"the exact filter leaves the range of float64 at step {run.stopped}")
     return run
 
 
