@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.display.tables import Table
-from gpbnb.kalman.filter_run import Run, reference_states
+from gpbnb.kalman.filter_run import Run, reference_states, widened
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.adversary import attack, responses, shares_of
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops, guarantee
@@ -52,7 +52,8 @@ class Row(NamedTuple):
     """A filter in a format, what its guarantee says, and the largest error / bound for each kind of input.
 
     `steps` counts the steps of all runs in which the exact filter was within its limits, `stopped` the runs that ended
-    there although the filter was within them.
+    there although the filter was within them, and `gains` the steps in which the gain of a run is not the one for which
+    the guarantee holds.
     """
 
     seed: int
@@ -70,14 +71,20 @@ class Row(NamedTuple):
     runs: int
     steps: int
     stopped: int
+    gains: int
     random: str
     constant: str
     chosen: str
 
     @property
     def largest(self) -> float:
-        """Largest error / bound of all runs; the guarantee is violated above 1."""
+        """Largest error / bound of all runs."""
         return max(float(self.random), float(self.constant), float(self.chosen))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a run exceeds its bound or has other gains, or the answer fails without a reason."""
+        return self.largest > 1 or self.gains > 0 or self.result == "failed"
 
 
 COLUMNS = (
@@ -96,6 +103,7 @@ COLUMNS = (
     Column("runs", "integer", 0),
     Column("steps", "integer", 0),
     Column("stopped", "integer", 0),
+    Column("gains", "integer", 0),
     *(Column(kind, "number", 0) for kind in INPUTS),
 )
 """Columns of the stored table."""
@@ -125,6 +133,22 @@ def first_outside(drawn: Drawn, true: NDArray[np.float64], z: NDArray[np.float64
     for values, limit in ((true, X.state), (innovation, X.innovation), (z, X.measurement)):
         inside &= (np.abs(values) <= limit).all(axis=1)
     return len(z) if inside.all() else int(inside.argmin())
+
+
+def other_gains(drawn: Drawn, found: Guarantee) -> int:
+    """Return the number of steps in which a user's run has another gain than those for which the guarantee holds."""
+    given = found.schedule
+    steps = STEPS if found.steps is None else min(STEPS, found.steps)
+    run = Run(drawn.model, drawn.fmt, drawn.form, range(1, steps + 1))
+    run.take(np.zeros((steps, drawn.model.m)))
+    at, count = _rows(found, run.steps), drawn.model.n * drawn.model.m
+    gains = run.G[: run.steps].reshape(run.steps, count, *run.G.shape[3:])
+    same = gains == given.packed[at, -count:]
+    if same.ndim == 3:
+        same = same.all(axis=2)
+    off = np.abs(widened(gains[:, :, None])[:, :, 0, 0] - given.coefficients[at, -count:, 0])
+    same |= off < given.offsets[at, -count:]  # a gain that never repeats is enclosed
+    return int((~same.all(axis=1)).sum())
 
 
 def inputs(drawn: Drawn, found: Guarantee, rng: np.random.Generator) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -162,6 +186,8 @@ def _rows(found: Guarantee, steps: int) -> NDArray[np.int64]:
     return np.where(k < given.steps, k, given.first + (k - given.first) % max(given.steps - given.first, 1))
 
 
+_BELOW = 1 - 2.0**-50
+"""Factor with which the largest measurement is not rounded to a number beyond its limit."""
 _FACTORS = np.array([[0.999], [0.5], [0.0], [-0.5], [-0.999]])
 
 
@@ -171,9 +197,10 @@ def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> 
     An innovation that takes the state out of its limits is reduced or reversed.
     """
     if drawn.limited == "measurement":
-        return course * drawn.within.measurement
+        return course * drawn.within.measurement * _BELOW
     given, at = found.schedule, _rows(found, len(course))
     X, V, Z = drawn.within
+    Z = Z * _BELOW
     of_state, of_innovation = (np.where(limit > 0, 1 / np.maximum(limit, 1e-300), 1e300) for limit in (X, V))
     x, z = given.x0.astype(np.float64), np.zeros(course.shape)
     for k, share in enumerate(course):
@@ -212,6 +239,7 @@ def examine(
     )
     if row.result == "no bound":
         return row
+    row = row._replace(gains=other_gains(given, found))
     rng, worst = np.random.default_rng([36, seed]), dict.fromkeys(INPUTS, 0.0)
     for kind, z in inputs(given, found, rng):
         try:
@@ -219,7 +247,7 @@ def examine(
         except OverflowError:
             continue  # a measurement that the format cannot store
         off = off[: found.steps]
-        row = row._replace(runs=row.runs + 1, steps=row.steps + len(off), stopped=row.stopped + ended)
+        row = row._replace(runs=row.runs + (len(off) > 0), steps=row.steps + len(off), stopped=row.stopped + ended)
         reached = shares_of(np.abs(off).max(axis=0, initial=0.0), smaller * found.bound)
         worst[kind] = max(worst[kind], float(reached.max()))
     ratios = (f"{worst[kind]:.4g}" for kind in INPUTS)
@@ -245,6 +273,7 @@ def _unexamined(seed: int, drawn: Drawn) -> Row:
         runs=0,
         steps=0,
         stopped=0,
+        gains=0,
         random="0",
         constant="0",
         chosen="0",
@@ -361,7 +390,7 @@ def reasons(rows: Sequence[Row]) -> Table:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the survey; return a nonzero status if a run exceeds its bound or an answer fails."""
+    """Compute the survey; return a nonzero status if an answer is wrong or fails."""
     parser = argparse.ArgumentParser(prog=COMMAND, description="Compare random Kalman filters with their guarantees.")
     parser.add_argument("--rows", type=int, default=FILTERS, help="number of filters to compute")
     parser.add_argument("--processes", type=int, default=1, help="number of processes")
@@ -377,7 +406,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         results = SWEEP.run(given.output, cells=cells)
     file = given.output / FILE.name
     SWEEP.store(results, file=file)
-    bad = [row for row in load(file) if row.largest > 1 or row.result == "failed"]
+    bad = [row for row in load(file) if row.wrong]
     for row in bad:
         print(*row)
     return int(bool(bad))
