@@ -24,6 +24,7 @@ from gpbnb.kalman.factors import combined_gain, covariance_of_factors
 from gpbnb.kalman.filter_run import Checkpoints, Run, check_compiled
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.opening import opening
 
 _HUNG = (Form.HUNG, Form.HUNG_SECOND_GAIN)
 _ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
@@ -64,10 +65,10 @@ class ArrayRun:
         self.steps, self.reason = 0, ""
         self.indefinite: int | None = None
         self.stopped: int | None = None
-        self._sound = model.definite_in(fmt)
+        sound = model.definite_in(fmt)
         #: Changes of the covariances, including those of the model.
-        self.repairs = list(self._sound.repairs)
-        stored = self._sound.arrays(fmt)
+        self.repairs = list(sound.repairs)
+        stored = sound.arrays(fmt)
         self.x, self.P = stored.pop("x0"), stored.pop("P0")
         self._given: dict[str, list[FloatArray]] = {letter: [] for letter in ("B", "u", "b", "d")}
         for letter, each in stored.items():
@@ -224,9 +225,9 @@ class ArrayRun:
 
     def _factor(self) -> None:
         """Compute factors of P0, Q and R as the compiled UD form does."""
-        start = Run(self._sound.without_inputs(), self.fmt, Form.UD, ())
-        self.repairs += start.repairs
-        first, Q, R = (self._unpacked(each) for each in (start.P, start.UQ, start.UR))
+        start = opening(self.model.without_inputs(), self.fmt, Form.UD, self.fmt.run_tag())
+        self.repairs += start.raised
+        first, Q, R = (self._unpacked(each) for each in (start.U0, start.UQ, start.UR))
         self._given["UR"] = list(R)
         if self.form in _ROOTS:
             self.P = array_steps.root_of_factors(first)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -16,10 +15,9 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.rules import Order, Rounding
+from gpbnb.arithmetic.kernels.rules import Order
 from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.kalman.factors import combined_gain, covariance_of_factors
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.bounded import widen
@@ -31,11 +29,10 @@ from gpbnb.kalman.kernels.step import (
     STOPPED,
     advance,
     advance_ud,
-    factor_each,
-    invert_each,
 )
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.named import compiled_form
+from gpbnb.kalman.opening import as_packed, opening
 from gpbnb.kalman.precise_reference import precise_steps
 
 LEAST_SHARE = 2.0**-60
@@ -64,7 +61,8 @@ class Run:
     Raises
     ------
     ValueError : a format or form without compiled loops; checkpoint steps that do not ascend; compensation or another
-        order of additions in a form that does not have it.
+        order of additions in a form that does not have it; covariances that lose their definiteness when they are
+        factored or inverted in this format, see :mod:`gpbnb.kalman.opening`.
     TypeError : `sums` is not a format.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
@@ -103,67 +101,25 @@ class Run:
             raise ValueError(f"got {order} sums in the UD form; needed another form")
         #: The arithmetic of the compiled loops.
         self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
-        stored = model if fmt is None else model.definite_in(fmt)
+        start = opening(model, fmt, self.form, self.tag)
         #: Changes of the covariances, including those of the model.
-        self.repairs = list(stored.repairs)
-        # A result that was stored would draw no random numbers, and the measurements would be rounded with others.
-        random = fmt is not None and fmt.rounding is Rounding.STOCHASTIC
-        Phi, H, Q, R, x0, P0 = (each.copy() for each in (_packed if random else _packed_once)(stored, fmt))
-        PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (Phi, H))
+        self.repairs = list(start.repairs)
+        PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (start.Phi, start.H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
         identity = self.as_packed(np.eye(n, dtype=int))
-        self.x, self.P = np.ascontiguousarray(x0[:, np.newaxis]), P0
-        RI, self.UQ, self.UR = np.zeros_like(R), np.zeros_like(Q), np.zeros_like(R)
+        self.x = np.ascontiguousarray(start.x0[:, np.newaxis])
+        self.P = start.U0 if self.form is Form.UD else start.P0
+        self.UQ, self.UR = start.UQ, start.UR
         self.X, self.G, self.C = (
             np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, 1), (n, m), (n, n))
         )
         self.notes = np.zeros(4, dtype=np.int64)
-        try:
-            definite = self._prepare(stored, Q, R, RI)
-        except ZeroDivisionError:
-            definite = False
-        if not definite:
-            raise ValueError(
-                f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
-                "this format; use more digits, or add a little to the diagonals of Q and P0"
-            )
         increment = self.as_packed(model.Phi - np.eye(n, dtype=int) if compensated else np.zeros((0, n, n)))
         self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
         rest = (identity, increment, np.zeros_like(self.x), self._place)
-        self.matrices = (Phi, PhiT, H, HT, Q, R, RI, *rest)
+        self.matrices = (start.Phi, PhiT, start.H, HT, start.Q, start.R, start.RI, *rest)
         #: Why the run stopped, if it did.
         self.reason = ""
-
-    def _prepare(self, stored: LinearModel, Q: NDArray[Any], R: NDArray[Any], RI: NDArray[Any]) -> bool:
-        """Compute what the form needs beside the model; whether the covariances are definite in this arithmetic."""
-        if self.form is Form.HUNG_SECOND_GAIN:
-            return bool(invert_each(self.tag, R, RI))
-        if self.form is Form.UD:
-            given, self.P = self.P, np.empty_like(self.P)
-            return all(
-                factor_each(self.tag, packed, factors)
-                or self._factored_higher(letter, getattr(stored, letter), factors)
-                for letter, packed, factors in (
-                    ("Q", Q, self.UQ),
-                    ("R", R, self.UR),
-                    ("P0", given[np.newaxis], self.P[np.newaxis]),
-                )
-            )
-        return True
-
-    def _factored_higher(self, letter: str, matrices: NDArray[Any], factors: NDArray[Any]) -> bool:
-        """Compute factors of covariances whose variances are raised until the factors are definite, if any are."""
-        if self.model.repair is False:
-            return False
-        found = raised_until(
-            matrices.reshape(-1, *matrices.shape[-2:]),
-            lambda raised: bool(factor_each(self.tag, self.as_packed(raised), factors)),
-            least_shift(self.fmt),
-            LARGEST_STORED_SHIFT,
-        )
-        if found is not None:
-            self.repairs.append(Repair(letter, 0, 0.0, found[1], self.fmt))
-        return found is not None
 
     @property
     def steps(self) -> int:
@@ -271,7 +227,7 @@ class Run:
 
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Round numbers into the format, and return them as the compiled loops expect them."""
-        return _as_packed(self.fmt, values)
+        return as_packed(self.fmt, values)
 
     def exactly(self, packed: NDArray[Any]) -> NDArray[Any]:
         """Convert results of the compiled loops to exact Fractions."""
@@ -305,42 +261,6 @@ def _exact_sum(high: float, low: float) -> Fraction:
     # Both denominators are powers of two: faster than the sum of two Fractions.
     (n, d), (p, q) = high.as_integer_ratio(), low.as_integer_ratio()
     return Fraction(n * (q // d) + p, q) if q > d else Fraction(n + p * (d // q), d)
-
-
-def _as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
-    if fmt is None:
-        entries = np.asarray(values)
-        if entries.dtype == np.float64:
-            if not np.isfinite(entries).all():
-                raise ValueError("got measurements with NaN or infinity; needed finite numbers")
-            return np.stack([entries, np.zeros_like(entries)], axis=-1)
-        return double_doubles(entries)
-    return _packed_array(fmt.array(values))
-
-
-def _packed_array(array: FloatArray) -> NDArray[Any]:
-    if not isinstance(array.backend, Compiled):
-        raise OverflowError(
-            f"got numbers beyond the range of the compiled loops of {array.format}; scale the states, or use base 10"
-        )
-    return array.backend.pack(array.components)
-
-
-def _packed(model: LinearModel, fmt: FloatFormat | None) -> list[NDArray[Any]]:
-    """Phi, H, Q, R, x0 and P0 as the compiled loops expect them."""
-    letters = "Phi", "H", "Q", "R", "x0", "P0"
-    if fmt is None:
-        return [double_doubles(getattr(model, letter)) for letter in letters]
-    arrays, packed = model.arrays(fmt), []
-    for letter in letters:
-        try:
-            packed.append(_packed_array(arrays[letter]))
-        except OverflowError as error:
-            raise OverflowError(f"{letter}: {error}") from None
-    return packed
-
-
-_packed_once = lru_cache(maxsize=8)(_packed)
 
 
 def check_compiled(fmt: FloatFormat) -> None:

@@ -307,6 +307,9 @@ class LinearModel:
     def rounded(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
         """Return the model as a computer with this format stores it, with each entry rounded.
 
+        It is the model of the exact filter with which runs in this format are compared. A run itself opens with the model
+        as given, see :mod:`gpbnb.kalman.opening`.
+
         Raises
         ------
         ValueError : a stored covariance is indefinite in spite of :meth:`definite_in`.

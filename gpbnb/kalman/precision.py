@@ -19,8 +19,9 @@ from gpbnb.kalman.array_run import ArrayRun
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import guarantee
+from gpbnb.kalman.guarantee.bound import check_limits, guarantee
 from gpbnb.kalman.guarantee.envelope import Limits
+from gpbnb.kalman.guarantee.gains import check_deterministic
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.inputs import simulated_measurements
 from gpbnb.kalman.missing import without_missing
@@ -115,6 +116,8 @@ def required_precision(
         raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
     if for_ever:
         model.refuse_inputs(f'basis "{basis}"')
+        check_deterministic(like)
+        check_limits(within, model.n, model.m, model.x0)
         if isinstance(form, ArrayForm):
             raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
         if model.steps is not None:

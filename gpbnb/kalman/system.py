@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.guarantee.bound import from_schedule, limits
-from gpbnb.kalman.guarantee.envelope import Limits
+from gpbnb.kalman.guarantee.envelope import Limits, storing_errors
 from gpbnb.kalman.guarantee.gains import pack, widened_array
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
@@ -227,6 +227,11 @@ def required_system_precision(
         if within is None:
             raise ValueError(f'got basis "{basis}" without limits; needed within=limits(..., measurement=...)')
         largest = np.asarray(within.measurement, dtype=np.float64)
+        if largest.shape != (system.m,):
+            raise ValueError(
+                f"got limits of shape {largest.shape} on the measurement; needed ({system.m},), one for each input: "
+                f"write limits({system.n}, {system.m}, measurement=...)"
+            )
     if basis != "emulation" and any(system.x0):
         raise ValueError(f'got a first state {system.x0.tolist()} and basis "{basis}"; needed x0 = 0 for a bound')
     true = system.outputs(u) if basis == "emulation" else None
@@ -264,24 +269,27 @@ def _observed(system: LinearSystem, u: Any, fmt: FloatFormat, true: NDArray[np.f
 def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64], basis: str) -> NDArray[np.float64]:
     """Bound the error of each output, (p,), due to rounding and to storing coefficients and inputs.
 
-    With stored matrices marked by a hat, outputs differ by at most the peak gain of the difference of both systems
-    times the largest input, and the peak gain of the stored system times the errors of the stored inputs.
+    Outputs differ by at most the peak gain of the difference of the given and the stored system times the largest
+    input, and the peak gain of the stored system times the largest error of storing an input, underflow included.
     """
-    A, B, C, D = (
-        cast(NDArray[Any], fmt.array(each).to_fractions()) for each in (system.A, system.B, system.C, system.D)
-    )
-    zero = exact(np.zeros((system.n, system.n), dtype=int))
+    given, n = system.as_filter(), system.n
+    stored, count = given.stored(fmt), (n + system.p) ** 2
+    AC, BD = stored[:count].reshape(n + system.p, -1)[:, :n], stored[count:].reshape(n + system.p, -1)
+    A, B, C, D = AC[:n], BD[:n], AC[n:], BD[n:]
+    zero = exact(np.zeros((n, n), dtype=int))
     both = np.block([[system.A, zero], [zero, A]])
-    beta = float(fmt.unit_roundoff)
     difference = peak_gain(both, np.vstack([system.B, B]), np.hstack([system.C, -C]), system.D - D).high
-    stored = peak_gain(A, B, C, D).high
-    sizes = largest * (1 + beta)
-    unit = exact(np.eye(system.n, dtype=int))
-    state = np.concatenate([peak_gain(A, B, unit).high, stored]) @ sizes * (1 + 2.0**-40)
-    within = limits(system.n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
-    found = from_schedule(system.as_filter().schedule(fmt), within, 1)
+    inputs = peak_gain(A, B, C, D).high
+    storing = storing_errors(fmt, largest)
+    sizes = (largest + storing) * (1 + 2.0**-50)
+    if not np.isfinite(sizes).all():
+        raise ValueError(f"got inputs of up to {largest}; needed inputs within the range of {fmt}")
+    unit = exact(np.eye(n, dtype=int))
+    state = np.concatenate([peak_gain(A, B, unit).high, inputs]) @ sizes * (1 + 2.0**-40)
+    within = limits(n + system.p, system.m, state=state, innovation=sizes, measurement=sizes)
+    found = from_schedule(given.schedule(fmt), within, 1)
     if not found.for_ever:
         raise ValueError(found.why)
     rounding = found.bound if basis != "probable" else 3 * probable_error(found)
-    # two sums of m products in float64, each with an error below 2**-40
-    return np.asarray((rounding[system.n :] + (difference + stored * beta) @ largest) * (1 + 2.0**-40))
+    # sums of m products in float64, with an error below 2**-40
+    return np.asarray((rounding[n:] + difference @ largest + inputs @ storing) * (1 + 2.0**-40))

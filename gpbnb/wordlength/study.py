@@ -206,7 +206,7 @@ def companion_run(
     error, bound : (n,), largest value for each state at the steps of :func:`gpbnb.kalman.filter_run.log_spaced`.
     """
     stored, measured, checkpoint_steps = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
-    run = Run(stored, fmt, form, checkpoint_steps)
+    run = Run(model, fmt, form, checkpoint_steps)
     companion = BoundedRun(stored, None, Form.INNOVATION, checkpoint_steps)
     run.take(measured)
     companion.take(measured.to_fractions())

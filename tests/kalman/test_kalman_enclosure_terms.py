@@ -13,6 +13,7 @@ from exact_terms import Distance, fractions
 from flint import arb, arb_mat, ctx
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee import bound, enclosure, gains
 from gpbnb.kalman.guarantee.enclosure import Enclosed
@@ -455,3 +456,72 @@ def test_the_gain_s_error_in_joseph_s_form(error: F, radius: F, monkeypatch: pyt
     askew = H * wide + (H * wide + H * V * turned + H * wide * turned)
     exactly = 4 * (error * (S + r) * error + error * askew)
     same(found[1] - found[0], exactly, 1e-6)
+
+
+def exact_covariance(V: np.ndarray, H: np.ndarray, R: np.ndarray) -> np.ndarray:
+    """(I - KH)V for any V, symmetric or not."""
+    S = H @ V @ H.T + R
+    return V - V @ H.T @ inverse_of(S) @ H @ V
+
+
+def set_of_covariances(seed: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
+    """A model, the center of a set of covariances, its limits B without symmetry, and errors of the predicted one."""
+    if seed == 0:  # one entry of B moves the right factor, and leaves the left one as it is
+        one, none = np.eye(2), np.zeros((2, 2))
+        model = [exact(each) for each in (one, [[1, 0]], none, [[1]])]
+        return model, one, np.array([[0, 0.25], [0, 0]]), np.array([[2.0**-20, 0], [0, 0]])
+    rng = np.random.default_rng([5, seed])
+    n, m = 3, int(rng.integers(1, 3))
+    G, L = rng.uniform(-1, 1, (n, n)), rng.uniform(-0.3, 0.3, (m, m))
+    numbers = rng.uniform(-0.9, 0.9, (n, n)), rng.uniform(-1, 1, (m, n)), G @ G.T / 8, np.eye(m) + L @ L.T
+    model = [exact(np.round(each * 64) / 64) for each in numbers]
+    center = np.eye(n) + np.round((G + G.T) * 8) / 64
+    return model, center, rng.choice([0, 2.0**-14], (n, n)), rng.choice([0, 2.0**-12], (n, n))
+
+
+@pytest.mark.parametrize("form", enclosure.FORMS)
+@pytest.mark.parametrize("seed", range(12))
+def test_a_set_that_is_not_symmetric_holds_what_a_step_adds(
+    seed: int, form: Form, monkeypatch: pytest.MonkeyPatch, bits: None
+) -> None:
+    """Exactly, for covariances at the corners of the set and of the errors of the predicted one."""
+    (Phi, H, Q, R), center, B, error_V = set_of_covariances(seed)
+    V = Phi @ fractions(center) @ Phi.T + Q
+    HS = H.T @ inverse_of(H @ V @ H.T + R)
+    C = exact(np.eye(len(V))) - V @ HS @ H
+    balls = enclosure._to_matrix
+    size = lambda a: abs(a).astype(float)  # noqa: E731
+    step = enclosure._Phase(
+        (), center, balls(C @ Phi), balls(V @ HS), size(HS), size(Phi.T @ HS @ H @ Phi), balls(C @ V)
+    )
+    restarted, calls = enclosure._restarted, []
+
+    def with_errors(values: Any) -> Any:
+        calls.append(1)
+        if len(calls) == 1:
+            for at in np.ndindex(values.shape):
+                values[at].error = float(error_V[at])
+        return restarted(values)
+
+    monkeypatch.setattr(enclosure, "_restarted", with_errors)
+    model = [enclosure._enclosed(each, 0.0) for each in (Phi, H, Q, R)]
+    found = enclosure._disturbed(form, step, model, B, 0.0)
+    rng, tightest = np.random.default_rng(seed), 0.0
+    for _ in range(20):
+        E, dV = (fractions(each * rng.choice([-1, 1], each.shape)) for each in (B, error_V))
+        after = exact_covariance(Phi @ (fractions(center) + E) @ Phi.T + Q + dV, H, R)
+        added = size(after - exact_covariance(V, H, R) - C @ Phi @ E @ Phi.T @ C.T)
+        assert (added <= found.covariance).all()
+        tightest = max(tightest, float((added[found.covariance > 0] / found.covariance[found.covariance > 0]).max()))
+    assert tightest > 0.3
+
+
+def test_errors_of_powers_are_carried_on_by_covariances_without_symmetry() -> None:
+    rng = np.random.default_rng(8)
+    for _ in range(50):
+        M, B = rng.uniform(-1, 1, (3, 3)), rng.choice([0.0, 1.0], (3, 3))
+        off = rng.choice([0.0, 2.0**-8], (3, 3))
+        most = enclosure._carried(off, B, np.abs(M)) * (1 + 1e-12)
+        for _ in range(10):
+            E, D = B * rng.choice([-1, 1], B.shape), off * rng.choice([-1, 1], off.shape)
+            assert (np.abs((M + D) @ E @ (M + D).T - M @ E @ M.T) <= most + 1e-15).all()

@@ -371,7 +371,7 @@ def test_the_probable_error_is_that_of_independent_roundings() -> None:
 
 
 def test_the_probable_error_of_a_periodic_model_is_the_largest_of_its_steps() -> None:
-    found = guarantee(rolling(), FloatFormat(2, 24), limits(2, 1, state=100, innovation=10))
+    found = guarantee(rolling(), FloatFormat(2, 24), limits(2, 2, state=100, innovation=10))
     each, count = separate_roundings(found), len(found.schedule.program.operations)
     first = found.schedule.first
     F, G = each.F[first:], each.G[first:, :, :count] * each.limits[first:, None, :count] / math.sqrt(3)

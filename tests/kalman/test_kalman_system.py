@@ -86,11 +86,11 @@ def test_units_of_states_inputs_and_outputs_do_not_matter(basis):
 
 
 def test_probable_errors_are_three_standard_deviations():
-    """Of x+ = x/2 + u: the peak gain is 2, and rounding the input of at most 1 adds at most 2u to that."""
+    """Of x+ = x/2 + u: the peak gain is 2, and storing an input of at most 1 in 12 bits is off by at most 2**-13."""
     system, fmt = LinearSystem([["0.5"]], [[1]]), FloatFormat(2, 12)
     found = from_schedule(system.as_filter().schedule(fmt), limits(2, 1, state=[2, 2], innovation=1, measurement=1), 1)
     ratios = dict(required_precision(system, 1, 1e-3, basis="probable", within=limits(2, 1, measurement=1)).tried)
-    assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-12) / 1e-3, rel=1e-3)
+    assert ratios[12] == pytest.approx((3 * probable_error(found)[1] + 2 * 2**-13) / 1e-3, rel=1e-3)
 
 
 def test_only_errors_beyond_float64_are_said_not_to_be_finite():

@@ -99,10 +99,11 @@ def _worth(fmt: Any, row: Any, x: Any, x_exact: Any) -> float:
 
 
 @inner
-def _share(value: float, limit: float) -> float:
-    """Return the size of a value over its limit; zero is within every limit."""
-    size = abs(value)
-    return 0.0 if size == 0.0 else np.inf if limit == 0.0 else size / limit
+def _share(size: float, limit: float) -> float:
+    """Return a size as a share of its limit, which may be zero."""
+    if size == 0.0:
+        return 0.0
+    return size / limit if limit > 0.0 else 1e10
 
 
 @compiled
@@ -181,17 +182,17 @@ def greedy(
                 put(fmt, z, r, c)
                 c_exact = widened(fmt, c)
                 put(exactly, nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
-                excess = max(excess, _share(nu[r, 0], limits.innovation[r]))
-                excess = max(excess, _share(c_exact[0], limits.measurement[r]))
+                excess = max(excess, _share(abs(nu[r, 0]), limits.innovation[r]))
+                excess = max(excess, _share(abs(c_exact[0]), limits.measurement[r]))
             _times(K[at], nu, following)
             for i in range(n):
                 s = doubledouble.add(exactly, load(exactly, predicted, i), load(exactly, following, i))
                 put(exactly, following, i, s)
-                excess = max(excess, _share(s[0], limits.state[i]))
+                excess = max(excess, _share(abs(s[0]), limits.state[i]))
             trial[:] = x
             execute(fmt, operations, outputs, coefficients[at], trial, z, values)
             if excess > 1.0:
-                score = -1e300 * min(excess, 1e8)
+                score = -1e300 * min(excess, 1e7)
             elif k + 1 == steps or not ahead:
                 score = _worth(fmt, rows[k], trial, following)
             else:
@@ -265,7 +266,7 @@ def attack(
     n, m = given.program.n, given.program.m
     by_range = not np.isfinite(found.limits.measurement).all()
     errors, best, best_z, allowed, runs = np.zeros(n), 0.0, np.zeros((steps, m)), True, 0
-    at: tuple[Any, ...] = (0, 0)
+    at: tuple[Any, ...] = ()
     F = closed_loops(given)
     for state in range(n) if states is None else states:
         rows = responses(given, F, state, steps)
@@ -280,10 +281,10 @@ def attack(
                 continue
             errors = np.maximum(errors, np.abs(outcome[2]).max(axis=0))
             reached = shares_of(np.abs(outcome[2]), found.bound)
-            if reached.max() > best:
+            if reached.max() > best or not at:
                 best, best_z, at = float(reached.max()), outcome[1], np.unravel_index(reached.argmax(), reached.shape)
-    ratios = shares_of(errors, found.bound)
-    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(at[1]), int(at[0]) + 1, allowed)
+    ratios, (step, state) = shares_of(errors, found.bound), at or (0, 0)
+    return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(state), int(step) + 1, allowed)
 
 
 def shares_of(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,7 +16,8 @@ sums over all earlier steps.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -33,14 +34,15 @@ from gpbnb.kalman.guarantee.envelope import (
     Disturbances,
     Limits,
     certify,
+    columns,
     disturbances,
     peaks,
     units,
 )
 from gpbnb.kalman.guarantee.gains import Schedule, schedule
 from gpbnb.kalman.guarantee.program import functionals
-from gpbnb.kalman.guarantee.reach import forward, nothing, onward
-from gpbnb.kalman.model import LinearModel
+from gpbnb.kalman.guarantee.reach import forward, nothing, onward, units_of_trace
+from gpbnb.kalman.model import LARGEST_EXPONENT, LinearModel
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
@@ -113,7 +115,45 @@ def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, me
             f"got limits {X} on the state, {V} on the innovation and {Z} on the measurement; needed a finite limit for "
             "each measurement, or for each state and each innovation"
         )
+    least, most = 2.0**-LARGEST_EXPONENT, 2.0**LARGEST_EXPONENT
+    for name, each in (("state", X), ("innovation", V), ("measurement", Z)):
+        if (((each > 0) & (each < least)) | (np.isfinite(each) & (each > most))).any():
+            raise ValueError(
+                f"got a limit {each} on the {name}; needed 0, infinity, or 2**-{LARGEST_EXPONENT} to "
+                f"2**{LARGEST_EXPONENT}, or sums leave the range of float64; scale the model by powers of two"
+            )
     return Limits(X, V, Z)
+
+
+def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] = ()) -> None:
+    """Reject limits that are for another filter, or that the first estimate exceeds.
+
+    Parameters
+    ----------
+    n, m : number of states and of measurements.
+    x0 : (n,), the exact first estimate; the exact filter must be within its limits from the beginning.
+
+    Raises
+    ------
+    TypeError : `within` is not a result of :func:`limits`.
+    ValueError : limits for another number of states or measurements, or a first estimate beyond its limit.
+    """
+    if not isinstance(within, Limits):
+        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
+    for name, size in (("state", n), ("innovation", m), ("measurement", m)):
+        shape = np.shape(getattr(within, name))
+        if shape != (size,):
+            raise ValueError(
+                f"got limits of shape {shape} on the {name}; needed ({size},): this filter has {n} states and {m} "
+                f"measurements, so write limits({n}, {m}, ...)"
+            )
+    limits(n, m, *within)
+    for i, (value, most) in enumerate(zip(x0, within.state, strict=False)):
+        if abs(value) > most:
+            raise ValueError(
+                f"got a first estimate {float(value)!r} of state {i}, beyond its limit {float(most)!r}; needed a first "
+                "estimate within its limit, from which the exact filter starts; raise the limit, or change x0"
+            )
 
 
 def guarantee(
@@ -139,19 +179,30 @@ def guarantee(
     Raises
     ------
     TypeError : `within` is not a result of :func:`limits`, or `fmt` is no format.
-    ValueError : the format has no compiled loops, or a covariance is not definite in it.
+    ValueError : the format has no compiled loops, rounds at random, or a covariance is not definite in it; limits for
+        another filter; a first estimate beyond its limit.
     """
-    if not isinstance(within, Limits):
-        raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
-    return from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
+    check_limits(within, model.n, model.m, model.x0)
+    if model.steps is not None:
+        most, horizon = min(most, model.steps), min(horizon, model.steps)
+    found = from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
+    if model.steps is not None and found.steps in (None, model.steps):
+        found = replace(found, steps=model.steps, why=f"{model.name} describes no more")
+    return found
 
 
 def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget: float = BUDGET) -> Guarantee:
-    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`."""
+    """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`.
+
+    Raises
+    ------
+    TypeError, ValueError : as of :func:`check_limits`.
+    """
     n = given.program.n
+    check_limits(within, n, given.program.m, given.x0)
     why, radius = given.why, _radius(given)
     for_ever = given.settled and radius < 1
     if given.settled and radius >= 1:
@@ -252,7 +303,7 @@ def _window(given: Schedule, columns: int, steps: int, budget: float) -> int:
 
 def _scale(found: Disturbances, radius: float) -> tuple[NDArray[np.float64], float]:
     """Return the largest contribution of a lag, and a negligible one; the proof does not use them."""
-    each = (np.abs(found.G) * np.where(found.G == 0, 0, found.limits[:, None, :])).sum(axis=2) + found.slack
+    each = columns(found).sum(axis=2) + found.slack
     size = each.max(axis=0)
     grown = size / (1 - radius) if radius < 1 else size
     positive = size[size > 0]
@@ -270,11 +321,20 @@ def _sums(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """Return bounds after each step, and their parts; the last rows are those of the period."""
     n, part = given.program.n, _parts_of(given)
-    used = (np.abs(found.G).max(axis=1) * found.limits).max(axis=0) > 0
-    columns = np.ascontiguousarray(found.G[:, :, used]), np.ascontiguousarray(found.limits[:, used])
-    arrays = (found.F, found.spread, *columns, found.slack, part[used])
+    sizes = columns(found)
+    used = (sizes > 0).any(axis=(0, 1))
+    if for_ever and not np.isfinite(sizes).all():  # a number may leave the range of the format
+        return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), most
+    arrays = (
+        found.F,
+        found.spread,
+        np.ascontiguousarray(found.G[:, :, used]),
+        np.ascontiguousarray(found.limits[:, used]),
+        found.slack,
+        part[used],
+    )
     scale, small = _scale(found, _radius(given) if for_ever else math.nan)
-    size = np.where(scale > 0, scale, 1.0)
+    size = units_of_trace(scale)
     window = _window(given, int(used.sum()), given.first if for_ever else steps, budget)
     if not for_ever:
         at = np.arange(steps)

@@ -19,9 +19,10 @@ which needs no symmetry; see :func:`gpbnb.kalman.derivation.contraction`. So the
 by induction. Products of closed loops are float64, with their own rounding errors as further terms. Ball arithmetic
 with a bound for every operation gives the roundings of a step. To keep the balls small, it restarts twice, from the
 computed predicted covariance V and from the computed gain, because later operations undo a part of earlier errors: the
-error of V enters as :math:`C\,\delta V\,C^T` with :math:`C = I - KH`, and that of the gain as :math:`\delta K\,HV` or,
-in Joseph's form and for a symmetric V, :math:`\delta K\,S\,\delta K^T`. In a cycle of several models, each phase has
-its own :math:`P^*` and B.
+error of V enters as :math:`C\,\delta V\,D` with :math:`C = I - KH` and :math:`D = I - H^TS^{-1}HV`, which is
+:math:`C^T` only for a symmetric V, and that of the gain as :math:`\delta K\,HV` or, in Joseph's form,
+:math:`\delta K\,S\,\delta K^T + \delta K(HV - SS^{-T}HV^T)`. In a cycle of several models, each phase has its own
+:math:`P^*` and B. Neither V nor B need be symmetric.
 """
 
 from __future__ import annotations
@@ -283,8 +284,7 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int,
             total = begun[j] + products[-1] @ B[(j - len(residuals)) % cycle] @ products[-1].T
             for lag, (M, after, off) in enumerate(zip(products, products[1:], residuals, strict=False)):
                 at = (j - 1 - lag) % cycle
-                carried = off @ B[at] @ (after + off).T
-                total += M @ W[at] @ M.T + carried + carried.T
+                total += M @ W[at] @ M.T + _carried(off, B[at], after)
             new.append(total * _SUMS)
         if not all(np.isfinite(each).all() for each in new):
             return None
@@ -298,6 +298,12 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int,
     known = [_to_matrix(each) for each in run.exactly(run.G[start - cycle : start])]
     limits = [found[j].gain + _abs(phases[j].K - known[j]) * _SUMS for j in range(cycle)]
     return Enclosure(start, np.array(limits), np.array(B), np.array([phase.center for phase in phases]))
+
+
+def _carried(off: NDArray[np.float64], B: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Bound the effect on M E M' of an error of M within `off`, for |M| = `after` and any E within B, symmetric or not."""
+    whole = after + off
+    return np.asarray(off @ B @ whole.T + whole @ B @ off.T)
 
 
 class _Disturbed(NamedTuple):
@@ -317,10 +323,10 @@ def _disturbed(form: Form, phase: _Phase, given: list[NDArray[Any]], B: NDArray[
     result = updated(form, H, R, V, K, one)
     rounded = np.array([[each.error for each in row] for row in result])
     h, v = _of(H), _of(V)
+    s = h * v * h.transpose() + _of(R)
     identity = arb_mat([[int(i == j) for j in range(n)] for i in range(n)])
-    C = _abs(identity - _of(computed) * h)
+    C, D = _abs(identity - _of(computed) * h), _abs(identity - h.transpose() * s.inv() * h * v)
     if form is Form.JOSEPH:
-        s = h * v * h.transpose() + _of(R)
         askew = h * v - s * s.transpose().inv() * h * v.transpose()  # zero if V is symmetric
         of_gain = error_K @ _abs(s) @ error_K.T + error_K @ _abs(askew)
     else:
@@ -328,9 +334,7 @@ def _disturbed(form: Form, phase: _Phase, given: list[NDArray[Any]], B: NDArray[
     phi = _abs(_of(Phi))
     second = C @ phi @ B @ phase.G @ B @ _abs(phase.loop).T
     moved = phi @ B @ phi.T + error_V
-    return _Disturbed(
-        (rounded + of_gain + C @ error_V @ C.T + second) * _SUMS, (C @ moved @ phase.HS + error_K) * _SUMS
-    )
+    return _Disturbed((rounded + of_gain + C @ error_V @ D + second) * _SUMS, (C @ moved @ phase.HS + error_K) * _SUMS)
 
 
 def _settled(stored: LinearModel, steps: int, unit: float) -> int | None:

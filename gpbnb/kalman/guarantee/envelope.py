@@ -98,6 +98,12 @@ def _largest_error(units: Any, size: float) -> float:
     return np.inf if at >= len(units.powers) else units.errors[at]
 
 
+def storing_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest error of storing a number of at most each size in a format; infinite beyond its range."""
+    table = units(fmt)
+    return np.array([_largest_error(table, float(size)) for size in np.ravel(sizes)]).reshape(np.shape(sizes))
+
+
 @compiled
 def _is_power(units: Any, high: float, low: float) -> bool:
     if high == 0.0:
@@ -140,6 +146,11 @@ class Disturbances(NamedTuple):
     K: NDArray[np.float64]
     loop: NDArray[np.float64]
     gain: NDArray[np.float64]
+
+
+def columns(found: Disturbances) -> NDArray[np.float64]:
+    """Return the largest effect of each column on each state, (steps, n, g), zero for zero times infinity."""
+    return np.abs(found.G) * np.where(found.G == 0, 0.0, found.limits[:, np.newaxis, :])
 
 
 @compiled

@@ -21,6 +21,7 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
+from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.filter_run import Run
@@ -105,6 +106,21 @@ def _decorrelated(fmt: Any, U: Any, H: Any, D: Any) -> None:
                 store(fmt, D[k], (i, j), s)
 
 
+def check_deterministic(fmt: FloatFormat | FixedFormat) -> None:
+    """Reject stochastic rounding of a filter that computes its gain.
+
+    Raises
+    ------
+    ValueError : the format rounds at random.
+    """
+    if fmt.rounding is Rounding.STOCHASTIC:
+        raise ValueError(
+            "got stochastic rounding for a Kalman filter; needed another rounding: its computed gain depends on the "
+            "random numbers, and a covariance that occurs again does not repeat. A LinearSystem, whose coefficients "
+            "are fixed, may round at random"
+        )
+
+
 def schedule(
     model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form | str, most: int = 20_000, horizon: int | None = None
 ) -> Schedule:
@@ -114,16 +130,19 @@ def schedule(
     ----------
     model, fmt, form : as for a run of the filter. The exact filter uses model and measurements as the format stores
         them.
-    most : largest number of steps to try.
+    most : largest number of steps to try. A model with `steps` is continued with the cycles of its matrices.
     horizon : number of steps to return if the gain does not settle; by default all that were tried.
 
     Raises
     ------
-    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it.
+    ValueError : the format or the form has no compiled loops, or a covariance is not definite in it; stochastic
+        rounding.
     """
     form = compiled_form(form)
-    stored = replace(model.rounded(fmt), x0=np.array([Fraction(0)] * model.n, dtype=object))
-    run, repeat, period = _emulated(stored, fmt, form, most)
+    check_deterministic(fmt)
+    stored, nothing = model.rounded(fmt), np.array([Fraction(0)] * model.n, dtype=object)
+    x0, stored = stored.x0, replace(stored, x0=nothing, steps=None)
+    run, repeat, period = _emulated(replace(model, x0=nothing, steps=None), fmt, form, most)
     bad = run.stopped or run.indefinite
     if run.stopped:
         why = f"the computed covariance became singular, or left the range of the backend, at step {run.stopped}"
@@ -155,7 +174,6 @@ def schedule(
     cycle = np.lcm(len(stored.H), len(stored.Phi))
     products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
     HPhi = double_doubles(products)[phases % cycle]
-    x0 = model.rounded(fmt).x0
     coefficients = widened_array(packed)
     enclosed = wide = None
     if enclosure is not None:
@@ -178,18 +196,18 @@ def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int6
 
 
 def _emulated(
-    stored: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
+    model: LinearModel, fmt: FloatFormat | FixedFormat, form: Form, most: int
 ) -> tuple[Run, int | None, int | None]:
     """Return a run that keeps every gain, and the number of steps after which the computed covariance first repeats."""
-    steps = min(most, max(128, 2 * stored.cycle))
+    steps = min(most, max(128, 2 * model.cycle))
     while True:
-        run = Run(stored, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
+        run = Run(model, fmt, form, range(1, steps + 1))  # type: ignore[arg-type]
         start = np.array(run.P)
-        run.take(np.zeros((steps, stored.m)))
+        run.take(np.zeros((steps, model.m)))
         done = run.steps
         seen: dict[tuple[int, bytes], int] = {(0, start.tobytes()): 0}
         for k in range(1, done + 1):
-            key = (k % stored.cycle, (run.C[k - 1] + 0).tobytes())
+            key = (k % model.cycle, (run.C[k - 1] + 0).tobytes())
             if key in seen:
                 return run, seen[key], k - seen[key]
             seen[key] = k

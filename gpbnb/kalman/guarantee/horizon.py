@@ -29,10 +29,19 @@ from gpbnb.kalman.bounded_run import BoundedRun
 from gpbnb.kalman.filter_run import Run
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.gravity_probe_b import YEAR
-from gpbnb.kalman.guarantee.bound import limits
-from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Disturbances, Limits, disturbances, units
-from gpbnb.kalman.guarantee.gains import packed_coefficients, widened_array
-from gpbnb.kalman.guarantee.reach import Reach, forward, nothing
+from gpbnb.kalman.guarantee.bound import check_limits, limits
+from gpbnb.kalman.guarantee.envelope import (
+    GAIN,
+    LOOP,
+    ROUNDING,
+    Disturbances,
+    Limits,
+    columns,
+    disturbances,
+    units,
+)
+from gpbnb.kalman.guarantee.gains import check_deterministic, packed_coefficients, widened_array
+from gpbnb.kalman.guarantee.reach import Reach, forward, nothing, units_of_trace
 from gpbnb.kalman.kernels.step import NEXT_CHECKPOINT
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year_cases import MODELS
@@ -106,12 +115,26 @@ def bounds_in_blocks(
     Raises
     ------
     ArithmeticError : a bound exceeds the assumed error; the filter stopped or a covariance became indefinite.
+    ValueError : stochastic rounding; a model with known inputs, or of fewer steps; limits or assumed errors for another
+        filter; no limits on state and innovation; a first estimate beyond its limit.
     """
+    check_deterministic(fmt)
+    model.refuse_inputs("bounds in blocks")
+    model.check_steps(steps)
     stored = model.rounded(fmt)
+    for limit, error in zip(within, assumed, strict=True):
+        check_limits(limit, model.n, model.m, stored.x0)
+        if not (np.isfinite(limit.state).all() and np.isfinite(limit.innovation).all()):
+            raise ValueError(
+                f"got limits {limit.state} on the state and {limit.innovation} on the innovation; needed finite ones: "
+                "bounds in blocks do not derive them from limits on the measurements"
+            )
+        if np.shape(error) != (model.n,):
+            raise ValueError(f"got assumed errors of shape {np.shape(error)}; needed ({model.n},), one for each state")
     n, m, cycle = stored.n, stored.m, stored.cycle
     block = cycle if block is None else block
     run, true = (
-        Run(stored, fmt, form, range(1, block + 1)),
+        Run(model, fmt, form, range(1, block + 1)),
         BoundedRun(stored, None, Form.INNOVATION, range(1, block + 1)),
     )
     products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
@@ -191,14 +214,14 @@ def _restored(file: Path, run: Run, true: BoundedRun) -> tuple[int, list[_Carrie
 
 
 def _follow(one: _Carried, found: Disturbances, part: NDArray[np.int64], done: int, count: int, window: int) -> None:
-    sizes = np.abs(found.G) * found.limits[:, None, :]
+    sizes = columns(found)
     if one.reach is None:
         one.used = sizes.max(axis=(0, 1)) > 0
-        one.size = np.maximum((sizes.sum(axis=2) + found.slack).max(axis=0), 1e-300)
+        one.size = units_of_trace((sizes.sum(axis=2) + found.slack).max(axis=0))
         one.reach = nothing(window, part[one.used], len(one.last))
     slack = found.slack + sizes[:, :, ~one.used].sum(axis=2) * (1 + 2.0**-40)
-    columns = np.ascontiguousarray(found.G[:, :, one.used]), np.ascontiguousarray(found.limits[:, one.used])
-    bounds, parts = forward(found.F, found.spread, *columns, slack, one.reach, done, count, one.last, one.size)
+    G, limits_of = (np.ascontiguousarray(each[..., one.used]) for each in (found.G, found.limits))
+    bounds, parts = forward(found.F, found.spread, G, limits_of, slack, one.reach, done, count, one.last, one.size)
     bounds = np.where(np.isnan(bounds), np.inf, bounds)
     at = bounds.argmax(axis=0)
     for i, k in enumerate(at):

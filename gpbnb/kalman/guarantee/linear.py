@@ -52,10 +52,22 @@ class LinearFilter:
     def __post_init__(self) -> None:
         checked_name(self.name)
 
+    def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+        """Return the coefficients as a run in a format stores them, exact, (c,).
+
+        Stochastic rounding begins with its first random number, as in a run.
+        """
+        fmt.restart()
+        return np.asarray(fmt.array(self.coefficients).to_fractions(), dtype=object)
+
     def schedule(self, fmt: FloatFormat | FixedFormat) -> Schedule:
-        """Return the filter in a format, for :func:`gpbnb.kalman.guarantee.bound.from_schedule`."""
+        """Return the filter in a format, for :func:`gpbnb.kalman.guarantee.bound.from_schedule`.
+
+        Its coefficients are those of :meth:`stored`, so they are fixed even where the format rounds at random. Each
+        operation is then off by less than a unit in the last place, as with directed rounding.
+        """
         program, first = self.program, self.program.n + self.program.m
-        packed = pack(fmt, self.coefficients.reshape(1, -1))
+        packed = pack(fmt, self.stored(fmt).reshape(1, -1))
         coefficients = widened_array(packed)
         count = first + len(program.operations)
         rows, sizes = np.empty((count, first, 2)), np.empty((count, first))

@@ -37,7 +37,7 @@ from gpbnb.kalman.guarantee.envelope import ROUNDING, START
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
 _TINY = 1e-250
-"""Components below this are dropped; 1e-240 is added to the slack for all components that a step drops."""
+"""Components below this are dropped; 1e-240 is added to the slack of a step that drops any."""
 
 
 class Reach(NamedTuple):
@@ -49,6 +49,11 @@ class Reach(NamedTuple):
     kind: NDArray[np.int64]
     #: (3, n, n), one for each part.
     ellipsoids: NDArray[np.float64]
+
+
+def units_of_trace(scale: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return units of the states for :func:`take_in`, whose squares float64 can divide by; any are valid."""
+    return np.clip(np.where((scale > 0) & np.isfinite(scale), scale, 1.0), 1e-120, 1e120)
 
 
 def nothing(window: int, part: NDArray[np.int64], n: int) -> Reach:
@@ -79,7 +84,7 @@ def forward(
     last = before.copy()
     for k in range(steps):
         number = done + k
-        loop, slot = F[k], number % window
+        loop, slot, dropped = F[k], number % window, 0.0
         if number >= window:
             take_in(segments[slot : slot + 1], kind, ellipsoids, size)
             for p in range(3):
@@ -91,11 +96,13 @@ def forward(
                         s = 0.0
                         for j in range(n):
                             s += loop[i, j] * segments[w, c, j]
-                        moved[i] = s if abs(s) > _TINY else 0.0
+                        moved[i] = s
+                        if s != 0.0 and abs(s) <= _TINY:
+                            moved[i], dropped = 0.0, 1e-240
                     for i in range(n):
                         segments[w, c, i] = moved[i]
         for i in range(n):
-            own = slack[k, i] + 1e-240
+            own = slack[k, i] + dropped
             for j in range(n):
                 own += 2 * spread[k, i, j] * last[j]
             for g in range(g_count):
