@@ -84,7 +84,7 @@ def _reached(model: LinearModel, fmt: FloatFormat, Z: NDArray[np.float64]) -> Li
         true = reference_states(stored, z)[:, :, 0]
     except (ValueError, ArithmeticError):
         return None
-    first = np.abs(stored.x0.astype(np.float64))
+    first = np.maximum(np.abs(stored.x0.astype(np.float64)), np.abs(model.x0.astype(np.float64)))
     innovation = np.abs(innovations(stored, true, z.astype(np.float64)))
     X = np.maximum(np.abs(true).max(axis=0), first)
     return limits(model.n, model.m, state=X * (1 + 2.0**-30), innovation=innovation.max(axis=0) * (1 + 2.0**-30))
