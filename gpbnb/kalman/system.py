@@ -22,7 +22,7 @@ from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.guarantee.bound import from_schedule, limits
-from gpbnb.kalman.guarantee.envelope import Limits, storing_errors
+from gpbnb.kalman.guarantee.envelope import Limits, stored_sizes, storing_errors
 from gpbnb.kalman.guarantee.gains import pack, widened_array
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
@@ -280,9 +280,8 @@ def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64
     both = np.block([[system.A, zero], [zero, A]])
     difference = peak_gain(both, np.vstack([system.B, B]), np.hstack([system.C, -C]), system.D - D).high
     inputs = peak_gain(A, B, C, D).high
-    storing = storing_errors(fmt, largest)
-    sizes = (largest + storing) * (1 + 2.0**-50)
-    if not np.isfinite(sizes).all():
+    storing, sizes = storing_errors(fmt, largest), stored_sizes(fmt, largest)
+    if not np.isfinite(storing).all():
         raise ValueError(f"got inputs of up to {largest}; needed inputs within the range of {fmt}")
     unit = exact(np.eye(n, dtype=int))
     state = np.concatenate([peak_gain(A, B, unit).high, inputs]) @ sizes * (1 + 2.0**-40)

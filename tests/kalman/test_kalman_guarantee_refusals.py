@@ -14,7 +14,7 @@ from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
-from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns, storing_errors
+from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns, stored_sizes, storing_errors
 from gpbnb.kalman.guarantee.gains import schedule
 from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
 from gpbnb.kalman.guarantee.linear import state_space
@@ -277,6 +277,23 @@ def test_the_errors_of_storing_are_those_of_operations(fmt: FloatFormat) -> None
         assert max(errors) <= Fraction(float(most))
         assert max(errors) >= Fraction(float(most)) / 4
     assert (storing_errors(FixedFormat(2, 5), np.array([3.0, 4.0])) == [2.0**-6, np.inf]).all()
+
+
+@pytest.mark.parametrize("rounding", Rounding)
+def test_limits_of_measurements_are_for_those_before_storing(rounding: Rounding) -> None:
+    """Three bits store 0.95 as 1, so that results above 1 occur, whose roundings are twice as large."""
+    fmt, rng = FloatFormat(2, 3, rounding), np.random.default_rng(1)
+    for size in (0.95, 1.0, 3.3, 0.0):
+        (most,) = stored_sizes(fmt, np.array([size]))
+        stored = [abs(float(fmt.round(float(v)))) for v in (*(size * rng.uniform(-1, 1, 500)), *([size, -size] * 9))]
+        assert max(stored) <= most
+        assert most in (size, max(stored)) or rounding is Rounding.STOCHASTIC
+    assert stored_sizes(fmt, np.array([np.inf]))[0] == np.inf
+    assert stored_sizes(FloatFormat(2, 3, rounding, -3, 3), np.array([99.0]))[0] == 99.0
+    system = LinearSystem([["0.5"]], [["1"]]).as_filter()
+    wide, narrow = (from_schedule(system.schedule(fmt), limits(2, 1, measurement=size)) for size in (1.0, 0.95))
+    if rounding in (Rounding.NEAREST, Rounding.EVEN, Rounding.STOCHASTIC):
+        assert np.array_equal(narrow.bound, wide.bound)
 
 
 def test_inputs_beyond_the_range_are_refused() -> None:

@@ -37,6 +37,7 @@ from gpbnb.kalman.guarantee.envelope import (
     columns,
     disturbances,
     peaks,
+    stored_sizes,
     units,
 )
 from gpbnb.kalman.guarantee.gains import Schedule, schedule
@@ -203,6 +204,7 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget:
     """
     n = given.program.n
     check_limits(within, n, given.program.m, given.x0)
+    within = within._replace(measurement=stored_sizes(given.fmt, within.measurement))
     why, radius = given.why, _radius(given)
     for_ever = given.settled and radius < 1
     if given.settled and radius >= 1:

@@ -301,7 +301,7 @@ def _enclose(stored: LinearModel, run: Run, unit: float, form: Form, start: int,
 
 
 def _carried(off: NDArray[np.float64], B: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bound the effect on M E M' of an error of M within `off`, for |M| = `after` and any E within B, symmetric or not."""
+    """Bound the effect of errors of M within `off` on M E M', for |M| = `after` and |E| <= B; B needs no symmetry."""
     whole = after + off
     return np.asarray(off @ B @ whole.T + whole @ B @ off.T)
 

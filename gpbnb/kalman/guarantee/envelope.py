@@ -23,6 +23,8 @@ Everything is float64. Each sum of terms of one sign is enlarged by more than it
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -84,9 +86,9 @@ def units(fmt: FloatFormat | FixedFormat) -> Units:
         exact = [(1.0, 0.0)]
     powers, above = [], []
     for power, error in zip(sizes, errors, strict=True):
-        near, near_error = float(power), float(error)
+        near = float(power)
         powers.append(near if Fraction(near) <= power else np.nextafter(near, 0))
-        above.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
+        above.append(_above(error))
     return Units(np.array(powers), np.array(above), np.array(exact), limits is not None and limits.fixed)
 
 
@@ -102,6 +104,29 @@ def storing_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -
     """Return the largest error of storing a number of at most each size in a format; infinite beyond its range."""
     table = units(fmt)
     return np.array([_largest_error(table, float(size)) for size in np.ravel(sizes)]).reshape(np.shape(sizes))
+
+
+def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest size of a number that was within each size before a format stored it.
+
+    Rounding keeps the order of numbers, so it is that of the stored limit, if this is larger; at random, that of the
+    next number of the format. A limit beyond the range stays as it is.
+    """
+    upwards = replace(fmt, rounding=Rounding.UP) if fmt.rounding is Rounding.STOCHASTIC else fmt
+    found = []
+    for size in np.ravel(sizes):
+        largest = float(size)
+        if np.isfinite(size):
+            with contextlib.suppress(OverflowError):
+                largest = max(largest, *(_above(abs(upwards.round(sign * float(size)))) for sign in (1, -1)))
+        found.append(largest)
+    return np.array(found).reshape(np.shape(sizes))
+
+
+def _above(value: Fraction) -> float:
+    """Return the least float64 that is not below a number."""
+    near = float(value)
+    return near if Fraction(near) >= value else float(np.nextafter(near, np.inf))
 
 
 @compiled

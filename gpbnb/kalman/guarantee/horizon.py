@@ -38,6 +38,7 @@ from gpbnb.kalman.guarantee.envelope import (
     Limits,
     columns,
     disturbances,
+    stored_sizes,
     units,
 )
 from gpbnb.kalman.guarantee.gains import check_deterministic, packed_coefficients, widened_array
@@ -141,7 +142,13 @@ def bounds_in_blocks(
     HPhi, Phi = double_doubles(products), double_doubles(stored.Phi)
     none = np.zeros(n)
     each = [
-        _Carried(w, np.asarray(a, dtype=np.float64), none, none, np.zeros((n, 4)))
+        _Carried(
+            w._replace(measurement=stored_sizes(fmt, w.measurement)),
+            np.asarray(a, dtype=np.float64),
+            none,
+            none,
+            np.zeros((n, 4)),
+        )
         for w, a in zip(within, assumed, strict=True)
     ]
     silence = ((run, fmt.array(np.zeros((block, m)))), (true, np.zeros((block, m))))
