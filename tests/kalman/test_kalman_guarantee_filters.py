@@ -185,7 +185,7 @@ def test_a_run_counts_until_the_exact_filter_leaves_its_limits():
         ([1, 1, -3, 1], [1, 1, 1, 1], 2),  # an innovation of -3.5
         ([1, 1, 1, 1], [1, 1, 1, 1], 4),
     ):
-        columns = (np.array(each, dtype=float)[:, None] for each in (true, z))
+        columns = (np.array(each, dtype=float)[:, None] for each in (true, z, z))
         assert filters.first_outside(drawn, *columns) == steps
 
 

@@ -119,16 +119,22 @@ def errors(drawn: Drawn, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], b
     run = Run(drawn.model, drawn.fmt, drawn.form, ())
     stored = run.exactly(run.pack_measurements(z))[:, :, 0]
     true = reference_states(drawn.stored, stored)
-    at = first_outside(drawn, true[:, :, 0], stored.astype(np.float64))
+    at = first_outside(drawn, true[:, :, 0], stored.astype(np.float64), z)
     x = run.states(z[:at])
     off = x - true[: len(x)]
     return np.asarray(off[..., 0] + off[..., 1]), bool(run.stopped)
 
 
-def first_outside(drawn: Drawn, true: NDArray[np.float64], z: NDArray[np.float64]) -> int:
-    """Return the number of steps after which the exact filter first leaves its limits, or all steps."""
+def first_outside(drawn: Drawn, true: NDArray[np.float64], stored: NDArray[np.float64], z: NDArray[np.float64]) -> int:
+    """Return the number of steps after which the exact filter first leaves its limits, or all steps.
+
+    Parameters
+    ----------
+    true : (steps, n), its estimates.
+    stored, z : (steps, m), measurements as stored, and as given, for which their limits hold.
+    """
     X = drawn.within
-    innovation = innovations(drawn.stored, true, z)
+    innovation = innovations(drawn.stored, true, stored)
     inside = np.ones(len(z), dtype=bool)
     for values, limit in ((true, X.state), (innovation, X.innovation), (z, X.measurement)):
         inside &= (np.abs(values) <= limit).all(axis=1)
@@ -186,8 +192,6 @@ def _rows(found: Guarantee, steps: int) -> NDArray[np.int64]:
     return np.where(k < given.steps, k, given.first + (k - given.first) % max(given.steps - given.first, 1))
 
 
-_BELOW = 1 - 2.0**-50
-"""Factor with which the largest measurement is not rounded to a number beyond its limit."""
 _FACTORS = np.array([[0.999], [0.5], [0.0], [-0.5], [-0.999]])
 
 
@@ -197,10 +201,9 @@ def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> 
     An innovation that takes the state out of its limits is reduced or reversed.
     """
     if drawn.limited == "measurement":
-        return course * drawn.within.measurement * _BELOW
+        return course * drawn.within.measurement
     given, at = found.schedule, _rows(found, len(course))
     X, V, Z = drawn.within
-    Z = Z * _BELOW
     of_state, of_innovation = (np.where(limit > 0, 1 / np.maximum(limit, 1e-300), 1e300) for limit in (X, V))
     x, z = given.x0.astype(np.float64), np.zeros(course.shape)
     for k, share in enumerate(course):

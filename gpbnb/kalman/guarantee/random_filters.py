@@ -59,7 +59,7 @@ def draw(seed: int) -> Drawn:
     # those that a filter reaches, this is the largest part of an error.
     degenerate = "singular" in kind
     limited = LIMITED[int(rng.choice(4, p=(0.2, 0.2, 0.1, 0.5) if degenerate else (0.4, 0.25, 0.1, 0.25)))]
-    Z = np.array([_stored(fmt, 10.0 ** rng.uniform(-2, 3)) for _ in range(m)])
+    Z = 10.0 ** rng.uniform(-2, 3, m)
     X, V = 10.0 ** rng.uniform(-1, 3, n), 10.0 ** rng.uniform(-1, 2.5, m)
     # The first estimate, and the innovation of a first measurement of zero, must be within their limits.
     first = np.abs(model.H[0] @ model.Phi[0] @ model.x0).astype(np.float64)
@@ -101,14 +101,6 @@ def _format(rng: np.random.Generator) -> FloatFormat:
     digit = math.log2(base)
     emin, emax = -int(rng.integers(8, 60) / digit), int(rng.integers(12, 60) / digit)
     return FloatFormat(base, precision, rounding, emin, emax, kind == "subnormal")
-
-
-def _stored(fmt: FloatFormat, value: float) -> float:
-    """Round a limit into the format, so that the largest measurement is a number of the format."""
-    try:
-        return math.nextafter(float(fmt.round(value)), math.inf) or value
-    except OverflowError:
-        return value
 
 
 def _model(rng: np.random.Generator, kind: str, n: int, m: int) -> LinearModel:
