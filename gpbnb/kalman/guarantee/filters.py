@@ -43,6 +43,7 @@ REASONS = (
     "indefinite covariance",
     "gain not settled",
     "unstable loop",
+    "too few digits",
     "exact filter stopped",
     "another",
 )
@@ -114,7 +115,7 @@ def errors(drawn: Drawn, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], b
 
     Raises
     ------
-    OverflowError : a measurement is beyond the range of the format.
+    ArithmeticError : a measurement is beyond the range of the format, or the exact filter needs too many digits.
     """
     run = Run(drawn.model, drawn.fmt, drawn.form, ())
     stored = run.exactly(run.pack_measurements(z))[:, :, 0]
@@ -247,13 +248,14 @@ def examine(
     for kind, z in inputs(given, found, rng):
         try:
             off, ended = errors(given, z)
-        except OverflowError:
-            continue  # a measurement that the format cannot store
+        except ArithmeticError:
+            continue  # the format cannot store a measurement, or the exact filter needs too many digits
         off = off[: found.steps]
         row = row._replace(runs=row.runs + (len(off) > 0), steps=row.steps + len(off), stopped=row.stopped + ended)
         reached = shares_of(np.abs(off).max(axis=0, initial=0.0), smaller * found.bound)
         worst[kind] = max(worst[kind], float(reached.max()))
-    ratios = (f"{worst[kind]:.4g}" for kind in INPUTS)
+    # No rounding may hide that a bound is exceeded.
+    ratios = (f"{worst[kind]:.4g}" if worst[kind] <= 1 else f"{worst[kind]:.17g}" for kind in INPUTS)
     return Row(*row[: -len(INPUTS)], *ratios)  # type: ignore[arg-type]
 
 
@@ -296,6 +298,7 @@ def reason_of(text: str) -> str:
         "singular": "indefinite covariance",
         "settle": "gain not settled",
         "not stable": "unstable loop",
+        "as large as itself": "too few digits",
     }
     return next((name for part, name in known.items() if part in text), "another")
 
