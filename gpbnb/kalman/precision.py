@@ -73,7 +73,8 @@ def required_precision(
         contraction bound of :mod:`gpbnb.kalman.contraction`, which is proved for the arithmetic of this run and
         requires more digits. "guarantee" bounds the error for every measurement sequence within limits, and forever
         (``guarantee``); "probable" takes three standard deviations of the error that independent
-        roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked.
+        roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked. Both
+        assume sums from left to right without fused multiply-add, and refuse stochastic rounding of a Kalman filter.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.kalman.guarantee.bound.limits`.
     emin, emax, subnormal : range of the formats, as of a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
@@ -88,7 +89,8 @@ def required_precision(
     ------
     ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops; more
         or fewer measurements than steps; a model with known inputs, or an ``ArrayForm``, where a basis does not cover
-        them.
+        them; limits for another filter, or that the first estimate exceeds; stochastic rounding with a basis that
+        holds for ever.
     TypeError : another kind of model, or of limits.
     OverflowError : an output of a linear system, or its reference, leaves the range of float64; the entries of a model
         are too large or too small for compiled loops.

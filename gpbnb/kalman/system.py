@@ -22,11 +22,12 @@ from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.search import CHECKED, Search
 from gpbnb.kalman.guarantee.bound import from_schedule, limits
-from gpbnb.kalman.guarantee.envelope import Limits, stored_sizes, storing_errors
+from gpbnb.kalman.guarantee.envelope import Limits
 from gpbnb.kalman.guarantee.gains import pack, widened_array
 from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain, state_space
 from gpbnb.kalman.guarantee.probable import probable_error
 from gpbnb.kalman.guarantee.program import Program, advance
+from gpbnb.kalman.guarantee.storing import stored_sizes, storing_errors
 from gpbnb.kalman.missing import real_numbers
 from gpbnb.kalman.named import checked_name, whole_number
 from gpbnb.kalman.requirement import ANY_BINARY, Basis, Requirement, checked_tolerance, largest_ratio, listed

@@ -12,12 +12,15 @@ import pytest
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.kalman.filter_run import Run, reference_states
 from gpbnb.kalman.forms import Form
+from gpbnb.kalman.guarantee import gains
 from gpbnb.kalman.guarantee.adversary import attack
 from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
-from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns, stored_sizes, storing_errors
+from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns
 from gpbnb.kalman.guarantee.gains import schedule
 from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
 from gpbnb.kalman.guarantee.linear import state_space
+from gpbnb.kalman.guarantee.probable import probable_error
+from gpbnb.kalman.guarantee.storing import stored_sizes, storing_errors
 from gpbnb.kalman.precision import required_precision
 
 FORMAT = FloatFormat(2, 11)
@@ -301,3 +304,48 @@ def test_inputs_beyond_the_range_are_refused() -> None:
     found = required_precision(system, 10, 0.1, basis="guarantee", within=within, emin=-14, emax=15)
     assert found.fmt is None
     assert "needed inputs within the range" in found.why
+
+
+def test_a_filter_whose_roundings_grow_with_its_error_has_no_bound() -> None:
+    """In two bits, the products and sums of a slow filter add more than it forgets."""
+    filter_ = state_space([["0.75", "0.5"], ["-0.5", "0.5"]], [[1], [1]])
+    found = from_schedule(filter_.schedule(FloatFormat(2, 2, Rounding.CHOP)), limits(2, 1, measurement=1))
+    assert found.radius < 1
+    assert not found.for_ever
+    assert found.steps == 0
+    assert "as large as itself" in found.why
+    with pytest.raises(ValueError, match="as large as itself"):
+        probable_error(found)
+
+
+# -- filters that never settle ----------------------------------------------------------------------------------------
+
+
+def test_an_exact_gain_that_does_not_settle_has_its_bounds_for_each_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gains, "_closes", lambda *_: None)
+    for most in (500, 1000):
+        given = schedule(two_states(), FORMAT, Form.INNOVATION, most)
+        assert not given.settled
+        assert len(given.coefficients) == len(given.exact) == len(given.dK) == given.steps
+        found = from_schedule(given, limits(2, 1, measurement=10))
+        assert np.isfinite(found.bound).all()
+
+
+def test_a_covariance_that_grows_for_ever_has_a_bound_for_some_steps() -> None:
+    """Nothing is measured: the exact covariance leaves float64, while saturated fixed point repeats its own."""
+    model, fmt = scalar(Phi=[[200]], H=[[0]]), FixedFormat(8, 4, overflow="saturate")
+    found = guarantee(model, fmt, limits(1, 1, measurement=1), horizon=20)
+    assert (found.steps, found.for_ever) == (20, False)
+    assert "the exact filter leaves the range of float64 at step" in found.why
+    answer = required_precision(model, 5, 0.1, basis="guarantee", within=limits(1, 1, measurement=1))
+    assert answer.fmt is None
+
+
+def test_limits_that_do_not_follow_from_the_measurements_are_infinite() -> None:
+    """An unstable state that is never measured grows with every rounding: no number is infinite times zero."""
+    model = two_states(Phi=[["5/4", 0], ["1/4", "1/3"]], H=[[0, 1]], x0=[1, 0])
+    found = guarantee(model, FloatFormat(2, 5), limits(2, 1, measurement=10), most=2000, horizon=300)
+    assert found.bound[0] > 0
+    drifting = two_states(Phi=[["5/4", 0], [0, "1/3"]], H=[[0, 1]], x0=[1, 0])
+    found = guarantee(drifting, FloatFormat(2, 5), limits(2, 1, measurement=10), most=2000, horizon=300)
+    assert not found.for_ever

@@ -78,7 +78,7 @@ def test_units_of_a_limited_range(rounding: Rounding, subnormal: bool) -> None:
     assert max(error for at, error in most.items() if table.powers[at] <= 0.25) >= least * F(3, 4)
     assert table.powers[-1] == 7
     assert table.errors[-1] == 1 / share
-    assert plain(envelope._largest_error)(table, np.nextafter(7.0, 8)) == np.inf
+    assert plain(envelope.largest_error)(table, np.nextafter(7.0, 8)) == np.inf
 
 
 @pytest.mark.parametrize("rounding", Rounding)
@@ -104,7 +104,7 @@ def test_allowances_of_modules_exceed_roundings_of_float64() -> None:
 
 
 def test_the_error_of_a_result_is_that_of_the_next_power() -> None:
-    largest, table = plain(envelope._largest_error), units(FloatFormat(10, 3))
+    largest, table = plain(envelope.largest_error), units(FloatFormat(10, 3))
     for size, power in ((0.0999, 0.1), (1.0, 1.0), (1.001, 10.0), (10.0, 10.0), (99.0, 100.0)):
         assert largest(table, size) == pytest.approx(power / 2000, rel=1e-15)
     assert largest(table, 0.0) == 0
@@ -393,7 +393,7 @@ MEASUREMENTS = (
 
 def found_disturbances(monkeypatch, fmt, case, caps, unit, up):
     program, C, offsets, Phi, HPhi, K, dK, within, b = case
-    for name in ("_largest_error", "_is_power", "_minus", "_plus_product", "_two_sum", "_two_product", "effects"):
+    for name in ("largest_error", "_is_power", "_minus", "_plus_product", "_two_sum", "_two_product", "effects"):
         monkeypatch.setattr(envelope, name, plain(getattr(envelope, name)))
 
     def functionals(_operations, _coefficients, _first, rows, sizes):

@@ -11,6 +11,17 @@ Let the program of a step compute, with coefficients that are known exactly, the
 where ρ holds the rounding errors of the operations, and the columns of Γ their effects on the result. See
 :func:`gpbnb.kalman.guarantee.derivation.recursion` for the algebra and :mod:`gpbnb.kalman.guarantee.envelope` for the
 sums over all earlier steps.
+
+A guarantee assumes, and checks where it can, that
+
+* the rounding is deterministic; a linear filter with fixed coefficients may also round at random;
+* sums run from left to right, each product and each sum is rounded in the format, and none is fused or compensated: the
+  run is ``Run(model, fmt, form)``, without its further options;
+* the run opens with the model as given, see :mod:`gpbnb.kalman.opening`, and the exact filter has the stored model and
+  the stored measurements;
+* the first estimate, as stored, is within the limits on the state;
+* exponents suffice. With a limited range, underflow is part of the bound, and no bound exists if a number of a step
+  might exceed the largest. A covariance beyond the range ends the emulation.
 """
 
 from __future__ import annotations
@@ -37,12 +48,12 @@ from gpbnb.kalman.guarantee.envelope import (
     columns,
     disturbances,
     peaks,
-    stored_sizes,
     units,
 )
 from gpbnb.kalman.guarantee.gains import Schedule, schedule
 from gpbnb.kalman.guarantee.program import functionals
 from gpbnb.kalman.guarantee.reach import forward, nothing, onward, units_of_trace
+from gpbnb.kalman.guarantee.storing import stored_sizes
 from gpbnb.kalman.model import LARGEST_EXPONENT, LinearModel
 
 PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
@@ -168,10 +179,14 @@ def guarantee(
 ) -> Guarantee:
     """Bound the effect of rounding on the estimates of a Kalman filter, for every admissible measurement sequence.
 
+    The bound is for a run of the model as given, with sums from left to right and no fused multiply-add. Its parts and
+    assumptions are listed in :mod:`gpbnb.kalman.guarantee.bound`.
+
     Parameters
     ----------
-    model, fmt, form : the filter. It is compared with the exact filter of the same stored model and measurements.
-    within : limits on the exact filter, from :func:`limits`.
+    model, fmt, form : the filter. It is compared with the exact filter of the same stored model and measurements. For a
+        model with `steps`, the bound holds for these.
+    within : limits on the exact filter, from :func:`limits`; those on the measurements hold before they are stored.
     most : largest number of steps to emulate until the gain settles.
     horizon : number of steps for which to give a bound if none holds forever.
     budget : approximate number of multiplications for disturbances before the gain settles. A larger budget gives a
@@ -186,7 +201,7 @@ def guarantee(
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
-    check_limits(within, model.n, model.m, model.x0)
+    check_limits(within, model.n, model.m)
     if model.steps is not None:
         most, horizon = min(most, model.steps), min(horizon, model.steps)
     found = from_schedule(schedule(model, fmt, form, most, horizon), within, horizon, budget)
@@ -226,8 +241,10 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget:
     else:
         new = np.full(n, math.inf)
     ended = None if for_ever else (steps if np.isfinite(new).all() else 0)
-    if ended is None and given.fmt.limits is not None and not np.isfinite(new).all():
-        ended, why = 0, f"no bound was found within the range of {given.fmt}: a number may exceed the largest"
+    if ended is None and not np.isfinite(new).all():
+        ended, why = 0, "no bound was found: in this precision, an error causes rounding errors as large as itself"
+        if given.fmt.limits is not None:
+            why = f"no bound was found within the range of {given.fmt}: a number may exceed the largest"
     at = history.argmax(axis=0)
     worst = np.array([parts[at[i], i] for i in range(n)])
     return Guarantee(b if np.isfinite(new).all() else new, ended, why, history, worst, known, given, lags, radius)
@@ -390,6 +407,8 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
     HPhi = np.ascontiguousarray(given.HPhi[..., 0])
     early = steps if not for_ever else given.first + most if given.first or x0.any() else 0
     for _ in range(60):
+        if not all(np.isfinite(each).all() for each in (X, V, given.dK)):
+            break
         limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
         slack = tiny * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
         slack += (tiny * np.abs(found.loop) + found.spread) @ X

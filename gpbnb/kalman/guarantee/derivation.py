@@ -88,6 +88,32 @@ def ellipsoid() -> Derivation:
     )
 
 
+def predicted() -> Derivation:
+    r"""Derive the effect of an error δ of the predicted covariance V, symmetric or not; primes mark transposes.
+
+    With :math:`S = HVH' + R`, K is the gain of V + δ. Both remainders are zero: the first for this gain, the second for
+    the inverse of S. So δ acts with I - KH on the left and with :math:`I - H'S^{-1}HV` on the right.
+    """
+    h, ht, v, r, k, d, inverse = sp.symbols("H H' V R K \\delta S^{-1}", commutative=False)
+    one = sp.S.One
+    c, moved = one - k * h, v + d
+    first = unevaluated(moved * ht - k * unevaluated(h * moved * ht + r))
+    second = unevaluated(unevaluated(h * v * ht + r) * inverse - one)
+    return Derivation(
+        (
+            Step(
+                "the updated covariance of V + δ, less that of V",
+                unevaluated(c) * moved - unevaluated(one - v * ht * inverse * h) * v,
+                together(
+                    unevaluated(c) * d * unevaluated(one - ht * inverse * h * v),
+                    first * inverse * h * v,
+                    k * second * h * v,
+                ),
+            ),
+        )
+    )
+
+
 def joseph() -> Derivation:
     r"""Derive the effect of an error δ of the gain on Joseph's form, for every n and m; primes mark transposes.
 

@@ -1,7 +1,7 @@
 r"""Bound sums over all earlier steps by a certificate that a finite computation can check.
 
-Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` and
-:math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
+Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` with :math:`L \le k`, which may depend
+on k, and :math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
 
 .. math:: c_0 e_k = \sum_{l<L} c_l w_{k-l} + \sum_{l<L} r_l e_{k-l-1} + c_L e_{k-L}.
 
@@ -18,13 +18,18 @@ Disturbances are given as columns: :math:`w_k = \sum_g G_{k,g}\rho_g + s`, :math
 \text{slack}_k`, and :math:`|c w| \le \sum_g |c\,G_g| h_g + |c|\,\text{slack}`, which is smaller than :math:`|c||w|`
 if a disturbance affects several states at once.
 
+The limit of a rounding error follows from the largest size of a result *before* it is rounded: that of its linear
+function of the exact filter, plus what earlier errors and roundings of the step add. The last rounding of a state has
+another limit, the largest error h of a result of size X + b, if that is smaller. It uses the claim for the same step,
+but not in a circle: without this rounding, the certificate gives :math:`|s - x| \le b - h` for the sum s before it, so
+:math:`|s| \le X + b`, and the error of rounding such a number is at most h. The roundings of a step are taken in the
+order of its operations.
+
 Everything is float64. Each sum of terms of one sign is enlarged by more than its own rounding errors.
 """
 
 from __future__ import annotations
 
-import contextlib
-from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -88,45 +93,18 @@ def units(fmt: FloatFormat | FixedFormat) -> Units:
     for power, error in zip(sizes, errors, strict=True):
         near = float(power)
         powers.append(near if Fraction(near) <= power else np.nextafter(near, 0))
-        above.append(_above(error))
+        near_error = float(error)
+        above.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
     return Units(np.array(powers), np.array(above), np.array(exact), limits is not None and limits.fixed)
 
 
 @compiled
-def _largest_error(units: Any, size: float) -> float:
+def largest_error(units: Any, size: float) -> float:
+    """Return the largest error of rounding a number of at most this size."""
     if size == 0.0:
         return 0.0
     at = np.searchsorted(units.powers, size)  # the first power not below
     return np.inf if at >= len(units.powers) else units.errors[at]
-
-
-def storing_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest error of storing a number of at most each size in a format; infinite beyond its range."""
-    table = units(fmt)
-    return np.array([_largest_error(table, float(size)) for size in np.ravel(sizes)]).reshape(np.shape(sizes))
-
-
-def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest size of a number that was within each size before a format stored it.
-
-    Rounding keeps the order of numbers, so it is that of the stored limit, if this is larger; at random, that of the
-    next number of the format. A limit beyond the range stays as it is.
-    """
-    upwards = replace(fmt, rounding=Rounding.UP) if fmt.rounding is Rounding.STOCHASTIC else fmt
-    found = []
-    for size in np.ravel(sizes):
-        largest = float(size)
-        if np.isfinite(size):
-            with contextlib.suppress(OverflowError):
-                largest = max(largest, *(_above(abs(upwards.round(sign * float(size)))) for sign in (1, -1)))
-        found.append(largest)
-    return np.array(found).reshape(np.shape(sizes))
-
-
-def _above(value: Fraction) -> float:
-    """Return the least float64 that is not below a number."""
-    near = float(value)
-    return near if Fraction(near) >= value else float(np.nextafter(near, np.inf))
 
 
 @compiled
@@ -285,7 +263,7 @@ def disturbances(
             size = (size + before + drift[v]) * _UP
             if result_of[v] >= 0:
                 size = min(size, (X[result_of[v]] + b[result_of[v]]) * _UP)
-            h = _largest_error(units, size)
+            h = largest_error(units, size)
             if is_exact and h < np.inf:
                 h = 0.0
             off[v] = (before + h) * _UP

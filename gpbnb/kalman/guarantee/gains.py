@@ -1,8 +1,9 @@
 """Find a filter's coefficients for all time: emulate the covariance until it repeats, and enclose the exact gain.
 
-In t digits, the recursion of the covariance maps a finite set of numbers into itself and does not depend on
-measurements. Once the computed covariance equals, digit for digit, the one a whole number of model cycles earlier,
-everything repeats from then on. This is a proof by exhaustion.
+As long as the rounding is deterministic, a computed covariance and the phase of the model's cycle determine the next
+covariance. The measurements have no influence on it. Once the computed covariance equals, digit for digit, the one a
+whole number of model cycles earlier, everything repeats from then on. With unlimited exponents, nothing forces a
+covariance to occur again; the emulation shows whether one does.
 """
 
 from __future__ import annotations
@@ -159,14 +160,18 @@ def schedule(
     if enclosure is not None:
         repeat, period, why = enclosure.start - stored.cycle, stored.cycle, ""
     if repeat is None or period is None or why:
-        end = end if horizon is None else min(end, horizon)
-        K, dK, settled, first = _exact_gains(stored, end, None, most, fmt)[:4]
         repeat = period = None
+        K, dK, settled, first = _exact_gains(stored, end if horizon is None else min(end, horizon), None, most, fmt)
     else:
-        K, dK, settled, first = _exact_gains(stored, repeat, period, most, fmt)
-        if not settled:
-            why = f"the exact gain did not settle within {len(K)} steps"
+        try:
+            K, dK, settled, first = _exact_gains(stored, repeat, period, most, fmt)
+            why = "" if settled else f"the exact gain did not settle within {len(K)} steps"
+        except ArithmeticError as error:
+            why = str(error)
+            K, dK, settled, first = _exact_gains(stored, end if horizon is None else horizon, None, most, fmt)
     steps = len(K)
+    if not steps:
+        raise ValueError(f"got {model.name} in {fmt}; needed a filter whose first step can be computed exactly")
     rows = _rows(steps, repeat, period)
     program, packed = packed_coefficients(run, rows)
     phases = np.arange(steps)
@@ -291,8 +296,9 @@ def _exact_gains(
     """
     n, m = stored.n, stored.m
     if period is None:
-        run = _bounded_run(stored, repeat)
-        return run.G.reshape(repeat, n, m, 2), run.bounds[1], False, repeat
+        run = _bounded_run(stored, repeat, to_the_end=False)
+        done = run.steps
+        return run.G[:done].reshape(done, n, m, 2), run.bounds[1][:done], False, done
     unit = float(fmt.unit if isinstance(fmt, FixedFormat) else fmt.unit_roundoff)
     steps = repeat + 2 * period
     while True:
@@ -318,14 +324,14 @@ def _exact_gains(
         steps = repeat + (steps - repeat) // period * period
         run = _bounded_run(stored, steps)
         first = steps - period
-    return K, run.bounds[1], False, len(K)
+    return run.G.reshape(run.steps, n, m, 2), run.bounds[1], False, run.steps
 
 
-def _bounded_run(stored: LinearModel, steps: int) -> BoundedRun:
+def _bounded_run(stored: LinearModel, steps: int, to_the_end: bool = True) -> BoundedRun:
     run = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
     run.take(np.zeros((steps, stored.m)))
-    if run.stopped:
-        raise ArithmeticError(f"{stored.name}: the exact filter stopped at step {run.stopped}; scale the model")
+    if run.stopped and to_the_end:
+        raise ArithmeticError(f"the exact filter leaves the range of float64 at step {run.stopped}")
     return run
 
 

@@ -38,11 +38,11 @@ from gpbnb.kalman.guarantee.envelope import (
     Limits,
     columns,
     disturbances,
-    stored_sizes,
     units,
 )
 from gpbnb.kalman.guarantee.gains import check_deterministic, packed_coefficients, widened_array
 from gpbnb.kalman.guarantee.reach import Reach, forward, nothing, units_of_trace
+from gpbnb.kalman.guarantee.storing import stored_sizes
 from gpbnb.kalman.kernels.step import NEXT_CHECKPOINT
 from gpbnb.kalman.model import LinearModel
 from gpbnb.kalman.year_cases import MODELS
