@@ -19,6 +19,8 @@ COMMANDS = {
     "kalman.mission_runs": "compute the years of the mission model again",
     "kalman.guarantee.horizon": "compute the bounds for a year of Gravity Probe B again",
     "kalman.guarantee.survey": "compute the survey of guarantees again",
+    "kalman.guarantee.filters": "compute random Kalman filters against their guarantees again",
+    "kalman.guarantee.scalar": "compute the worst errors of scalar filters again",
     "wordlength.guarantees": "compute the table of guarantees again",
 }
 """Commands, each also available as ``python -m gpbnb.<command>``."""

@@ -93,6 +93,21 @@ OPTIONS = {
             "--output": (".cache/guarantee", "folder for survey.csv"),
         },
     ),
+    "kalman.guarantee.filters": (
+        "random Kalman filters with their guarantees",
+        {
+            "--rows": (3000, "number of filters to compute"),
+            "--processes": (1, "number of processes"),
+            "--output": (".cache/filters", "folder for filters.csv and saved progress"),
+        },
+    ),
+    "kalman.guarantee.scalar": (
+        "worst errors of scalar filters",
+        {
+            "--rows": (500, "number of filters to compute"),
+            "--output": (".cache/scalar", "folder for scalar.csv and saved progress"),
+        },
+    ),
     "wordlength.guarantees": (
         "table of guarantees",
         {
@@ -142,6 +157,8 @@ LISTED = {
     "kalman.mission_runs": "compute the years of the mission model again",
     "kalman.guarantee.horizon": "compute the bounds for a year of Gravity Probe B again",
     "kalman.guarantee.survey": "compute the survey of guarantees again",
+    "kalman.guarantee.filters": "compute random Kalman filters against their guarantees again",
+    "kalman.guarantee.scalar": "compute the worst errors of scalar filters again",
     "wordlength.guarantees": "compute the table of guarantees again",
 }
 

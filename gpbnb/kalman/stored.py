@@ -16,6 +16,7 @@ import numpy as np
 from gpbnb.kalman import ensembles, mission_runs, threshold, year
 from gpbnb.kalman.emulation import emulate
 from gpbnb.kalman.filter_run import Checkpoints, reference
+from gpbnb.kalman.guarantee import filters, scalar
 from gpbnb.kalman.year_cases import CASES, Case, checkpoint_steps, model, simulation
 from gpbnb.sweeps import Sweep
 
@@ -93,5 +94,6 @@ ENSEMBLES: Sweep[int] = Sweep(
 
 def stored() -> tuple[Sweep[Any], ...]:
     """Return all stored sweeps of the chapter."""
-    later: tuple[Sweep[Any], ...] = tuple(each for each in (threshold.SWEEP, mission_runs.SWEEP) if each.file.exists())
+    added: tuple[Sweep[Any], ...] = (threshold.SWEEP, mission_runs.SWEEP, filters.SWEEP, scalar.SWEEP)
+    later = tuple(each for each in added if each.file.exists())
     return (YEAR, ENSEMBLES, *later)

@@ -18,7 +18,7 @@ from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
-from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
+from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
 from gpbnb.kalman.guarantee.bound import Guarantee, closed_loops, unit_disturbances
 from gpbnb.kalman.guarantee.envelope import units
 from gpbnb.kalman.guarantee.gains import Schedule, pack
@@ -59,7 +59,7 @@ def number(fmt: Any, x: Any) -> Any:
 
 @overload(number, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_number(fmt: Any, x: Any) -> Any:
-    if getattr(fmt, "instance_class", None) in (Decimal, ShortDecimal):
+    if getattr(fmt, "instance_class", None) in PAIRS:
         return lambda fmt, x: round_(fmt, _scaled(x))
     return lambda fmt, x: round_(fmt, x)
 
@@ -192,7 +192,7 @@ def greedy(
             trial[:] = x
             execute(fmt, operations, outputs, coefficients[at], trial, z, values)
             if excess > 1.0:
-                score = -1e300 * excess
+                score = -1e300 * min(excess, 1e7)
             elif k + 1 == steps or not ahead:
                 score = _worth(fmt, rows[k], trial, following)
             else:
@@ -280,17 +280,17 @@ def attack(
             if outcome[0]:
                 continue
             errors = np.maximum(errors, np.abs(outcome[2]).max(axis=0))
-            reached = _over(np.abs(outcome[2]), found.bound)
+            reached = shares_of(np.abs(outcome[2]), found.bound)
             if reached.max() > best or not at:
                 best, best_z, at = float(reached.max()), outcome[1], np.unravel_index(reached.argmax(), reached.shape)
-    ratios, (step, state) = _over(errors, found.bound), at or (0, 0)
+    ratios, (step, state) = shares_of(errors, found.bound), at or (0, 0)
     return Attack(errors, float(ratios.max()), ratios, runs, steps, best_z, int(state), int(step) + 1, allowed)
 
 
-def _over(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return errors over their bounds; an error of zero is no share of a bound of zero."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(errors == 0, 0.0, errors / bound)
+def shares_of(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return errors over their bounds; no error is within every bound, and any other beyond a bound of zero."""
+    beyond = np.where(errors == 0, 0.0, np.inf)
+    return np.asarray(np.divide(errors, bound, out=beyond, where=(errors != 0) & (bound != 0)))
 
 
 def ceiling(found: Guarantee, z: NDArray[np.float64], state: int) -> float:
@@ -436,11 +436,12 @@ def _steering(found: Guarantee, center: Any) -> NDArray[np.float64]:
     """Return a regulator whose innovations bring the exact filter to a given state, from transition and gain."""
     given, n, m = found.schedule, found.schedule.program.n, found.schedule.program.m
     Phi, K = given.Phi[-1, :, :, 0], given.exact[-1, :, :, 0]
-    limits = np.where(np.isfinite(found.limits.state), found.limits.state, 1.0)
+    X = found.limits.state
+    limits = np.where(np.isfinite(X) & (X > 0), X, 1.0)
     place = np.zeros(n) if center is None else np.asarray(center, dtype=np.float64)
     # x = p + K nu; a regulator chooses nu to minimize |x - place| / limits over a few steps.
     P = np.diag(limits**-2.0)
-    weight = np.diag(found.limits.innovation**-2.0) * 1e-2
+    weight = np.diag(np.maximum(found.limits.innovation, 1e-150) ** -2.0) * 1e-2
     for _ in range(2000):
         gain = np.linalg.solve(weight + K.T @ P @ K, K.T @ P)
         following = Phi.T @ (P - P @ K @ gain) @ Phi + np.diag(limits**-2.0)

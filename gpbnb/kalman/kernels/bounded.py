@@ -26,7 +26,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     subtract,
     zero,
 )
-from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, ShortDecimal
+from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
 from gpbnb.kalman.forms import Form
 from gpbnb.kalman.kernels.step import decorrelate
 
@@ -59,7 +59,7 @@ def _overloaded_widened(fmt: Any, a: Any) -> Any:
 
     if tag is DoubleDouble:
         return lambda fmt, a: a
-    return of_pair if tag in (Decimal, ShortDecimal) else of_float
+    return of_pair if tag in PAIRS else of_float
 
 
 @compiled
