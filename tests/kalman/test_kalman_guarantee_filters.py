@@ -221,20 +221,11 @@ def test_the_command_fails_where_a_run_exceeds_its_bound(monkeypatch, tmp_path, 
 def test_no_stored_run_exceeds_its_bound():
     rows = filters.load()
     assert sum(row.runs for row in rows) >= 20_000
-    assert [row for row in rows if row.wrong and row.result != "failed"] == []
+    assert [row for row in rows if row.wrong] == []
     (whole,) = {sum(each.runs for each in filters.counts(rows, name)) for name in ("form", "base", "rounding", "kind")}
     assert whole == sum(row.runs for row in rows)
     for name in ("form", "rounding", "kind", "range", "limited"):
-        assert all(each.runs > 1_000 and each.largest > 0.9 for each in filters.counts(rows, name)), name
-
-
-@pytest.mark.xfail(
-    strict=True, reason="where the exact gain does not settle, the tables of its errors are longer than it is"
-)
-def test_no_answer_fails_without_a_reason():
-    """Once this passes, the failed rows of the survey have answers and must be computed again."""
-    failed = [row.seed for row in filters.load() if row.result == "failed"]
-    assert filters.examine(failed[0]).result != "failed"
+        assert all(each.runs > 1_000 and each.largest > 0.8 for each in filters.counts(rows, name)), name
 
 
 # -- scalar filters ---------------------------------------------------------------------------------------------------
