@@ -19,9 +19,9 @@ from gpbnb.ledger.statements import Statement
 # -- title, abstract, figure ----------------------------------------------------------------------
 
 
-@CHECKS.add(MAIN + "stitle.date")
-def date() -> Finding:
-    return given("date and report number of the document")
+@CHECKS.add(MAIN + "stitle.date", MAIN + "stitle.author")
+def title_page() -> Finding:
+    return given("title, author, date and report number of the document")
 
 
 @CHECKS.add(MAIN + "sreference.reference")
@@ -259,9 +259,8 @@ def transition_integral(printed: Statement) -> Finding:
         f"(7) exceeds the printed integral by ${sp.latex(residual)}$: $\\Phi(\\tau)=I+\\int_0^\\tau A\\Phi\\,d\\tau_1$",
         Verdict.MISPRINT,
         otherwise_note="the $I$ is missing, although $\\Phi(0)=I$ is printed beside the equation, and the limits "
-        "are those of $t$, not of $\\tau$; the printed equation has only the solution $\\Phi=0$. (7) "
-        "is right, so nothing depends on the misprint. The scan may have lost the $I$; the wrong "
-        "limits are the author's, since both integrals have them",
+        "are those of $t$, not of $\\tau$; by the printed equation $\\Phi(0)$ would be an integral over nothing, zero. "
+        "(7) is right, so nothing depends on the misprint. Both integrals have the wrong limits",
     )
 
 

@@ -62,7 +62,7 @@ def rate_in_mu(printed: Statement) -> Finding:
             "by $1-\\phi_{11}$"
         ),
         Verdict.MISPRINT if ends else Verdict.WRONG,
-        otherwise_note="the author or the scan has lost the factor $T$, which the third expression has again; "
+        otherwise_note="the factor $T$ is missing, which the third expression has again; "
         f"{if_used('(34)')}; with $T=1$ the misprint has no effect",
     )
 
@@ -180,8 +180,8 @@ def series(printed: Statement) -> Finding:
             "result $\\frac16\\mu$, is right"
         ),
         Verdict.MISPRINT if others else Verdict.WRONG,
-        otherwise_note="the factor 2 in front halves the quadratic term but was not applied to the cubic term, due "
-        "to the author or the scan; the next line drops the cubic term, so nothing depends on it. If "
+        otherwise_note="the factor 2 in front halves the quadratic term but was not applied to the cubic term; "
+        "the next line drops the cubic term, so nothing depends on it. If "
         f"kept, it would add a term ${sp.latex(derivation.printed_37(sp.Rational(1, 6)) - MU / 6)}$ to an odd "
         "function of $\\mu$",
     )

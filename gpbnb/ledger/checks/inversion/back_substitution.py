@@ -35,10 +35,9 @@ def evaluable(printed: Statement) -> Statement:
 
 
 @CHECKS.add(
-    "hung1984.II.eq65",
-    "hung1984.II.eq66",
-    "hung1984.II.eq67",
-    "hung1982.III.eq65-67",
+    *both("eq65"),
+    *both("eq66"),
+    *both("eq67"),
     "hung1984.II.eq69",
     "hung1984.II.eq70",
     "hung1984.II.eq83",

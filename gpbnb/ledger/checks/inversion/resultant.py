@@ -196,7 +196,7 @@ def letter_e(printed: Statement) -> Finding:
         f"that $\\|\\hat A^{{-1}}\\|$ is at least 1, but in the example of 11.4 it is {inverse:.2f}. "
         f"With the bracket of (95) as $E$, (96) says that {error:.1e} is at most "
         f"{inverse * bracket:.1e}",
-        Verdict.OCR if error <= inverse * bracket else Verdict.WRONG,
+        Verdict.MISPRINT if error <= inverse * bracket else Verdict.WRONG,
         otherwise_note="$E$ means the bracket of (95), whose letter this scan does not show; the scan of hung1982 "
         "shows a D below the bracket. As printed, $E$ has two meanings",
     )

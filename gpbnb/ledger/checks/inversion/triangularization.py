@@ -42,10 +42,9 @@ def blocks(printed: Statement) -> Finding:
 
 
 @CHECKS.add(
-    "hung1984.II.eq55",
-    "hung1984.II.eq56",
-    "hung1984.II.eq57",
-    "hung1982.III.eq55-57",
+    *both("eq55"),
+    *both("eq56"),
+    *both("eq57"),
     "hung1984.II.s11-1.a-t-a-n-1",
     "hung1982.III.s11-1.a-t",
 )

@@ -201,6 +201,6 @@ def name_of_the_experiment(printed: Statement) -> Finding:
     return compare(
         printed.claims("the experiment", {"GP-beta": False, "GP-B": True}),
         "GP-B",
-        Verdict.OCR,
+        Verdict.MISPRINT,
         otherwise_note="the scan shows β for B here, and B for β in (122)",
     )

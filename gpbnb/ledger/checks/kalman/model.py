@@ -120,7 +120,7 @@ def unrolled_1982(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
         "the equation gives the estimate only with the term $u_4$",
-        Verdict.OCR,
+        Verdict.MISPRINT,
         otherwise_note="the scan has lost the last term, but the report must contain it: hung1984 prints it, and "
         "(124), which is the same in both reports, counts it",
     )

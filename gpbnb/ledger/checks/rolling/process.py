@@ -222,7 +222,7 @@ def best_phase(printed: Statement) -> Finding:
     return compare(
         _ANGLES[printed.says("angle")] == best and printed.says("demodulation") == name,
         "$\\cos\\theta$ is largest at $\\theta=0$",
-        note="in two dimensions the strength does not depend on θ, but the direction does",
+        note="this is said of the one signal of (1) to (4); for the pair it holds in the channel of each signal",
     )
 
 
@@ -326,7 +326,7 @@ def one_over_t(printed: Statement) -> Finding:
         "halving the roll period divides the density of $1/f$ noise at the roll frequency by "
         f"{long / short:g}; noise with a $1/T$ law would double",
         Verdict.MISPRINT,
-        otherwise_note="T stands for f, due to the author or the scan; all other places have $1/f$",
+        otherwise_note="T stands for f; all other places have $1/f$",
     )
 
 
