@@ -205,6 +205,17 @@ def _entry(record: list[str]) -> Statement:
         raise ValueError(f"got kind {entry.kind!r}; needed one of {', '.join(KINDS)}")
     if not entry.id.startswith(f"{entry.document}."):
         raise ValueError(f"got id {entry.id!r}; needed an id that begins with its document: '{entry.document}.…'")
+    check_text(entry)
+    return entry
+
+
+def check_text(entry: Statement) -> None:
+    """Check that the form of a statement can be read and that its text can be typeset with the parts of the form.
+
+    Raises
+    ------
+    ValueError : it cannot.
+    """
     if entry.text.count("$") % 2 or "$$" in entry.text:
         raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
     for place in _PLACE.findall(entry.text):
@@ -213,8 +224,7 @@ def _entry(record: list[str]) -> Statement:
                 f"got the place {{{{{place}}}}} in text; needed a number up to {len(entry.parts)}, the "
                 "number of parts of the form"
             )
-    _ = entry.parts, entry.printed
-    return entry
+    _ = entry.printed
 
 
 def select(

@@ -91,6 +91,5 @@ def two_ways(printed: Statement) -> Finding:
     ways = [each for each in load_statements() if each.id.startswith("hung1982.II.classification-by-")]
     return compare(
         {"two": 2, "three": 3}[printed.says("ways")] == len(ways),
-        f"the report classifies {' and '.join(each.id.rpartition('-')[2] for each in ways)}: by their statistical nature "
-        "and by their physical form",
+        f"the report classifies by {' and by '.join(each.id.rpartition('-')[2] for each in ways)}",
     )

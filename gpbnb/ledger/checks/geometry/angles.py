@@ -78,8 +78,10 @@ def phi_frame(printed: Statement) -> Finding:
     against = {name: abs(theta_of(phi, np.array([0.0, a, 0.0]) * ARCSEC)[1]) for name, a in (("a", 0.0), ("i", 4.0))}
     # right-handed: a positive rotation of the gyro about y moves its x axis towards -z
     stands = float(rotation(phi)[2, 0])
+    said = printed.says("frame")
+    reversed_signs = said.endswith("(with reversed signs)")
     return compare(
-        bool(abs(against[printed.says("frame")[0]] - phi[1]) < MAS and stands < 0),
+        bool(abs(against[said[0]] - phi[1]) < MAS and (stands > 0) == reversed_signs),
         "for $\\varphi_2$ of 5 arcseconds and a pointing angle of 4 arcseconds, the gyro is turned "
         f"by {against['i'] / ARCSEC:.0f} arcseconds relative to the intermediate frame and by "
         f"{against['a'] / ARCSEC:.0f} relative to the absolute frame, and its axis is at "

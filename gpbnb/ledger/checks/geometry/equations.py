@@ -137,8 +137,8 @@ def estimates(printed: Statement) -> Finding:
         f"{name}_3\\sin2\\omega t+{name}_2\\cos2\\omega t]$, with mean 0 over a roll; correcting it "
         f"takes at least {len(changes[0])} changes of sign, before {' or '.join(sorted(signs))}",
         Verdict.MISPRINT if later_uses_are_right() else Verdict.WRONG,
-        otherwise_note="as the scan shows it, the equation rolls the readings once more instead of derolling them; right "
-        f"is the inverse of (3), $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$, as in (5) to (7). Nothing "
+        otherwise_note="as the scan shows it, the equation rolls the readings once more instead of derolling them; "
+        f"right is the inverse of (3), $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$, as in (5) to (7). Nothing "
         "later uses the printed signs, as (10) to (12) hold for any estimates; but anyone who programs them measures "
         "no drift",
     )

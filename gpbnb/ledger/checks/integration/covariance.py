@@ -42,8 +42,8 @@ def if_used(place: str) -> str:
     values = {MU: sp.Rational(1, 10), T: sp.Rational(1, 100)}
     found, right = (float((e * T).subs(values)) for e in (_misprints()[place], derivation.walk()))
     return (
-        f"if the printed form were used, the rate $\\dot P_{{ee}}$ for $\\mu=0.1$, $T=0.01$ s and $\\sigma_x=1$ would be "
-        f"{found:.4g} instead of {right:.4g} per second"
+        f"if the printed form were used, the rate $\\dot P_{{ee}}$ for $\\mu=0.1$, $T=0.01$ s and $\\sigma_x=1$ would "
+        f"be {found:.4g} instead of {right:.4g} per second"
     )
 
 
@@ -157,8 +157,8 @@ def p32(printed: Statement) -> Finding:
         agrees,
         "the last term must be $\\frac12\\phi_{21}P_{11_{n-1}}T$",
         Verdict.MISPRINT if later_uses_are_right() else Verdict.WRONG,
-        otherwise_note="(16) and (17) give the factor $\\frac12$ and (32) has it again, so nothing later depends on the "
-        f"misprint. Whoever evaluates (18) before the steady state needs the factor; {if_used('(18)')}, which would "
+        otherwise_note="(16) and (17) give the factor $\\frac12$ and (32) has it again, so nothing later depends on "
+        f"the misprint. Whoever evaluates (18) before the steady state needs the factor; {if_used('(18)')}, which would "
         "be a negative variance",
     )
 
@@ -316,6 +316,6 @@ def complete_set(printed: Statement) -> Finding:
         printed.says("set")
         == ("comprise a complete set for evaluating" if complete else "lack an equation for evaluating"),
         f"with the misprints of (18) and (25) corrected, no equation is missing: $P_{{ee_n}}$ is {fit}",
-        note="the initial values $P_{31}=P_{32}=P_{33}=0$ are needed as well, and with the misprints the error is up to "
-        f"{wrong:.2g} times the value",
+        note="the initial values $P_{31}=P_{32}=P_{33}=0$ are needed as well, and with the misprints the error is "
+        f"up to {wrong:.2g} times the value",
     )

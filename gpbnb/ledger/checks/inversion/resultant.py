@@ -189,7 +189,11 @@ def terms_of_96() -> tuple[float, float, float]:
 @CHECKS.add("hung1984.II.s11-3.claim-e-defined")
 def letter_e(printed: Statement) -> Finding:
     error, inverse, bracket = terms_of_96()
-    shown = {"(95)": "E" in statement("hung1984.II.eq95").form, "(36)": error <= inverse * error}
+    shown = {
+        "(95)": "E" in statement("hung1984.II.eq95").form,
+        "(36)": error <= inverse * error,
+        "the bracket of (95)": error <= inverse * bracket,
+    }
     return compare(
         shown[printed.says("place")],
         "the scan defines one $E$ earlier, in (36): the error itself. With this $E$, (96) would say "

@@ -36,18 +36,28 @@ def three_steps(printed: Statement) -> Finding:
     )
 
 
+#: States, measurements, x_0 and inputs for (121). In the first two, each term of (120) has the same sign.
+_SCALARS = (
+    (2, 1, (20, -1, -2, -3)),
+    (3, 2, (30, -5, -1, -4)),
+    (1, 1, (2, 3, 5, 7)),
+    (1, 1, (2, -3, 5, -7)),
+    (1, 1, (-3, 1, 1, 1)),
+)
+
+
 def _instances() -> list[dict[str, Any]]:
-    """Return scalars for (121) with closed loops of 1 and inputs of different sign; the last input makes x_3 zero."""
+    """Return scalars for (121) with closed loops of 1 and inputs of different sign; the last inputs make x_3 zero."""
     found = []
-    for x_0, u_1, u_2, u_3 in ((2, 3, 5, 7), (2, -3, 5, -7), (-3, 1, 1, 1)):
-        values = [Fraction(each) for each in (x_0, u_1, u_2, u_3)]
+    for n, m, numbers in _SCALARS:
+        values = [Fraction(each) for each in numbers]
         counts = [derivation.count_start(derivation.TWICE[0])] + [
             derivation.count_input(*derivation.TWICE).subs(derivation.NTH, i) for i in (1, 2, 3)
         ]
-        at = {derivation.K: 3, derivation.N: 1, derivation.M: 1}
+        at = {derivation.K: 3, derivation.N: n, derivation.M: m}
         error = sum(int(count.subs(at)) * value for count, value in zip(counts, values, strict=True))
         found.append(
-            {"n": 1, "m": 1, "epsilon": 1, "F_3": 1, "F_2": 1, "norm": abs, "x_3": sum(values), "x_tilde_3": error}
+            {"n": n, "m": m, "epsilon": 1, "F_3": 1, "F_2": 1, "norm": abs, "x_3": sum(values), "x_tilde_3": error}
             | {f"u_{i}": values[i] for i in (1, 2, 3)}
         )
     return found
@@ -58,7 +68,8 @@ def norm_with_minus(printed: Statement) -> Finding:
     links = [link for names in _instances() for link in printed.links(names, Fraction)]
     last = links[-1]
     return compare(
-        all(link.symbol == "<=" and link.left <= link.right for link in links),
+        all(link.symbol == "<=" and link.left <= link.right for link in links)
+        and all(link.left == link.right for link in links[:2]),
         f"for $n=m=1$, $F_k=1$, $x_0=-3$ and $u_k=1$, the left side is ${last.left}\\epsilon$ and the "
         f"right side is ${last.right}\\epsilon$",
         otherwise_note=(

@@ -256,8 +256,8 @@ def negligible(printed: Statement) -> Finding:
     lost = theory.off_tuned_loss(worst) * DRIFTS[0]
     return compare(
         printed.says("effect") == ("negligible" if lost < ALLOWED else "not negligible"),
-        f"the one signal that section 4 considers loses at most {lost:.0e} mas of a geodetic drift of {DRIFTS[0]:.0f} mas "
-        f"by the end of the year, and hung1982 allows {ALLOWED} mas for a single error",
+        f"the one signal that section 4 considers loses at most {lost:.0e} mas of a geodetic drift of {DRIFTS[0]:.0f} "
+        f"mas by the end of the year, and hung1982 allows {ALLOWED} mas for a single error",
         note="it does not hold for the pair of signals: there the geodetic drift causes an error of "
         f"{across[0]:.2f} mas a year in the perpendicular direction in the worst case, and {across[1]:.2f} with the "
         "actual rounding error of ω_r",

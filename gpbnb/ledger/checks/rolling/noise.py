@@ -45,9 +45,9 @@ def ramp_density(printed: Statement) -> Finding:
     densities = []
     for cycle in cycles:
         omega = 2 * math.pi * cycle / YEAR
-        names = {"k": 1.0, "omega": omega, "T": YEAR, "phi_SS": lambda omega: 0.0}
+        names = {"k": 3.0, "omega": omega, "T": YEAR, "phi_SS": lambda omega: 0.0}
         densities.append(float(printed.relation().value(names, float)) * YEAR**-2)
-    record = theory.ramp_density(1.0, YEAR, cycles / YEAR)
+    record = theory.ramp_density(3.0, YEAR, cycles / YEAR)
     slopes = [float(np.diff(np.log(d))[0] / np.log(10)) for d in (record, densities)]
     return compare(
         bool(np.all(abs(np.array(densities) / record - 1) < 0.01)),

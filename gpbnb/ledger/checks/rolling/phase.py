@@ -28,8 +28,8 @@ def no_direct_error(printed: Statement) -> Finding:
         "geodetic drift into apparent frame dragging and changes the geodetic drift by "
         f"{cost[0]:.2f}; for an error of one milliarcsecond a year, the roll angle must be known to "
         f"{limit:.0f} arcseconds",
-        otherwise_note="the claim would be true if there were one signal. The experiment has a pair, which a phase error "
-        "mixes: $\\hat s_x=s_x\\cos\\theta-s_y\\sin\\theta$ and $\\hat s_y=s_y\\cos\\theta+s_x\\sin\\theta$",
+        otherwise_note="the claim would be true if there were one signal. The experiment has a pair, which a phase "
+        "error mixes: $\\hat s_x=s_x\\cos\\theta-s_y\\sin\\theta$ and $\\hat s_y=s_y\\cos\\theta+s_x\\sin\\theta$",
         root=ONE_DIMENSION,
     )
 

@@ -91,16 +91,17 @@ def chopping_doubles(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("s3.cross-reference-to-1"))
 def reference_1(printed: Statement) -> Finding:
-    x = Fraction("765.4")
-    _, _, least = FOUR.split(x)
-    forms = [(x / Fraction(10) ** e, Fraction(e)) for e in range(least, least + 3)]
+    forms = []
+    for x in (Fraction(100), Fraction("765.4")):
+        _, _, least = FOUR.split(x)
+        forms += [(x / Fraction(10) ** e, Fraction(e)) for e in range(least, least + 3)]
     names = [{"u": u, "e": e, "b": Fraction(10)} for u, e in forms]
     splits = [each for each in names if abs(each["u"]) >= Fraction(1, 10)]
     by_1, by_2 = (judge(relations(printed), instances) for instances in (names, splits))
     cited = by_2 if printed.says("equation") == "(2)" else by_1
     u, e = forms[-1]
     return compare(
-        cited.holds,
+        cited.right,
         f"(1) alone would allow 765.4 to be written as ${float(u):g}\\times10^{{{e}}}$; the "
         f"inequality then {by_1.count}, but with the condition $|u|\\ge1/b$ below (2) it {by_2.count}",
         Verdict.MISPRINT if by_2.holds else Verdict.WRONG,
@@ -131,9 +132,9 @@ def meaning_of_beta(printed: Statement) -> Finding:
     names = number_names(Fraction("765.4567"))
     absolute = max(abs(each["x_tilde"]) / each["beta"] for each in all_numbers())
     relative = max(each["epsilon"] / each["beta"] for each in all_numbers())
-    agrees = {"absolute bound of": absolute <= 1, "mean of": False}[printed.says("bound")]
+    meanings = {"absolute bound of": absolute <= 1, "mean of": False, "absolute bound of the relative": relative <= 1}
     return compare(
-        agrees,
+        printed.claims("bound", meanings),
         f"the absolute error of 765.4567 is {float(abs(names['x_tilde'])):g}, above "
         f"$\\beta={float(names['beta']):g}$; the largest relative error of all samples is {float(relative):.4f} β",
         Verdict.MISPRINT if relative <= 1 else Verdict.WRONG,
@@ -226,7 +227,7 @@ def example_8_1982(printed: Statement) -> Finding:
 def example_13_parameters(printed: Statement) -> Finding:
     names = _example_names()
     base, exponent = relations(printed)
-    meant = judge([base], [names]).holds and judge([exponent], [{"e": names["t"]}]).holds
+    meant = judge([base], [names]).holds and judge([exponent], [names | {"e": names["t"]}]).holds
     return compare(
         judge(relations(printed), [names]).holds,
         f"the number in the example has $e={names['e']}$; $\\beta_c=10^{{1-4}}$ implies $t={names['t']}$",
@@ -255,7 +256,7 @@ def example_13_1982(printed: Statement) -> Finding:
     return compare(
         rest and judge(found[1:2], [names]).holds,
         f"$e={names['e']}$; {_example_text(names, chopped=True)}",
-        Verdict.MISPRINT if rest and judge(found[1:2], [{"e": names["t"]}]).holds else Verdict.WRONG,
+        Verdict.MISPRINT if rest and judge(found[1:2], [names | {"e": names["t"]}]).holds else Verdict.WRONG,
         otherwise_note="$t=4$ is meant, not $e=4$, which the scan shows as 6 = 4 and hung1984 repeats; the scan has "
         "changed $.7654$, printed in the next line, to $.7650$; the other numbers are right",
     )
