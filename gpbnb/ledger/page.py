@@ -329,7 +329,7 @@ def _evidence(row: Row, note_first: bool = False) -> str:
 def _scan(statement: Statement) -> list[tuple[str, str]]:
     """The characters of the scan where it is damaged, as the class and text of a paragraph."""
     damage = load_legibility().get(statement.id)
-    return [("scan", f"<code>{escape(damage.scan)}</code>")] if damage else []
+    return [("scan", f"<code>{escape(damage.scan).replace('$', '&#36;')}</code>")] if damage else []
 
 
 def _correction(row: Row) -> list[tuple[str, str]]:

@@ -49,7 +49,7 @@ def test_the_norm_of_a_column_is_its_largest_entry_and_of_others_the_largest_col
 
 def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
     assert set(CHECKS) == set(PRINTED)
-    assert len(PRINTED) == 197
+    assert len(PRINTED) == 213
 
 
 def test_each_numbered_equation_has_its_entry():
@@ -64,7 +64,8 @@ def test_each_numbered_equation_has_its_entry():
 
 
 def test_only_what_the_scan_has_lost_has_no_form(rows):
-    lost = {row.statement.id for row in rows if not row.statement.form}
+    told = {"hung1984.II.s10.claim-two-steps", "hung1982.III.s10.claim-two-steps"}  # plans, in words
+    lost = {row.statement.id for row in rows if not row.statement.form} - told
     assert lost == {row.statement.id for row in rows if row.finding.verdict is Verdict.UNVERIFIABLE}
 
 
@@ -75,7 +76,7 @@ def test_verdicts_by_document(rows):
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {
-        "given": 23,
+        "given": 25,
         "verified": 59,
         "misprint": 19,
         "wrong": 13,

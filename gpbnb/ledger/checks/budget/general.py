@@ -26,7 +26,7 @@ from gpbnb.measurement import ARCSEC, MAS
 def contents(printed: Statement) -> Finding:
     entries = [entry for entry in load_statements() if entry.document == "hung1984"]
     return unverifiable(
-        f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries))}",
+        f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries if entry.chapter != '-'))}",
         "the scan has no page numbers and no distribution list",
     )
 

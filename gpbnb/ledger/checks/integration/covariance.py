@@ -158,8 +158,8 @@ def p32(printed: Statement) -> Finding:
         "the last term must be $\\frac12\\phi_{21}P_{11_{n-1}}T$",
         Verdict.MISPRINT if later_uses_are_right() else Verdict.WRONG,
         otherwise_note="(16) and (17) give the factor $\\frac12$ and (32) has it again, so nothing later depends on "
-        f"the misprint. Whoever evaluates (18) before the steady state needs the factor; {if_used('(18)')}, which would "
-        "be a negative variance",
+        f"the misprint. Whoever evaluates (18) before the steady state needs the factor; {if_used('(18)')}, "
+        "which would be a negative variance",
     )
 
 

@@ -69,7 +69,6 @@ def abstract(printed: Statement) -> Finding:
         Verdict.INCONSISTENT,
         otherwise_note="the claim is true only of approximation (39) for small $\\mu$, not of (35); (39) is 1 % too "
         f"large at $\\mu={theory.validity(0.01):.2f}$ and 10 % at {theory.validity(0.1):.2f}",
-        root="abstract-states-small-mu-limit",
     )
 
 

@@ -194,5 +194,4 @@ def product_bound(printed: Statement) -> Finding:
         otherwise_note="the bound is too large by 2β and contradicts the report's own example, $2\\beta$ for "
         "$x_1x_2/y_1$, and hung1982 (20); even so it is not strict: the error for 20 factors of two "
         f"digits can be {exceeded}",
-        root="product-roundings-overcounted",
     )
