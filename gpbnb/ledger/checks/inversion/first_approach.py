@@ -194,8 +194,8 @@ def practicality(printed: Statement) -> Finding:
         ),
         text,
         Verdict.WRONG,
-        otherwise_note="$R$ can easily be obtained: it takes one matrix product with twice the digits. That (43) and (44) "
-        "contain no β is true, because they bound the actual error rather than the largest possible error",
+        otherwise_note="$R$ can easily be obtained: it takes one matrix product with twice the digits. That (43) and "
+        "(44) contain no β is true, because they bound the actual error rather than the largest possible error",
         root="residue-hard-to-obtain",
     )
 
