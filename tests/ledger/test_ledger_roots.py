@@ -1,10 +1,15 @@
 """Root errors: each wrong statement follows from one of them, and each of them makes a statement wrong."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from gpbnb import ledger
 from gpbnb.ledger import counts, load_roots
 from gpbnb.ledger.finding import Verdict
+
+ERRATA = Path(__file__).resolve().parents[2] / "book" / "errata.md"
 
 
 @pytest.fixture(scope="module")
@@ -22,5 +27,11 @@ def test_each_root_error_makes_a_statement_wrong(rows):
     assert wrong == set(load_roots())
 
 
-def test_the_verdicts_add_up_to_the_statements(rows):
-    assert sum(counts(rows).values()) == len(rows)
+def test_the_counts_of_the_errata_add_up_to_the_statements(rows):
+    """The list at the top of the page has each verdict once, so its counts add up to the number of statements."""
+    first, _, _ = ERRATA.read_text(encoding="utf-8").partition("\n## ")
+    named = re.findall(r"\{ledger-count\}`([^`]+)`", first)
+    verdicts = [name for name in named if name not in ("statements", "roots")]
+    found = counts(rows)
+    assert sorted(verdicts) == sorted(found)
+    assert sum(found[name] for name in verdicts) == len(rows)

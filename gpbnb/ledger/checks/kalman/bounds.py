@@ -115,7 +115,7 @@ def assumptions(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(*both("eq122"), "hung1984.II.eq124", "hung1984.II.eq125", "hung1982.III.eq124-125")
+@CHECKS.add(*both("eq122"), *both("eq124"), *both("eq125"))
 def norm_bounds(printed: Statement) -> Finding:
     return _several_steps(printed, algebra.norms(), _NO_BOUND + _BETA)
 

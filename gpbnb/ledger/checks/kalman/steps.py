@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import sympy as sp
 
-from gpbnb.kalman import derivation, smallest
+from gpbnb.kalman import derivation, exact_step, report_bounds, smallest
 from gpbnb.ledger.checks.kalman import algebra, worst_case
 from gpbnb.ledger.checks.kalman.judging import bounded
 from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR
@@ -17,8 +17,9 @@ from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 
 #: Root errors; see roots.csv.
-PRODUCT, EXACT_GAIN, SIGNS, TWICE = (
+PRODUCT, DROPPED, EXACT_GAIN, SIGNS, TWICE = (
     "product-error-relative-to-product",
+    "earlier-covariance-error-dropped",
     "gain-taken-as-exact",
     "one-signed-epsilon",
     "roundings-counted-twice",
@@ -29,16 +30,42 @@ _CANCELS = (
 )
 
 
-@CHECKS.add(*both("eq102"), *both("eq103"))
+@cache
+def dropped_error() -> tuple[float, float]:
+    """Return what the error of P_{k-1} makes of (103), and of the growth of (125) when k is doubled.
+
+    The first is the error of P_kp in the second step of a filter with one state, over (2n + 1)β P_kp. One state has no
+    sums that could cancel, so this error comes from the first step alone.
+    """
+    case = smallest.scalar(FOUR)
+    _, _, rounded = smallest.rounded_step(FOUR, case, second=True)
+    true = exact_step.exact_step(*case).P
+    allowed = FOUR.unit_roundoff * report_bounds.prediction_count(1) * (true + case.Q)
+    k, n, m = report_bounds.EXAMPLE
+    growth = [report_bounds.coefficients(i * k, n, m, **report_bounds.ALL_CORRECTED).second for i in (1, 2)]
+    return float((abs(rounded - true) / allowed)[0, 0]), growth[1] / growth[0]
+
+
+def _prediction(printed: Statement, note: str, root: str) -> Finding:
+    instances = (*worst_case.one_step(), *worst_case.tight_prediction())
+    return bounded(printed, instances, algebra.prediction(), note, root)
+
+
+@CHECKS.add(*both("eq102"))
 def rounded_prediction(printed: Statement) -> Finding:
-    return bounded(
+    times, growth = dropped_error()
+    return _prediction(
         printed,
-        (*worst_case.one_step(), *worst_case.tight_prediction()),
-        algebra.prediction(),
-        f"{_CANCELS}; the inequality in (103) also assumes that $\\epsilon$ is positive, and it omits "
-        "the error of $P_{k-1}$ from earlier steps",
-        PRODUCT,
+        "$P_{k-1}$ stands here without a hat, so the error that earlier steps left in it is dropped. With one state it "
+        f"makes the error of $P_{{kp}}$ {times:.3g} times $(2n+1)\\beta P_{{kp}}$ in the second step. Carried on, "
+        f"it lets the bound grow as $k^3$: twice as many steps multiply it by {growth:.2g}. Also, {_CANCELS}",
+        DROPPED,
     )
+
+
+@CHECKS.add(*both("eq103"))
+def error_of_the_prediction(printed: Statement) -> Finding:
+    return _prediction(printed, f"{_CANCELS}; the inequality also assumes that $\\epsilon$ is positive", PRODUCT)
 
 
 def _covariance(printed: Statement, note: str, root: str, otherwise: str) -> Finding:
