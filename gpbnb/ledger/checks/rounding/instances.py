@@ -83,20 +83,23 @@ def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bo
     Parameters
     ----------
     found : printed relations.
-    instances : the values of their names.
+    instances : the values of their names; where ``tight`` is true, the first bound must be attained.
     first_order : whether differences of second order are allowed; ``≈`` always allows them.
     """
     found = tuple(found)
     count = violated = 0
     attained: dict[int, bool] = {}
+    missed: set[int] = set()
     for names in instances:
         links = [link for relation in found for link in relation.links(names, number=lambda q: q)]
         count += 1
         violated += not all(link_holds(link, first_order) for link in links)
-        for i, link in enumerate(links):
-            if link.symbol not in ("==", "≈"):
-                attained[i] = attained.get(i, False) or _attains(link)
-    return Judgement(count, violated, tuple(i for i, reached in attained.items() if not reached))
+        bounds = {i: _attains(link) for i, link in enumerate(links) if link.symbol not in ("==", "≈")}
+        for i, reached in bounds.items():
+            attained[i] = attained.get(i, False) or reached
+        if names.get("tight") and bounds and not bounds[min(bounds)]:
+            missed.add(min(bounds))
+    return Judgement(count, violated, tuple(i for i, reached in attained.items() if not reached or i in missed))
 
 
 def link_holds(link: Link, first_order: bool = False) -> bool:
