@@ -293,11 +293,16 @@ def first_form_1982(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.eq89-factored-form")
 def factored_1982(printed: Statement) -> Finding:
-    positive = [names for names in general() if names["epsilon"] == EPSILON]
+    shown = evaluable(printed)
+    counted = holds(shown, [names for names in general() if names["epsilon"] == EPSILON])
     return compare(
-        holds(evaluable(printed), positive),
-        "the weights are those of (87), with β in place of $\\epsilon$",
-        note="the equation holds for absolute values, with $|A_D|$",
+        holds(shown, general()),
+        "the weights are those of (87), but β stands for $\\epsilon$, so the equation fails where "
+        "$\\epsilon$ is negative; $|\\Delta A|\\le|A_D|M_A\\beta$ holds",
+        Verdict.WRONG if counted else Verdict.INCONSISTENT,
+        otherwise_note="this is the step for which (49), (52)–(54), (59) and (60) are wrong; hung1984 has "
+        "neither β nor $\\epsilon$ there",
+        root=ONE_EPSILON,
     )
 
 
