@@ -320,7 +320,7 @@ def square(x: FirstOrder) -> Named:
 def substitutions(n: int) -> tuple[Names, ...]:
     """Return symbols of section 11.2 for random triangular systems of n rows; k and j are the indices of some entry."""
     found = []
-    for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1))):
+    for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1), (1, 3, Fraction(1, 2)))):
         rng = random.Random(7000 + 10 * n + seed)
         upper = np.triu(random_matrix(rng, n, n)) + Fraction(0)
         right = random_matrix(rng, n, 1)

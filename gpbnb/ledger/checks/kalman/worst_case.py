@@ -19,19 +19,8 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
 from gpbnb.kalman import report_bounds, smallest
 from gpbnb.ledger.checks.inversion.first_order import FirstOrder
 from gpbnb.ledger.checks.kalman.registry import FOUR
-from gpbnb.ledger.checks.kalman.rounded import (
-    Matrix,
-    Step,
-    largest,
-    predict,
-    product,
-    reduce,
-    rounded,
-    second_gain,
-    take,
-    tracked,
-    update,
-)
+from gpbnb.ledger.checks.kalman.rounded import Step, predict, reduce, second_gain, take, update
+from gpbnb.ledger.tracked import Matrix, largest, product, rounded, tracked
 
 Names = dict[str, Any]
 
