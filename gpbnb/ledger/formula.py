@@ -122,6 +122,12 @@ class Relation:
         nodes = (tree.left, *tree.comparators) if isinstance(tree, ast.Compare) else (tree,)
         return tuple(Relation(ast.get_source_segment(text, node) or "") for node in nodes)
 
+    @property
+    def equates(self) -> bool:
+        """Whether each comparison is = or ≈."""
+        tree = self.tree
+        return isinstance(tree, ast.Compare) and all(isinstance(op, ast.Eq | ast.Is) for op in tree.ops)
+
     def terms(
         self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
     ) -> tuple[Any, ...]:

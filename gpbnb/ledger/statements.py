@@ -69,6 +69,11 @@ class Statement:
             raise LookupError(f"got relation number {number} of {self.id}; needed a number from 1 to {len(relations)}")
         return relations[number - 1]
 
+    @property
+    def equates(self) -> bool:
+        """Whether each comparison of each relation is = or ≈."""
+        return all(part.equates for part in self.parts if isinstance(part, Relation))
+
     def links(
         self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
     ) -> tuple[Link, ...]:

@@ -11,6 +11,9 @@ from functools import lru_cache
 from gpbnb.ledger.formula import Number, Part, Relation, Words
 from gpbnb.ledger.statements import Statement
 
+COMPARISON = "comparison"
+"""Begins the name of an alteration that exchanges = with ≠, or makes an inequality an equation."""
+_OTHER = {ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.LtE: ast.Eq, ast.GtE: ast.Eq, ast.Lt: ast.Eq, ast.Gt: ast.Eq}
 _OPPOSITE = {ast.LtE: ast.GtE, ast.GtE: ast.LtE, ast.Lt: ast.GtE, ast.Gt: ast.LtE}
 
 
@@ -105,9 +108,11 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield "function", ast.Call(ast.Name("cos" if name == "sin" else "sin", ast.Load()), arguments, [])
         case ast.Compare(left=left, ops=ops, comparators=rights):
             for i, op in enumerate(ops):
-                if type(op) in _OPPOSITE:
-                    name = "direction" if i == 0 else f"direction {i + 1}"
-                    yield name, ast.Compare(left, [*ops[:i], _OPPOSITE[type(op)](), *ops[i + 1 :]], rights)
+                place = "" if i == 0 else f" {i + 1}"
+                for name, others in (("direction", _OPPOSITE), (COMPARISON, _OTHER)):
+                    if type(op) in others:
+                        other = others[type(op)]()
+                        yield f"{name}{place}", ast.Compare(left, [*ops[:i], other, *ops[i + 1 :]], rights)
 
 
 def _with(tree: ast.AST, place: ast.AST, new: ast.AST) -> str:

@@ -188,7 +188,12 @@ def matrices(printed: Statement) -> Finding:
     x1, x2, n1, w = sp.symbols("x_1 x_2 n_p1 omega_bw")
     x, a, noise = (printed.relation(k).value({"matrix": sp.Matrix}) for k in (1, 2, 3))
     rates = sp.Matrix([-w * x1 + n1, x1])  # (1)
-    agrees = x == sp.Matrix([x1, x2]) and vanishes(a - rates.jacobian(x)) and vanishes(rates - a * x - noise)
+    agrees = (
+        printed.equates
+        and x == sp.Matrix([x1, x2])
+        and vanishes(a - rates.jacobian(x))
+        and vanishes(rates - a * x - noise)
+    )
     return compare(
         bool(agrees),
         (

@@ -167,6 +167,8 @@ _LESS = {"<=": operator.le, "<": operator.lt}
 
 def _piecewise(diagonal: Relation | None, off: Relation, where: Relation) -> bool:
     """Whether a formula with index ranges gives every entry its true value exactly once, and names no other entries."""
+    if not all(rule.equates for rule in (diagonal, off) if rule):
+        return False
     for names in general():
         n = int(names["n"])
         for k, j in itertools.product(range(2 * n + 2), repeat=2):

@@ -15,6 +15,7 @@ from gpbnb.ledger.statements import Statement
 Names = Mapping[str, Any]
 SYMBOLS: dict[str, Callable[[Any, Any], Any]] = {
     "==": operator.eq,
+    "!=": operator.ne,
     "≈": operator.eq,  # to first order
     "<=": operator.le,
     ">=": lambda a, b: b <= a,

@@ -113,7 +113,9 @@ def omega_r(printed: Statement) -> Finding:
     names = {"omega_r": float(rate), "T": PERIOD, "pi": math.pi}
     (link,) = printed.links(names, float)
     return compare(
-        math.isclose(link.left, link.right) and prints_as(rate, printed.number("omega_r").literal, *PRINTED),
+        printed.equates
+        and math.isclose(link.left, link.right)
+        and prints_as(rate, printed.number("omega_r").literal, *PRINTED),
         f"${float(rate) * 10:.7f}\\times10^{{-1}}$",
     )
 
@@ -124,7 +126,8 @@ def delta_omega_1(printed: Statement) -> Finding:
     first, second = printed.links({"Deltaomega": worst}, Fraction)
     real = experiment.rounded_rate_error(PERIOD, SIX)
     return compare(
-        first.left == first.right == second.right == second.left
+        printed.equates
+        and first.left == first.right == second.right == second.left
         and math.isclose(worst, theory.worst_rate_error(PERIOD, SIX)),
         f"half a unit of the sixth place is {scientific(float(worst), 2)} rad/s",
         note=f"this is the worst case; the actual rounding error of ω_r is {scientific(real, 4)} rad/s",
@@ -137,7 +140,9 @@ def period_1(printed: Statement) -> Finding:
     period = 2 * math.pi / offset
     (link,) = printed.links({"T_Deltaomega": period, "Deltaomega": offset, "pi": math.pi}, float)
     return compare(
-        math.isclose(link.left, link.right) and prints_as(period, printed.number("period").literal, *PRINTED),
+        printed.equates
+        and math.isclose(link.left, link.right)
+        and prints_as(period, printed.number("period").literal, *PRINTED),
         f"{scientific(period, 5)} s",
     )
 
@@ -167,7 +172,8 @@ def s_to_zero(printed: Statement) -> Finding:
     first, _ = printed.links({"t": 0.0, "s": lambda t: 1.0, "s_hat": lambda t: start}, float)
     _, second = printed.links({"t": YEAR, "s": lambda t: 1.0, "s_hat": lambda t: end}, float)
     return compare(
-        printed.number("cosine at the start").value == 2 * start
+        printed.equates
+        and printed.number("cosine at the start").value == 2 * start
         and math.isclose(first.left, first.right)
         and abs(second.left - second.right) < 0.01,
         f"by (11), the signal falls from {start:g} s to {end:.3f} s",
@@ -199,7 +205,7 @@ def delta_omega_2(printed: Statement) -> Finding:
     links = printed.links({"Deltaomega": worst}, Fraction)
     left, right = links[0].right, links[-1].right
     return compare(
-        left == worst == right and math.isclose(worst, theory.worst_rate_error(PERIOD, TEN)),
+        printed.equates and left == worst == right and math.isclose(worst, theory.worst_rate_error(PERIOD, TEN)),
         f"{scientific(float(worst), 2)} rad/s; the left side is {scientific(float(left), 2)}, the right side "
         f"{scientific(float(right), 2)}",
         Verdict.MISPRINT if right == worst else Verdict.WRONG,
@@ -236,7 +242,9 @@ def cosine_2(printed: Statement) -> Finding:
     (bare,) = printed.links({"cos": float, "pi": math.pi}, float)
     years = round(2 * math.pi / float(half_unit(TEN)) / YEAR, -4)
     return compare(
-        math.isclose(2 * math.pi / bare.left, years) and prints_side(link.left, printed.relation(), *PRINTED),
+        printed.equates
+        and math.isclose(2 * math.pi / bare.left, years)
+        and prints_side(link.left, printed.relation(), *PRINTED),
         f"{math.cos(2 * math.pi / years):.11f}",
         note="the printed number is chopped to nine digits",
     )

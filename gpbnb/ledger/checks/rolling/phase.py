@@ -89,7 +89,9 @@ def printed_cosine(printed: Statement) -> Finding:
     (link,) = printed.links()
     cosine = math.cos(math.radians(1))
     return compare(
-        prints_side(float(link.left), printed.relation(), *PRINTED) and prints_as(cosine, ".9998", *PRINTED),
+        printed.equates
+        and prints_side(float(link.left), printed.relation(), *PRINTED)
+        and prints_as(cosine, ".9998", *PRINTED),
         f"$1-.9998^2={1 - 0.9998**2:.8f}$; $\\cos1°={cosine:.6f}$",
         note=f"the unrounded cosine gives {1 - cosine**2:.4f}",
     )

@@ -112,6 +112,8 @@ def link_holds(link: Link, first_order: bool = False) -> bool:
     match link.symbol:
         case "==" | "≈":
             return bool(np.all(abs(difference) <= slack))
+        case "!=":
+            return bool(np.any(abs(difference) > slack))
         case "<=" | "<":
             return bool(np.all(difference <= slack)) and (link.symbol == "<=" or bool(np.all(difference < slack)))
         case _:

@@ -32,7 +32,7 @@ def split_is_printed(relation: Relation, names: Names) -> bool:
     """Whether the terms of a printed number ``x = .1234e2 + .56e-2`` are those of its split (2)."""
     b, t, e = names["b"], names["t"], names["e"]
     terms = relation.terms(names, number=lambda q: q)
-    return terms == (names["u"] * b**e, names["v"] * b ** (e - t))
+    return relation.equates and terms == (names["u"] * b**e, names["v"] * b ** (e - t))
 
 
 @CHECKS.add(*both("eq1"))
