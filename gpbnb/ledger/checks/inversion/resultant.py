@@ -7,7 +7,6 @@ from functools import cache
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.inversion import derivation, experiment, procedure, theory
-from gpbnb.ledger.checks.inversion.back_substitution import evaluable
 from gpbnb.ledger.checks.inversion.environments import factored_errors, inverses
 from gpbnb.ledger.checks.inversion.judging import corrected, holds, says, slip
 from gpbnb.ledger.checks.inversion.registry import CHECKS
@@ -114,7 +113,7 @@ def resultant_error(printed: Statement) -> Finding:
 @CHECKS.add("hung1984.II.eq95")
 def resultant_errors(printed: Statement) -> Finding:
     return compare(
-        holds(evaluable(printed), inverses()),
+        holds(printed, inverses()),
         "each column is (94), which is right to first order",
         note="the equation needs the $\\delta A$ and $\\delta b_j$ of the system that was solved",
     )
@@ -159,9 +158,10 @@ def error_norm(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.eq95-97")
 def error_norm_1982(printed: Statement) -> Finding:
-    columns, norm = evaluable(printed).form.split("; ")
+    *columns, norm = (part.text for part in printed.parts)
     return compare(
-        holds(corrected(printed, columns), inverses()) and holds(corrected(printed, norm), factored_errors()),
+        holds(corrected(printed, "; ".join(columns)), inverses())
+        and holds(corrected(printed, norm), factored_errors()),
         ("(95) holds to first order, and (96) follows from it, with equality where $\\hat A$ is a multiple of $I$"),
         note=FOLLOWS + exceeded() + ". In (97) the scan does not show the sign before $\\|D\\|$",
     )
