@@ -8,7 +8,7 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
-from gpbnb.ledger.formula import Number, Part, Relation, Words
+from gpbnb.ledger.formula import Number, Part, Relation, Words, has_dotted_matrix
 from gpbnb.ledger.statements import Statement
 
 COMPARISON = "comparison"
@@ -34,7 +34,7 @@ def _of_part(part: Part) -> Iterator[tuple[str, str]]:
             for name, literal in _of_literal(part.literal):
                 yield name, replace(part, literal=literal).text
         case Relation():
-            if not any(isinstance(node, ast.Constant) and node.value is Ellipsis for node in ast.walk(part.tree)):
+            if not has_dotted_matrix(part):
                 yield from _of_relation(part)
 
 
@@ -57,7 +57,7 @@ def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
     """The usual alterations; where they are few, dropped factors and the opposite sign as well."""
     usual = dict(_usual(relation))
     yield from usual.items()
-    if len(usual) < 3:
+    if sum(COMPARISON not in name for name in usual) < 3:
         tree = relation.tree
         for k, node in enumerate(ast.walk(tree)):
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):

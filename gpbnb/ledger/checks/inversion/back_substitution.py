@@ -18,7 +18,7 @@ from gpbnb.ledger.checks.inversion.registry import CHECKS
 from gpbnb.ledger.checks.inversion.samples import of_example, samples
 from gpbnb.ledger.checks.inversion.triangularization import ONE_EPSILON
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
-from gpbnb.ledger.formula import Relation
+from gpbnb.ledger.formula import Relation, has_dotted_matrix
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement
 
@@ -30,8 +30,8 @@ def general() -> tuple[Names, ...]:
 
 
 def evaluable(printed: Statement) -> Statement:
-    """Return the statement without the relations that contain dots."""
-    return corrected(printed, "; ".join(part.text for part in printed.parts if "..." not in part.text))
+    """Return the statement without matrices that contain dots, which cannot be evaluated."""
+    return corrected(printed, "; ".join(part.text for part in printed.parts if not has_dotted_matrix(part)))
 
 
 @CHECKS.add(

@@ -7,7 +7,6 @@ from functools import cache
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.inversion import derivation, experiment, procedure, theory
-from gpbnb.ledger.checks.inversion.back_substitution import evaluable
 from gpbnb.ledger.checks.inversion.environments import factored_errors, inverses
 from gpbnb.ledger.checks.inversion.judging import corrected, holds, says, slip
 from gpbnb.ledger.checks.inversion.registry import CHECKS
@@ -114,7 +113,7 @@ def resultant_error(printed: Statement) -> Finding:
 @CHECKS.add(*both("eq95"))
 def resultant_errors(printed: Statement) -> Finding:
     return compare(
-        holds(evaluable(printed), inverses()),
+        holds(printed, inverses()),
         "each column is (94), which is right to first order",
         note="the equation needs the $\\delta A$ and $\\delta b_j$ of the system that was solved",
     )

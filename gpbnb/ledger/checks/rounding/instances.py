@@ -73,8 +73,8 @@ class Judgement:
 
 
 def relations(printed: Statement) -> tuple[Relation, ...]:
-    """Return the relations of a statement without dots, which can be evaluated."""
-    return tuple(part for part in printed.parts if isinstance(part, Relation) and "..." not in part.text)
+    """Return the relations of a statement, without products with dots, which cannot be evaluated."""
+    return tuple(part for part in printed.parts if isinstance(part, Relation) and "*...*" not in part.text)
 
 
 def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bool = False) -> Judgement:
@@ -83,7 +83,7 @@ def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bo
     Parameters
     ----------
     found : printed relations.
-    instances : the values of their names; where ``tight`` is true, the first bound must be attained.
+    instances : the values of their names; where ``tight`` is true, the first bound of each relation must be attained.
     first_order : whether differences of second order are allowed; ``≈`` always allows them.
     """
     found = tuple(found)
@@ -91,14 +91,15 @@ def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bo
     attained: dict[int, bool] = {}
     missed: set[int] = set()
     for names in instances:
-        links = [link for relation in found for link in relation.links(names, number=lambda q: q)]
+        links = [(k, link) for k, relation in enumerate(found) for link in relation.links(names, number=lambda q: q)]
         count += 1
-        violated += not all(link_holds(link, first_order) for link in links)
-        bounds = {i: _attains(link) for i, link in enumerate(links) if link.symbol not in ("==", "≈")}
-        for i, reached in bounds.items():
+        violated += not all(link_holds(link, first_order) for _, link in links)
+        bounds = {i: (k, _attains(link)) for i, (k, link) in enumerate(links) if link.symbol not in ("==", "≈")}
+        for i, (_, reached) in bounds.items():
             attained[i] = attained.get(i, False) or reached
-        if names.get("tight") and bounds and not bounds[min(bounds)]:
-            missed.add(min(bounds))
+        if names.get("tight"):
+            first = {k: i for i, (k, _) in reversed(bounds.items())}
+            missed |= {i for i in first.values() if not bounds[i][1]}
     return Judgement(count, violated, tuple(i for i, reached in attained.items() if not reached or i in missed))
 
 

@@ -172,8 +172,8 @@ def matrix_products() -> tuple[dict[str, Any], ...]:
     instances = []
     for m, n, p in ((2, 3, 2), (3, 4, 2), (2, 5, 3)):
         cases = [(_random_matrix(rng, (m, n)), _random_matrix(rng, (n, p)), lambda k: small(rng, k)) for _ in range(3)]
-        cases.append((abs(cases[0][0]), abs(cases[0][1]), lambda k: [BETA] * k))
         cases.append((_dominated((m, n)), _dominated((n, p)), lambda k: [BETA] * k))
+        cases.append((abs(cases[0][0]), abs(cases[0][1]), lambda k: [BETA] * k))
         for a, b, errors in cases:
             error = rounded_product(a, b, errors) - a @ b
             entry: dict[str, Any] = {
@@ -183,6 +183,7 @@ def matrix_products() -> tuple[dict[str, Any], ...]:
             weights = np.diag([n, *range(n, 1, -1)])
             instances.append(
                 {**entry, "n": Fraction(n), "i": Fraction(m), "j": Fraction(p), "beta": BETA, "norm": norm,
+                 "positive": a is cases[-1][0],
                  "bracket": abs, "A": Matrix(a), "B": Matrix(b), "C_tilde": Matrix(error), "D": Matrix(weights)}
             )  # fmt: skip
     return tuple(instances)
@@ -195,15 +196,27 @@ def lost_page() -> Finding:
     )
 
 
+def _long_products() -> list[dict[str, Any]]:
+    """Return the products with at least four terms in each entry, so that the printed dots have a meaning.
+
+    Where all numbers and errors are positive, each entry attains its bound.
+    """
+    return [
+        {**each, "diag": lambda *numbers: Matrix(np.diag(numbers)), "tight": each["positive"]}
+        for each in matrix_products()
+        if each["n"] >= 4
+    ]
+
+
 @CHECKS.add("hung1982.III.eq27")
 def entry_bound(printed: Statement) -> Finding:
-    found = judge(relations(printed), matrix_products(), first_order=True)
+    found = judge(relations(printed), _long_products(), first_order=True)
     return compare(found.right and derived(), f"{found}", note="to first order")
 
 
 @CHECKS.add("hung1982.III.s9-2.unnumbered-c")
 def entry_bounds(printed: Statement) -> Finding:
-    found = judge(relations(printed), matrix_products(), first_order=True)
+    found = judge(relations(printed), _long_products(), first_order=True)
     n = 5
     d = [n, *range(n, 1, -1)]
     return compare(
