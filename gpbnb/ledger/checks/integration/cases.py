@@ -74,7 +74,7 @@ def at(now: Any, before: Any) -> Callable[[Any], Any]:
     def value(index: Any) -> Any:
         if index == N:
             return now
-        if index == N - 1:
+        if index == N - 1 and before is not None:
             return before
         raise LookupError(f"got cycle {index}; needed a cycle at which this case has a value")
 

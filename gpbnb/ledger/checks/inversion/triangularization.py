@@ -39,7 +39,10 @@ def system(printed: Statement) -> Finding:
     "hung1982.III.s11-1.blocks",
 )
 def blocks(printed: Statement) -> Finding:
-    return given("defines matrices that hold the entries changed by a step, and zeros elsewhere")
+    return compare(
+        holds(printed, eliminations(3)),
+        "the matrices hold exactly the entries that the step changes, and zeros elsewhere",
+    )
 
 
 @CHECKS.add(

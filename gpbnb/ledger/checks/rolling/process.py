@@ -69,6 +69,7 @@ def signals() -> tuple[Names, ...]:
                 "n": fixed(n),
                 "c": fixed(carrier),
                 "d": fixed(demodulator),
+                "s_1": fixed(s * carrier),
                 "m": fixed(s * carrier + n),
                 "s_x": sx,
                 "s_y": sy,
@@ -182,9 +183,15 @@ def equivalent(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(entry("s1.carriers"), *(entry(e) for e in ("eq1", "eq2", "eq9", "eq6")))
+@CHECKS.add(entry("s1.carriers"), *(entry(e) for e in ("eq1", "eq9", "eq6")))
 def definitions() -> Finding:
     return given("states the model: carriers, rolled signal and measured signal")
+
+
+@CHECKS.add(entry("eq2"))
+def measured_signal(printed: Statement) -> Finding:
+    agrees = all(hold(printed.links(names)) for names in signals())
+    return compare(agrees, "the measured signal is the rolled signal of (1) plus the noise")
 
 
 @CHECKS.add(entry("eq3"))

@@ -41,8 +41,14 @@ def derived() -> bool:
 
 
 @CHECKS.add(*both("eq4"), *both("eq7"), *both("eq12"))
-def error_defined() -> Finding:
-    return given("defines an error; the relative errors (7) and (12) require $x\\ne0$")
+def error_defined(printed: Statement) -> Finding:
+    found = judge(relations(printed), all_numbers())
+    return compare(
+        found.right,
+        f"the sides agree with the error computed from the rounded number: the line {found}",
+        note="the line defines an error, and its sides follow from each other; the relative errors (7) and (12) "
+        "require $x\\ne0$",
+    )
 
 
 @CHECKS.add(*both("eq9"))
