@@ -81,10 +81,15 @@ class Ledger(SphinxDirective):
 
 
 def count(name, rawtext, text, lineno, inliner, options=None, content=None):
-    """Write a count: of ``statements``, of ``roots``, of a document, of a verdict, or of both as ``hung1984 wrong``."""
+    """Write a count: of ``statements``, ``roots``, statements with a ``damaged`` scan, of a document, of a verdict.
+
+    A document and a verdict may be combined, as in ``hung1984 wrong``.
+    """
     rows = all_rows()
     if text == "roots":
         found = len(ledger().by_root(rows))
+    elif text == "damaged":
+        found = len(ledger().load_legibility())
     else:
         words = text.replace("not reproduced", "not-reproduced").split()
         kept = [

@@ -35,7 +35,7 @@ SPIN = 7.292115e-5
 """Rotation rate of the Earth, rad/s."""
 
 
-def precession_rates(altitude: float) -> tuple[float, float]:
+def precession_rates(altitude: float, spin: float = SPIN) -> tuple[float, float]:
     r"""Return the geodetic and frame-dragging drift in a circular polar orbit, for a star on the equator; rad/yr.
 
     .. math:: \Omega_G = \frac32\,\frac{(GM)^{3/2}}{c^2 r^{5/2}}, \qquad \Omega_M = \frac{G I \omega}{2 c^2 r^3}
@@ -43,6 +43,7 @@ def precession_rates(altitude: float) -> tuple[float, float]:
     Parameters
     ----------
     altitude : height above the equatorial radius, m; 0 or above.
+    spin : rotation rate of the Earth, rad/s.
 
     References
     ----------
@@ -52,7 +53,7 @@ def precession_rates(altitude: float) -> tuple[float, float]:
         raise ValueError(f"got an altitude of {altitude} m; needed 0 or above")
     r = RADIUS + altitude
     geodetic = 1.5 * GM**1.5 / (LIGHT**2 * r**2.5)
-    motional = GM * INERTIA * RADIUS**2 * SPIN / (2 * LIGHT**2 * r**3)
+    motional = GM * INERTIA * RADIUS**2 * spin / (2 * LIGHT**2 * r**3)
     return geodetic * YEAR, motional * YEAR
 
 

@@ -11,6 +11,7 @@
 from gpbnb.ledger.checking import Row, counts, examine, rows
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.html import CHAPTERS, Html
+from gpbnb.ledger.legibility import load_legibility
 from gpbnb.ledger.page import (
     PAGES,
     claim_table,
@@ -41,6 +42,7 @@ __all__ = [
     "error_table",
     "examine",
     "ledger_page",
+    "load_legibility",
     "load_roots",
     "load_statements",
     "note_table",

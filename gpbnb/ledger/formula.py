@@ -10,8 +10,9 @@ A form is one or more parts, separated by semicolons. Each part is one of:
 In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``P[k-1]`` has an index; ``A.T`` and
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
-printed sequence; a part that contains it can be typeset but not evaluated. The name ``dots`` stands for the terms that
-a printed series omits; a check gives it a value, such as ``sp.O(mu**4)``.
+printed sequence or sum: for the members between its neighbours, in which each number that differs changes by one from
+member to member. Dots in a matrix or in a product can be typeset but not evaluated. The name ``dots`` stands for the
+terms that a printed series omits; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
@@ -121,6 +122,12 @@ class Relation:
         text, tree = self.text.replace("≈", " is "), self.tree
         nodes = (tree.left, *tree.comparators) if isinstance(tree, ast.Compare) else (tree,)
         return tuple(Relation(ast.get_source_segment(text, node) or "") for node in nodes)
+
+    @property
+    def equates(self) -> bool:
+        """Whether each comparison is = or ≈."""
+        tree = self.tree
+        return isinstance(tree, ast.Compare) and all(isinstance(op, ast.Eq | ast.Is) for op in tree.ops)
 
     def terms(
         self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
@@ -292,6 +299,8 @@ class _Evaluation:
                 return self.names[name] if name in self.names else sp.Symbol(name)
             case ast.UnaryOp(op=ast.USub(), operand=operand):
                 return _apply(node, operator.neg, self(operand))
+            case ast.BinOp(op=ast.Add() | ast.Sub()) if any(_is_dots(term) for _, term in _terms(node)):
+                return self._dotted_sum(node)
             case ast.BinOp(left=left, op=op, right=right):
                 return _apply(node, _BINARY[type(op)], self(left), self(right))
             case ast.Subscript(value=ast.Name(id=name), slice=index):
@@ -308,16 +317,65 @@ class _Evaluation:
                 if name == "cases":
                     return self._cases(arguments)
                 function = self.names.get(name) or _FUNCTIONS.get(name) or sp.Function(name)
-                return _apply(node, function, *map(self, arguments))
+                return _apply(node, function, *self._sequence(arguments))
             case ast.Call(func=ast.Subscript(value=ast.Name(id=name), slice=index), args=arguments):
                 indices = self._indices(index)
                 if name not in self.names:
                     return sp.Function(f"{name}[{','.join(map(str, indices))}]")(*map(self, arguments))
                 return _apply(node, self.names[name], *indices, *map(self, arguments))
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
-                found = [[self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows]
+                if any(isinstance(row, ast.List) for row in rows):
+                    found = [
+                        [self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows
+                    ]
+                else:
+                    found = self._sequence(rows)
                 return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
         raise ValueError(f"got {ast.unparse(node)}; needed an expression that can be evaluated")
+
+    def _sequence(self, nodes: list[ast.expr]) -> list[Any]:
+        """Evaluate the members of a sequence; dots stand for the members between their neighbours."""
+        found: list[Any] = []
+        for i, node in enumerate(nodes):
+            if not _is_dots(node):
+                found.append(self(node))
+            elif 0 < i < len(nodes) - 1:
+                found += self._between(nodes[i - 1], nodes[i + 1])
+            else:
+                raise Undefined("got dots at the end of a sequence; needed a member on each side")
+        return found
+
+    def _between(self, left: ast.expr, right: ast.expr) -> list[Any]:
+        """Evaluate the members between two, whose numbers change by one from each member to the next."""
+        pairs = _differing(left, right)
+        try:
+            ends = [(int(self(a)), int(self(b))) for a, b in pairs]
+        except (TypeError, ValueError) as error:
+            raise Undefined(
+                f"got {ast.unparse(left)}, ..., {ast.unparse(right)}; needed whole numbers that differ"
+            ) from error
+        distances = {abs(last - first) for first, last in ends}
+        if len(distances) != 1:
+            raise Undefined(
+                f"got {ast.unparse(left)}, ..., {ast.unparse(right)}; needed numbers that all change by the same amount"
+            )
+        steps = [(last > first) - (last < first) for first, last in ends]
+        found = []
+        for k in range(1, distances.pop()):
+            numbers = [
+                ast.parse(str(first + k * step), mode="eval").body for (first, _), step in zip(ends, steps, strict=True)
+            ]
+            found.append(self(_replaced(left, {id(a): number for (a, _), number in zip(pairs, numbers, strict=True)})))
+        return found
+
+    def _dotted_sum(self, node: ast.expr) -> Any:
+        terms = _terms(node)
+        if any(negative for negative, _ in terms):
+            raise Undefined(f"got {ast.unparse(node)}; needed dots between terms that are added")
+        total, *others = self._sequence([term for _, term in terms])
+        for each in others:
+            total = _apply(node, operator.add, total, each)
+        return total
 
     def _indices(self, index: ast.expr) -> list[Any]:
         return [self(i) for i in (index.elts if isinstance(index, ast.Tuple) else [index])]
@@ -363,6 +421,44 @@ class _Evaluation:
         if len(values) != 1:
             raise Undefined(f"got {len(values)} cases that hold; needed exactly one")
         return values[0]
+
+
+def has_dotted_matrix(part: Part) -> bool:
+    """Whether a relation displays a matrix with dots between rows or columns, or a product with dots."""
+    if not isinstance(part, Relation) or "..." not in part.text:
+        return False
+    rows = (row for node in ast.walk(part.tree) if isinstance(node, ast.List) for row in node.elts)
+    return "*...*" in part.text or any(isinstance(row, ast.List) for row in rows)
+
+
+def _is_dots(node: ast.expr) -> bool:
+    return isinstance(node, ast.Constant) and node.value is Ellipsis
+
+
+def _differing(left: ast.AST, right: ast.AST) -> list[tuple[ast.expr, ast.expr]]:
+    """Return the parts of two expressions in which they differ, where they have the same structure otherwise."""
+    if ast.dump(left) == ast.dump(right):
+        return []
+    if type(left) is not type(right) or isinstance(left, ast.Constant | ast.Name | ast.UnaryOp):
+        return [(left, right)]  # type: ignore[list-item]
+    found: list[tuple[ast.expr, ast.expr]] = []
+    for a, b in zip(ast.iter_child_nodes(left), ast.iter_child_nodes(right), strict=False):
+        found += _differing(a, b)
+    return found
+
+
+def _replaced(node: Any, others: Mapping[int, ast.expr]) -> Any:
+    """Return a copy of a tree with other nodes in the places named by the ids of nodes."""
+    if id(node) in others:
+        return others[id(node)]
+    if isinstance(node, list):
+        return [_replaced(each, others) for each in node]
+    if not isinstance(node, ast.AST):
+        return node
+    copy = type(node)(**{field: _replaced(value, others) for field, value in ast.iter_fields(node)})
+    if hasattr(node, "literal"):
+        copy.literal = node.literal  # type: ignore[attr-defined]
+    return copy
 
 
 def _apply(node: ast.expr, operation: Callable[..., Any], *operands: Any) -> Any:

@@ -10,8 +10,10 @@ from html import escape
 from gpbnb.display.tables import Table
 from gpbnb.ledger.checking import Row, counts, in_reading_order
 from gpbnb.ledger.checks import TOPICS
+from gpbnb.ledger.corrections import load_corrections
 from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict
 from gpbnb.ledger.html import CHAPTERS, Html, badge, chapter_link, typeset
+from gpbnb.ledger.legibility import load_legibility
 from gpbnb.ledger.render import describe, outcome_name, section_name
 from gpbnb.ledger.roots import by_root, load_roots
 from gpbnb.ledger.statements import Statement
@@ -45,7 +47,7 @@ PAGES = (
         "ledger-1984-1",
         "Ledger: report of 1984, rounding and inversion in general",
         "hung1984",
-        r"I|II\.([1-9]|9\..*|10)",
+        r"title|I|II\.([1-9]|9\..*|10)",
     ),
     LedgerPage("ledger-1984-2", "Ledger: report of 1984, inversion by elimination", "hung1984", r"II\.11.*"),
     LedgerPage("ledger-1984-3", "Ledger: report of 1984, Kalman filter", "hung1984", r"II\.1[234]"),
@@ -260,13 +262,18 @@ def _seriousness(row: Row) -> int:
 
 
 def _error(group: Sequence[Row]) -> str:
-    """One error: what is wrong, the verdicts, and links to the statements of each document."""
+    """One error: what is wrong, what is right, the verdicts, and links to the statements of each document."""
     notes = [typeset(row.finding.note or row.finding.recomputed) for row in group if row.finding]
     finding = group[0].finding
     text = _root_link(finding) if finding and finding.root else notes[0]
     if finding and finding.root:
-        listed = "".join(f"<li>{_link(row)}: {note}</li>" for row, note in zip(group, notes, strict=True))
+        listed = "".join(
+            f"<li>{_link(row)}: {note}{_paragraphs(_correction(row))}</li>"
+            for row, note in zip(group, notes, strict=True)
+        )
         text += f"<details><summary>In detail</summary><ul>{listed}</ul></details>"
+    else:
+        text += _paragraphs(dict.fromkeys(paragraph for row in group for paragraph in _correction(row)))
     places: dict[str, list[str]] = {}
     for row in group:
         link = f'<a href="{address(row.statement)}">{typeset(row.statement.item)}</a>'
@@ -300,14 +307,38 @@ def _evidence(row: Row, note_first: bool = False) -> str:
     found, note, root = "", "", ""
     if row.finding:
         found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
-    named = [("printed", typeset(row.statement.printed)), ("recomputed", found), ("note", note)]
+    scan = _scan(row.statement)
+    named = [
+        ("printed", typeset(row.statement.printed)),
+        *scan,
+        *_correction(row),
+        ("recomputed", found),
+        ("note", note),
+    ]
     shown = _SHOWN.get(row.outcome, len(named))
+    if scan and row.finding and row.finding.verdict in DISAGREEMENTS:
+        shown += 1
     if note_first and note:
         named.insert(0, named.pop())
         shown = 1
     hidden = _paragraphs(named[shown:])
     evidence = f"<details><summary>Evidence</summary>{hidden}</details>" if hidden else ""
     return f"<td>{_paragraphs(named[:shown])}{root}{evidence}</td>"
+
+
+def _scan(statement: Statement) -> list[tuple[str, str]]:
+    """The characters of the scan where it is damaged, as the class and text of a paragraph."""
+    damage = load_legibility().get(statement.id)
+    return [("scan", f"<code>{escape(damage.scan).replace('$', '&#36;')}</code>")] if damage else []
+
+
+def _correction(row: Row) -> list[tuple[str, str]]:
+    """What a row that disagrees should say, or why no text can correct it, as the class and text of a paragraph."""
+    correction = load_corrections().get(row.statement.id)
+    if correction is None or row.finding is None or row.finding.verdict not in DISAGREEMENTS:
+        return []
+    corrected = correction.applied(row.statement)
+    return [("corrected", typeset(corrected.printed)) if corrected else ("uncorrected", typeset(correction.reason))]
 
 
 def _paragraphs(named: Iterable[tuple[str, str]]) -> str:

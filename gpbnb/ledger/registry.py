@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from gpbnb.ledger.finding import Finding
+from gpbnb.ledger.legibility import charged
 from gpbnb.ledger.statements import Statement
 
 
@@ -76,7 +77,7 @@ class Checks(Mapping[str, Check]):
         return register
 
     def run(self, statement: Statement) -> Finding:
-        """Run the check of a statement.
+        """Run the check of a statement, and decide by the rule of :mod:`gpbnb.ledger.legibility` who is charged.
 
         Raises
         ------
@@ -90,7 +91,7 @@ class Checks(Mapping[str, Check]):
                 f"got {finding!r} from the check of {statement.id!r}, {_name(check)}; needed a "
                 "Finding: return compare(...), answer(...), unverifiable(...) or given(...)"
             )
-        return finding
+        return charged(statement.id, finding)
 
     def __getitem__(self, key: str) -> Check:
         try:

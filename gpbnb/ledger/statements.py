@@ -69,6 +69,11 @@ class Statement:
             raise LookupError(f"got relation number {number} of {self.id}; needed a number from 1 to {len(relations)}")
         return relations[number - 1]
 
+    @property
+    def equates(self) -> bool:
+        """Whether each comparison of each relation is = or ≈."""
+        return all(part.equates for part in self.parts if isinstance(part, Relation))
+
     def links(
         self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
     ) -> tuple[Link, ...]:
@@ -205,6 +210,17 @@ def _entry(record: list[str]) -> Statement:
         raise ValueError(f"got kind {entry.kind!r}; needed one of {', '.join(KINDS)}")
     if not entry.id.startswith(f"{entry.document}."):
         raise ValueError(f"got id {entry.id!r}; needed an id that begins with its document: '{entry.document}.…'")
+    check_text(entry)
+    return entry
+
+
+def check_text(entry: Statement) -> None:
+    """Check that the form of a statement can be read and that its text can be typeset with the parts of the form.
+
+    Raises
+    ------
+    ValueError : it cannot.
+    """
     if entry.text.count("$") % 2 or "$$" in entry.text:
         raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
     for place in _PLACE.findall(entry.text):
@@ -213,8 +229,7 @@ def _entry(record: list[str]) -> Statement:
                 f"got the place {{{{{place}}}}} in text; needed a number up to {len(entry.parts)}, the "
                 "number of parts of the form"
             )
-    _ = entry.parts, entry.printed
-    return entry
+    _ = entry.printed
 
 
 def select(

@@ -8,9 +8,12 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
-from gpbnb.ledger.formula import Number, Part, Relation, Words
+from gpbnb.ledger.formula import Number, Part, Relation, Words, has_dotted_matrix
 from gpbnb.ledger.statements import Statement
 
+COMPARISON = "comparison"
+"""Begins the name of an alteration that exchanges = with ≠, or makes an inequality an equation."""
+_OTHER = {ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.LtE: ast.Eq, ast.GtE: ast.Eq, ast.Lt: ast.Eq, ast.Gt: ast.Eq}
 _OPPOSITE = {ast.LtE: ast.GtE, ast.GtE: ast.LtE, ast.Lt: ast.GtE, ast.Gt: ast.LtE}
 
 
@@ -31,7 +34,7 @@ def _of_part(part: Part) -> Iterator[tuple[str, str]]:
             for name, literal in _of_literal(part.literal):
                 yield name, replace(part, literal=literal).text
         case Relation():
-            if not any(isinstance(node, ast.Constant) and node.value is Ellipsis for node in ast.walk(part.tree)):
+            if not has_dotted_matrix(part):
                 yield from _of_relation(part)
 
 
@@ -54,7 +57,7 @@ def _of_relation(relation: Relation) -> Iterator[tuple[str, str]]:
     """The usual alterations; where they are few, dropped factors and the opposite sign as well."""
     usual = dict(_usual(relation))
     yield from usual.items()
-    if len(usual) < 3:
+    if sum(COMPARISON not in name for name in usual) < 3:
         tree = relation.tree
         for k, node in enumerate(ast.walk(tree)):
             if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div):
@@ -105,9 +108,11 @@ def _of_node(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
             yield "function", ast.Call(ast.Name("cos" if name == "sin" else "sin", ast.Load()), arguments, [])
         case ast.Compare(left=left, ops=ops, comparators=rights):
             for i, op in enumerate(ops):
-                if type(op) in _OPPOSITE:
-                    name = "direction" if i == 0 else f"direction {i + 1}"
-                    yield name, ast.Compare(left, [*ops[:i], _OPPOSITE[type(op)](), *ops[i + 1 :]], rights)
+                place = "" if i == 0 else f" {i + 1}"
+                for name, others in (("direction", _OPPOSITE), (COMPARISON, _OTHER)):
+                    if type(op) in others:
+                        other = others[type(op)]()
+                        yield f"{name}{place}", ast.Compare(left, [*ops[:i], other, *ops[i + 1 :]], rights)
 
 
 def _with(tree: ast.AST, place: ast.AST, new: ast.AST) -> str:

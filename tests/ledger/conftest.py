@@ -5,7 +5,9 @@ import textwrap
 
 import pytest
 
-CHECKED = tuple(f"hung1984.I.{item}" for item in ("two-tasks", "1-f-study", "report-period", "contract", "contents"))
+from gpbnb.ledger import load_statements, select
+
+CHECKED = tuple(entry.id for entry in select(load_statements(), "hung1984", "I"))
 
 
 @pytest.fixture

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import faults
 import pytest
-from alterations import altered
+from alterations import COMPARISON, altered
 
 from gpbnb.ledger.checks import TOPICS
 from gpbnb.ledger.checks.rounding import instances, introduction, matrices, products, sums
-from gpbnb.ledger.finding import Verdict
+from gpbnb.ledger.corrections import load_corrections
+from gpbnb.ledger.finding import DISAGREEMENTS, Verdict
 from gpbnb.ledger.formula import Undefined, Words
 from gpbnb.ledger.registry import takes_statement
 from gpbnb.ledger.statements import Statement, load_statements
 from gpbnb.rounding import experiment
 
-STATEMENTS = load_statements()
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
 MOST = 5
 """Alterations judged of one statement; which ones depends on its id alone."""
@@ -28,6 +28,8 @@ LOST = {
     "hung1984.II.eq27": "the page is missing from the scan",
     "hung1982.II.table-ii-1": "the table is missing from the scan",
     "hung1982.III.s11-1.b-i-1-definition": "of the equation, the scan keeps one divisor",
+    "hung1982.III.eq61": "the scan shows no legible part of the equation",
+    "hung1982.III.eq97": "the scan has lost the sign that the equation is about",
 }
 """Statements that the scan has lost, so that there is nothing to write down."""
 
@@ -49,6 +51,21 @@ def still_true():
 
 
 STILL_TRUE = still_true()
+STATEMENTS = load_statements()
+CORRECTIONS = load_corrections()
+CORRECTED = [
+    corrected
+    for each in STATEMENTS
+    if each.id in CORRECTIONS and (corrected := CORRECTIONS[each.id].applied(each)) is not None
+]
+"""Statements as they should read."""
+PRINTED = {each.id: each.form for each in STATEMENTS}
+
+
+def listed(statement, name):
+    """Whether an alteration is an exception; those of a corrected statement are listed as ``id corrected``."""
+    key = statement.id if statement.form == PRINTED[statement.id] else f"{statement.id} corrected"
+    return (key, name) in STILL_TRUE
 
 
 def sameness(statement):
@@ -63,11 +80,11 @@ def in_order(statement):
     are too few.
     """
     every = dict(altered(statement))
-    others = [name for name in every if (statement.id, name) not in STILL_TRUE]
+    others = [name for name in every if not listed(statement, name)]
     random.Random(FIRST[sameness(statement)]).shuffle(others)
     others.sort(key=lambda name: "lower index" in name)
-    listed = [name for name in every if (statement.id, name) in STILL_TRUE]
-    return {name: every[name] for name in (*listed, *others)}
+    exceptions = [name for name in every if listed(statement, name)]
+    return {name: every[name] for name in (*exceptions, *others)}
 
 
 FINDINGS = {}
@@ -96,11 +113,15 @@ class Trial:
 
 
 def tried(statement, most=MOST):
-    """Try alterations until `most` of them, besides the exceptions listed, have been judged."""
+    """Try `most` alterations besides the exceptions listed, and each one of a comparison."""
     trial = Trial({}, [])
     for name, other in in_order(statement).items():
-        if len([name for name in trial.judged if (statement.id, name) not in STILL_TRUE]) == most:
-            break
+        of_comparison = COMPARISON in name
+        if of_comparison and judged(statement).verdict is not Verdict.VERIFIED:
+            continue  # the sides of a wrong equation are unequal, so this alteration may well be right
+        others = [each for each in trial.judged if COMPARISON not in each and not listed(statement, each)]
+        if not of_comparison and len(others) >= most:
+            continue
         try:
             trial.judged[name] = judged(other).verdict
         except Undefined:
@@ -116,8 +137,9 @@ def needed(statement):
 
 TAKEN = [each for each in STATEMENTS if each.form and takes_statement(CHECKED[each.id][each.id])]
 """Statements with a form that their checks judge."""
-FIRST = {sameness(each): each.id for each in reversed(TAKEN)}
-TAKEN.sort(key=lambda each: FIRST[sameness(each)])  # copies side by side, so that one process judges both
+FIRST = {sameness(each): each.id for each in reversed([*TAKEN, *CORRECTED])}
+for each in (TAKEN, CORRECTED):
+    each.sort(key=lambda each: FIRST[sameness(each)])  # copies side by side, so that one process judges both
 
 
 def each_of(statements):
@@ -125,15 +147,32 @@ def each_of(statements):
     return pytest.mark.parametrize("statement", list(statements), ids=lambda statement: statement.id)
 
 
-@each_of(TAKEN)
-def test_no_altered_statement_is_judged_right(statement):
-    if judged(statement).verdict is Verdict.GIVEN:
-        return  # a definition: there is nothing to judge
+def assert_alterations_are_rejected(statement):
+    """Enough alterations have a meaning, and of these only the exceptions listed are judged right."""
     trial = tried(statement)
-    exceptions = {name for name in trial.judged if (statement.id, name) in STILL_TRUE}
+    exceptions = {name for name in trial.judged if listed(statement, name)}
     right = {name for name, verdict in trial.judged.items() if verdict is Verdict.VERIFIED}
     assert right == exceptions
     assert len(trial.judged) >= needed(statement)
+
+
+@each_of(TAKEN)
+def test_no_altered_statement_is_judged_right(statement):
+    if judged(statement).verdict is not Verdict.GIVEN:  # of a definition, there is nothing to judge
+        assert_alterations_are_rejected(statement)
+
+
+@each_of(TAKEN)
+def test_only_a_statement_that_disagrees_has_a_correction(statement):
+    assert (judged(statement).verdict in DISAGREEMENTS) == (statement.id in CORRECTIONS)
+
+
+@each_of(CORRECTED)
+def test_a_corrected_statement_is_judged_right_and_its_alterations_are_not(statement):
+    verdict = judged(statement).verdict
+    assert verdict in (Verdict.VERIFIED, Verdict.GIVEN)
+    if verdict is Verdict.VERIFIED:
+        assert_alterations_are_rejected(statement)
 
 
 def negations(statement):
@@ -153,8 +192,8 @@ def test_a_claim_in_words_has_a_negation_that_is_rejected(statement):
 
 
 def test_each_exception_is_an_alteration_with_its_reason():
-    by_id = {statement.id: statement for statement in STATEMENTS}
-    alterations = {key: dict(altered(by_id[key])) for key, _ in STILL_TRUE}
+    by_key = {each.id: each for each in STATEMENTS} | {f"{each.id} corrected": each for each in CORRECTED}
+    alterations = {key: dict(altered(by_key[key])) for key, _ in STILL_TRUE}
     for (key, name), why in STILL_TRUE.items():
         assert why
         assert name in alterations[key], (key, name)
@@ -181,6 +220,7 @@ def test_alterations_change_each_part():
     for expected in (
         "x[k + 1] <= -2 * a ** 3 + b",
         "x[k] >= -2 * a ** 3 + b",
+        "x[k] == -2 * a ** 3 + b",
         "x[k] <= -3 * a ** 3 + b",
         "x[k] <= -2 * a ** (3 + 1) + b",
         "x[k] <= -2 * a ** 3 - b",

@@ -46,13 +46,15 @@ def test_every_entry_has_a_finding_on_record():
 def test_one_row_an_entry_in_order(complete):
     found = rows(topics=topics(complete))
     assert tuple(row.statement for row in found) == INVENTORY
-    assert [row.statement.id for row in found if row.finding] == [entry.id for entry in INVENTORY[:5]]
+    assert [row.statement.id for row in found if row.finding] == [
+        entry.id for entry in INVENTORY if entry.id.startswith("hung1984.I.")
+    ]
     assert all(row.error is None for row in found)
 
 
 def test_a_function_that_checks_several_entries_is_called_once(complete):
     found = rows(document="hung1984", chapter="I", topics=topics(complete))
-    assert [row.outcome for row in found] == ["misprint"] * 5
+    assert {row.outcome for row in found} == {"misprint"}
     assert importlib.import_module(complete).CALLS == [1]
 
 
@@ -64,7 +66,7 @@ def test_only_the_selected_checks_are_run(complete):
 
 
 def test_an_iterator_of_entries_will_do(complete):
-    some = INVENTORY[:5]
+    some = tuple(entry for entry in INVENTORY if entry.id.startswith("hung1984.I."))
     assert tuple(row.statement for row in rows(iter(some), topics=topics(complete))) == some
 
 

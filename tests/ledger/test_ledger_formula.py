@@ -184,9 +184,27 @@ def test_functions_have_their_usual_meaning(form, value):
     assert found == value or math.isclose(found, value)
 
 
-def test_dots_have_no_value():
-    with pytest.raises(ValueError, match="that can be evaluated"):
-        Relation("a + ... + b").value()
+@pytest.mark.parametrize(
+    ("form", "value"),
+    [
+        ("1 + 2 + ... + n", 15),
+        ("n*x[1] + (n-1)*x[2] + ... + 1*x[n]", 5 * 10 + 4 * 20 + 3 * 30 + 2 * 40 + 50),
+        ("[x[1], ..., x[n]]", [10, 20, 30, 40, 50]),
+        ("[0, n + 1, ..., 4, 3]", [0, 6, 5, 4, 3]),
+        ("[2, ..., 2 + 1]", [2, 3]),
+    ],
+)
+def test_dots_stand_for_the_members_between_their_neighbours(form, value):
+    assert Relation(form).value({"n": Fraction(5), "x": lambda i: 10 * i}, Fraction) == value
+
+
+@pytest.mark.parametrize(
+    "form",
+    ["a + ... + b", "[x[1], ..., y[5]]", "[1*2, ..., 3*5]", "[..., 2]", "1 - 2 + ... + 5", "[1 + 2, ..., 1 - 2]"],
+)
+def test_dots_without_a_pattern_have_no_value(form):
+    with pytest.raises(Undefined):
+        Relation(form).value({"x": lambda i: i, "y": lambda i: i}, Fraction)
 
 
 # -- typesetting ----------------------------------------------------------------------------------

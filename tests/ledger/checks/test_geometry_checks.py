@@ -11,16 +11,16 @@ import pytest
 import sympy as sp
 
 from gpbnb.display.derivation import Derivation, Step
-from gpbnb.geometry import derivation, experiment, theory
+from gpbnb.geometry import derivation, theory
 from gpbnb.ledger.checks import geometry as checks
-from gpbnb.ledger.checks.geometry import angles, equations, frames, precessions
+from gpbnb.ledger.checks.geometry import angles, definitions, equations, frames, precessions
 from gpbnb.ledger.finding import Verdict
 from gpbnb.ledger.statements import statement
-from gpbnb.measurement import ARCSEC, deroll
+from gpbnb.measurement import ARCSEC, deroll, rotation
 
 INVENTORY = faults.INVENTORY
 ENTRIES = [entry for entry in INVENTORY if entry.id in checks.CHECKS]
-CACHING = (angles, equations, frames, precessions)
+CACHING = (angles, definitions, equations, frames, precessions)
 
 
 def test_every_entry_of_chapter_iv_has_a_check_here():
@@ -37,22 +37,16 @@ def test_every_equation_has_a_form():
 def test_verdicts(rows):
     """The present state: to be changed knowingly."""
     assert Counter(row.outcome for row in rows) == {
-        "verified": 17,
-        "given": 2,
-        "misprint": 1,
-        "wrong": 3,
+        "verified": 32,
+        "given": 11,
+        "misprint": 3,
         "inconsistent": 7,
         "unverifiable": 3,
         "answered": 2,
     }
     found = faults.by_verdict(rows)
-    assert found[Verdict.WRONG] == {
-        "hung1982.IV.eq8",
-        "hung1982.IV.eq9",
-        "hung1982.IV.identity-transformation",
-    }
-    assert found[Verdict.GIVEN] == {"hung1982.IV.eq10", "hung1982.IV.eq11"}
-    assert found[Verdict.MISPRINT] == {"hung1982.IV.intermediate-frame"}
+    assert found[Verdict.GIVEN] >= {"hung1982.IV.eq10", "hung1982.IV.eq11", "hung1982.IV.roll-frame"}
+    assert found[Verdict.MISPRINT] == {f"hung1982.IV.{place}" for place in ("eq8", "eq9", "intermediate-frame")}
 
 
 def test_findings_have_their_notes_and_numbers(rows):
@@ -62,6 +56,7 @@ def test_findings_have_their_notes_and_numbers(rows):
     # 60√2
     assert r"85 arcseconds apart with $\gamma_2=\gamma_3=60''$" in found["IV.axes-colinear"].recomputed
     assert "31 arcseconds" in found["IV.identity-transformation"].note
+    assert "0.000 arcseconds a year, instead of 6.62 and 0.041" in found["I.spin-spin"].recomputed
     assert "takes at least 2 changes of sign, before C, C" in found["IV.eq8"].recomputed
     # (5, 3) + (-2, 4); √(9² + 5²); 5 + 4; the declination of Rigel
     assert "is (3, 7) arcseconds" in found["IV.thetas-drift"].recomputed
@@ -114,6 +109,20 @@ DEPENDS = [
     ("IV.axes-colinear", angles, "boresight_offset", lambda angles: 1.0),
     ("IV.use-of-model", theory, "effect", lambda case, rolling: theory.Effect((0, 0), (ARCSEC, 0), 0.0)),
     ("IV.use-of-model", angles, "THIRD_ORDER", 1e-3),
+    ("IV.identity-transformation", derivation, "exact", lambda angles: TURN(1, sp.pi / 3)),
+    ("IV.roll-axes-coincide", definitions, "roll", lambda phase: rotation([0.0, phase, 0.0])),
+    ("IV.lined-up", definitions, "rotation", lambda angles: rotation(np.add(angles, 0.1))),
+    ("IV.body-fixed", definitions, "roll", lambda phase: np.eye(3)),
+    ("IV.projection-on-telescope", definitions, "star_in_telescope", lambda *angles: np.array([1.0, 0.0, 0.0])),
+    ("IV.projection-on-readout", definitions, "spin_in_readout", lambda *angles: np.array([1.0, 0.0, 0.0])),
+    ("IV.factors-of-1", definitions, "sets_of_angles", lambda printed: ["alpha", "omega", "beta"]),
+    ("IV.factors-of-2", definitions, "sets_of_angles", lambda printed: ["beta", "gamma", "omega", "theta"]),
+    ("IV.reduction", definitions, "statement", lambda key: statement(key.replace("eq4", "eq3"))),
+    ("IV.label-of-5", definitions, "deroll", lambda readings, phase: 2 * readings),
+    ("IV.label-of-6", definitions, "deroll", lambda readings, phase: 2 * readings),
+    ("IV.estimated-by-deroll", definitions, "deroll", lambda readings, phase: deroll(readings, -phase)),
+    ("I.precession-in-orbit", theory, "precession_rates", lambda altitude: (0.0, 0.0)),
+    ("I.spin-spin", theory, "precession_rates", lambda altitude, spin=1.0: (1.0, 0.5)),
 ]
 
 
@@ -133,7 +142,6 @@ AGREE = [
     ("IV.absolute-frame", theory, "aberration", lambda altitude: (0.0, 0.0)),
     ("IV.intermediate-frame", frames, "boresight_offset", lambda beta: 0.0),
     ("IV.thetas-drift", frames, "theta_of", lambda phi, alpha: phi),
-    ("IV.identity-transformation", experiment, "small_angle_errors", lambda *given: np.zeros(1)),
 ]
 
 
@@ -180,6 +188,25 @@ def test_a_chain_leads_from_the_first_axis_to_the_reading(number, before, after)
     printed = statement(f"hung1982.IV.eq{number}")
     assert printed.form.count(before) == 1
     assert checks.CHECKS.run(changed(printed, form=printed.form.replace(before, after))).agrees is False
+
+
+def test_the_printed_deroll_is_a_slip_only_while_the_other_equations_are_right(patch):
+    assert run("IV.eq8").verdict is Verdict.MISPRINT
+    patch.setattr(equations, "later_uses_are_right", lambda: False)
+    assert run("IV.eq8").verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize("number", [5, 12])
+def test_the_equations_that_use_the_estimates_are_looked_at(patch, number):
+    assert equations.later_uses_are_right()
+    statements = {f"hung1982.IV.eq{k}": statement(f"hung1982.IV.eq{k}") for k in (5, 6, 7, 12)}
+    printed = statements[f"hung1982.IV.eq{number}"]
+    altered = printed.form.replace("- Deltaalpha_2", "+ Deltaalpha_2").replace("[-alpha_3]", "[alpha_3]")
+    assert altered != printed.form
+    statements[printed.id] = changed(printed, form=altered)
+    equations.later_uses_are_right.cache_clear()
+    patch.setattr(equations, "statement", statements.__getitem__)
+    assert not equations.later_uses_are_right()
 
 
 def test_a_frame_that_moves_is_a_slip_only_while_the_drift_is_right(patch):

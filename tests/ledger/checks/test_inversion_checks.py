@@ -49,7 +49,7 @@ def test_the_norm_of_a_column_is_its_largest_entry_and_of_others_the_largest_col
 
 def test_every_entry_of_the_sections_has_a_check_here_and_none_is_elsewhere():
     assert set(CHECKS) == set(PRINTED)
-    assert len(PRINTED) == 197
+    assert len(PRINTED) == 236
 
 
 def test_each_numbered_equation_has_its_entry():
@@ -64,7 +64,8 @@ def test_each_numbered_equation_has_its_entry():
 
 
 def test_only_what_the_scan_has_lost_has_no_form(rows):
-    lost = {row.statement.id for row in rows if not row.statement.form}
+    told = {"hung1984.II.s10.claim-two-steps", "hung1982.III.s10.claim-two-steps"}  # plans, in words
+    lost = {row.statement.id for row in rows if not row.statement.form} - told
     assert lost == {row.statement.id for row in rows if row.finding.verdict is Verdict.UNVERIFIABLE}
 
 
@@ -75,21 +76,21 @@ def test_verdicts_by_document(rows):
         for document in ("hung1984", "hung1982")
     }
     assert counts["hung1984"] == {
-        "given": 23,
-        "verified": 59,
+        "given": 21,
+        "verified": 65,
         "misprint": 19,
-        "wrong": 13,
+        "wrong": 11,
         "ocr": 1,
         "unverifiable": 1,
         "not reproduced": 7,
     }
     assert counts["hung1982"] == {
-        "verified": 39,
-        "given": 8,
+        "verified": 57,
+        "given": 21,
         "misprint": 9,
         "ocr": 1,
-        "wrong": 10,
-        "unverifiable": 2,
+        "wrong": 14,
+        "unverifiable": 4,
         "inconsistent": 1,
         "not reproduced": 4,
     }
@@ -104,10 +105,9 @@ def test_which_are_wrong_and_why(rows):
         "residue-hard-to-obtain": {"s10.practicality-of-44"},
         "one-signed-epsilon": {
             *(f"eq{number}" for number in (48, 49, 51, 52, 53, 54, 59, 60, 90)),
-            "eq53-54",
-            "eq59-60",
+            "eq89-factored-form",
         },
-        "two-systems-added": {"s11-3.claim-two-sets", "eq91", "eq92", "eq91-92"},
+        "two-systems-added": {"s11-3.claim-two-sets", "eq91", "eq92"},
     }
 
 
@@ -186,32 +186,6 @@ def test_a_number_that_a_reading_gives_is_verified():
     assert CHECKS.run(replace(table, form="; ".join(parts))).verdict is Verdict.VERIFIED
     one_column = [*parts[:3], *(part.text for part in table.parts if part.label.startswith("actual"))]
     assert CHECKS.run(replace(table, form="; ".join(one_column))).verdict is Verdict.NOT_REPRODUCED
-
-
-@pytest.mark.parametrize(
-    ("key", "old", "new"),
-    [
-        ("hung1984.II.eq44", "== norm(R)", "<= norm(R)"),
-        ("hung1984.II.eq77", "*x[3]", "*x_hat[3]"),
-        ("hung1984.II.eq80", "[x[", "[x_hat["),
-        ("hung1984.II.eq81", "[0, 0, 3]]", "[0, 0, 3]]*epsilon"),
-        ("hung1984.II.eq85", "k <= j", "k < j"),
-        ("hung1984.II.eq89", "A_D*M_A", "A_D*M_A*epsilon"),
-        ("hung1984.II.eq91", "+ DeltaA", "+ L*DeltaA"),
-        ("hung1984.II.eq92", "+ Deltab", "+ L*Deltab"),
-        ("hung1984.II.s11-2.x-1-line", "_hat", ""),
-        ("hung1984.II.s11-1.b-3-2", "== b_hat[3](2) + 3", "== b[3](2) + 3"),
-        ("hung1982.III.eq47", "a[i,j](1)*(2", "a[i,j](0)*(2"),
-        ("hung1982.III.eq42", "43", "42"),
-        ("hung1982.III.s10.cross-reference-to-33", "29", "33"),
-        ("hung1984.II.s11-3.figure-number", "III", "II"),
-        ("hung1984.II.s11-4.reference-to-figure-1", "Figure 1", "Figure III-1"),
-    ],
-)
-def test_a_corrected_slip_is_verified(key, old, new):
-    printed = statement(key)
-    assert CHECKS.run(printed).agrees is False
-    assert CHECKS.run(replace(printed, form=printed.form.replace(old, new))).verdict is Verdict.VERIFIED
 
 
 def test_readings_belong_to_the_columns_of_the_table():

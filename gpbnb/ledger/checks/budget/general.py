@@ -16,12 +16,8 @@ from gpbnb.ledger.checks import rolling
 from gpbnb.ledger.checks.budget.registry import CHECKS
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
 from gpbnb.ledger.html import chapter
-from gpbnb.ledger.statements import Statement, load_statements, quote
+from gpbnb.ledger.statements import Statement, load_statements, quote, statement
 from gpbnb.measurement import ARCSEC, MAS
-
-TITLE_PAGE = "NAS8-34426"
-"""The contract, on the title page of hung1984."""
-
 
 # -- hung1984, ch. I ------------------------------------------------------------------------------
 
@@ -30,7 +26,7 @@ TITLE_PAGE = "NAS8-34426"
 def contents(printed: Statement) -> Finding:
     entries = [entry for entry in load_statements() if entry.document == "hung1984"]
     return unverifiable(
-        f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries))}",
+        f"the chapters are {', '.join(dict.fromkeys(entry.chapter for entry in entries if entry.chapter != '-'))}",
         "the scan has no page numbers and no distribution list",
     )
 
@@ -128,11 +124,12 @@ def period_1984(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1984.I.contract")
 def contract(printed: Statement) -> Finding:
+    title_page = statement("hung1984.title.contract").says("contract")
     return compare(
-        printed.says("contract") == TITLE_PAGE,
-        TITLE_PAGE,
+        printed.says("contract") == title_page,
+        title_page,
         Verdict.MISPRINT,
-        otherwise_note="the title page and hung1982 have an S where this page, or its scan, has a 5",
+        otherwise_note="the title page and hung1982 have an S where this page has a 5",
     )
 
 
@@ -184,9 +181,10 @@ def previous_contract(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.I.contract")
 def contract_1982(printed: Statement) -> Finding:
+    title_page = statement("hung1984.title.contract").says("contract")
     return compare(
-        printed.says("contract") == TITLE_PAGE,
-        f"{TITLE_PAGE}, as on the title page of hung1984",
+        printed.says("contract") == title_page,
+        f"{title_page}, as on the title page of hung1984",
         Verdict.INCONSISTENT,
     )
 
@@ -231,7 +229,7 @@ def period_1982(printed: Statement) -> Finding:
             f"the period is {months} months and {days} days with the printed year, and {restored[0]} "
             f"months and {restored[1]} days with 1981"
         ),
-        Verdict.OCR,
+        Verdict.MISPRINT,
         otherwise_note="the year must be 1981, which the scan shows as 1987",
     )
 

@@ -8,7 +8,8 @@ import numpy as np
 import sympy as sp
 
 from gpbnb.geometry import derivation, experiment, theory
-from gpbnb.geometry.derivation import ALPHA
+from gpbnb.geometry.derivation import ALPHA, PHI
+from gpbnb.ledger.agreement import vanishes
 from gpbnb.ledger.checks.geometry.frames import boresight_offset
 from gpbnb.ledger.checks.geometry.registry import CHAPTER, CHECKS, MINUTE
 from gpbnb.ledger.finding import Finding, Verdict, answer, compare
@@ -53,18 +54,21 @@ def colinear(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.IV.identity-transformation")
 def identity(printed: Statement) -> Finding:
-    block = derivation.printed_small(ALPHA)[1:, 1:]
-    without = block.subs(ALPHA[0], 0) == sp.eye(2)
+    h = sp.Symbol("h")
+    drift = h * sp.Matrix(PHI)
+    turned = derivation.exact([h * angle for angle in ALPHA]).T * drift
+    first, second = ((turned - drift).diff(h, order).subs(h, 0) for order in (1, 2))
     error = experiment.small_angle_errors("alpha1", MINUTE, (theory.GEODETIC, theory.MOTIONAL))[0]
     limit = theory.twist_limit(MAS)
     return compare(
         printed.says("matrix")
-        == ("an identity matrix" if without and error < MAS else "a matrix that is not the identity"),
-        f"an $\\alpha_1$ of 60 arcseconds turns {error / MAS:.2f} milliarcseconds of a drift of 6.6 "
-        "arcseconds a year into the perpendicular direction",
-        otherwise_note="an angle $\\alpha_1$ that cannot be determined is not necessarily zero; it must be known to "
+        == ("an identity matrix" if vanishes(first) and not vanishes(second) else "a matrix that is not the identity"),
+        "for angles of any size $h$ between the two frames, drift angles of the size $h$ have the same components in "
+        f"both, to first order in $h$; the next order matters here: an $\\alpha_1$ of 60 arcseconds turns "
+        f"{error / MAS:.2f} milliarcseconds of a drift of 6.6 arcseconds a year into the perpendicular direction",
+        note="the identity is right to first order, as small angles are assumed. It follows from the small angles, "
+        "not from the absence of $\\alpha_1$, which is unknown rather than zero and must be known to "
         f"{limit / ARCSEC:.0f} arcseconds for an error of one milliarcsecond",
-        root="undetermined-roll-angle-taken-for-zero",
     )
 
 
@@ -74,8 +78,10 @@ def phi_frame(printed: Statement) -> Finding:
     against = {name: abs(theta_of(phi, np.array([0.0, a, 0.0]) * ARCSEC)[1]) for name, a in (("a", 0.0), ("i", 4.0))}
     # right-handed: a positive rotation of the gyro about y moves its x axis towards -z
     stands = float(rotation(phi)[2, 0])
+    said = printed.says("frame")
+    reversed_signs = said.endswith("(with reversed signs)")
     return compare(
-        bool(abs(against[printed.says("frame")[0]] - phi[1]) < MAS and stands < 0),
+        bool(abs(against[said[0]] - phi[1]) < MAS and (stands > 0) == reversed_signs),
         "for $\\varphi_2$ of 5 arcseconds and a pointing angle of 4 arcseconds, the gyro is turned "
         f"by {against['i'] / ARCSEC:.0f} arcseconds relative to the intermediate frame and by "
         f"{against['a'] / ARCSEC:.0f} relative to the absolute frame, and its axis is at "

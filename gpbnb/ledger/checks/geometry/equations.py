@@ -11,8 +11,8 @@ import sympy as sp
 from gpbnb.geometry import derivation
 from gpbnb.geometry.derivation import SEQUENCES
 from gpbnb.ledger.agreement import hold, vanishes
-from gpbnb.ledger.checks.geometry.registry import CHECKS, DEROLL
-from gpbnb.ledger.finding import Finding, compare, given
+from gpbnb.ledger.checks.geometry.registry import CHECKS
+from gpbnb.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.ledger.statements import Statement, statement
 
 H = sp.Symbol("h")
@@ -136,10 +136,19 @@ def estimates(printed: Statement) -> Finding:
         f"the right side is $[-{name}_3\\cos2\\omega t+{name}_2\\sin2\\omega t;\\ "
         f"{name}_3\\sin2\\omega t+{name}_2\\cos2\\omega t]$, with mean 0 over a roll; correcting it "
         f"takes at least {len(changes[0])} changes of sign, before {' or '.join(sorted(signs))}",
-        otherwise_note="the equation rolls the readings once more instead of derolling them; the inverse of (3), as "
-        f"in (5), is $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$",
-        root=DEROLL,
+        Verdict.MISPRINT if later_uses_are_right() else Verdict.WRONG,
+        otherwise_note="as the scan shows it, the equation rolls the readings once more instead of derolling them; "
+        f"right is the inverse of (3), $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$, as in (5) to (7). Nothing "
+        "later uses the printed signs, as (10) to (12) hold for any estimates; but anyone who programs them measures "
+        "no drift",
     )
+
+
+@cache
+def later_uses_are_right() -> bool:
+    """Whether (5) to (7), which show the same computation, and (12), which uses its results, hold as printed."""
+    others = [derolled(statement(f"hung1982.IV.eq{k}")).agrees for k in (5, 6, 7)]
+    return all(others) and error_of_drift(statement("hung1982.IV.eq12")).agrees is True
 
 
 @cache

@@ -99,20 +99,29 @@ def gyro_to_readout(phase: float) -> np.ndarray:
 
 @CHECKS.add("hung1982.IV.deltas-zero")
 def deltas(printed: Statement) -> Finding:
-    return turning_delta(printed.says("angles") == "zero", 1e-9)
+    return turning_delta(printed.says("angles"), 1e-9)
 
 
 @CHECKS.add("hung1982.IV.all-small")
 def all_small(printed: Statement) -> Finding:
-    return turning_delta(printed.says("angles") == "sufficiently small", 0.1)
+    return turning_delta(printed.says("angles"), 0.1)
 
 
-def turning_delta(claimed: bool, limit: float) -> Finding:
-    """Whether δ stays below a limit, in radians, without misalignment and drift."""
-    turned = [abs(gyro_to_readout(phase)[0]) for phase in (0.0, math.pi / 4, math.pi / 2)]
-    degrees = ", ".join(f"{math.degrees(angle):.0f}" for angle in turned)
+def turning_delta(said: str, limit: float) -> Finding:
+    """Judge what is said of δ, without misalignment and drift, where a small angle is below a limit in radians."""
+    phases = np.array([0.0, math.pi / 4, math.pi / 2])
+    deltas = np.abs([gyro_to_readout(phase) for phase in phases])
+    degrees = ", ".join(f"{math.degrees(angle):.0f}" for angle in deltas[:, 0])
+    small = deltas.max(axis=0) < limit
+    first_alone = bool(small[1:].all() and not small[0])
+    meanings = {
+        "zero": bool(small.all()),
+        "zero except the roll angle $\\delta_1$": first_alone and bool(np.allclose(deltas[:, 0], phases)),
+        "sufficiently small": bool(small.all()),
+        "sufficiently small except $\\delta_1$": first_alone,
+    }
     return compare(
-        bool(claimed and max(turned) < limit),
+        meanings.get(said, False),
         f"without misalignment and drift, $\\delta_1$ is {degrees} degrees after 0, an eighth and a quarter of a roll",
         Verdict.INCONSISTENT,
         otherwise_note="the readout frame rolls but the gyro frame does not, so δ contains the roll angle; no "

@@ -9,7 +9,7 @@ import sympy as sp
 
 from gpbnb.geometry import derivation, theory
 from gpbnb.ledger.checks.geometry.registry import CHAPTER, CHECKS
-from gpbnb.ledger.finding import Finding, answer, compare, unverifiable
+from gpbnb.ledger.finding import Finding, answer, compare, given, unverifiable
 from gpbnb.ledger.statements import Statement
 from gpbnb.measurement import ARCSEC, deroll
 
@@ -112,3 +112,49 @@ def deroll_errors() -> tuple[float, float]:
     back = (theory.printed_deroll(readings, phase), deroll(readings, phase))
     as_printed, corrected = (float(np.hypot(*(each - inertial).T).max()) for each in back)
     return as_printed, corrected
+
+
+@CHECKS.add("hung1982.I.precession-in-orbit")
+def precession_in_orbit(printed: Statement) -> Finding:
+    rates = [math.hypot(*theory.precession_rates(altitude)) / ARCSEC for altitude in (0.0, 640e3, 3.6e7)]
+    return compare(
+        printed.says("gyroscope") == ("undergoes" if min(rates) > 0 else "does not undergo"),
+        "Schiff's formulas give a precession of "
+        f"{', '.join(f'{rate:.2g}' for rate in rates)} arcseconds a year at the ground, at 640 km and at 36000 km",
+        note="they hold in the frame of the fixed stars; a gyro in empty space at rest does not precess",
+    )
+
+
+@CHECKS.add("hung1982.I.two-effects")
+def two_effects(printed: Statement) -> Finding:
+    star_in_the_plane = {sp.Symbol("epsilon", real=True): 0}
+    product = next(step for step in derivation.precessions().steps if step.name.startswith("inner product"))
+    apart = bool(sp.simplify(product.left.subs(star_in_the_plane)) == 0)
+    tilted = sp.simplify(product.left) != 0
+    return compare(
+        printed.says("effects") == ("perpendicular to one another" if apart else "oblique to one another"),
+        "for a star in the plane of a polar orbit the inner product of the two drifts is 0",
+        note="for a star outside the plane it is not zero" if tilted else "",
+    )
+
+
+@CHECKS.add("hung1982.I.spin-spin")
+def spin_spin(printed: Statement) -> Finding:
+    turning = theory.precession_rates(640e3)
+    still = theory.precession_rates(640e3, 0.0)
+    lost = [
+        name for name, before, after in zip(("geodetic", "motional"), turning, still, strict=True) if before != after
+    ]
+    gone = lost == ["motional"] and still[1] == 0
+    return compare(
+        printed.says("coupling")
+        == ("between the gyroscope and the Earth's rotation" if gone else "between the gyroscope and the orbit"),
+        f"if the Earth did not rotate, the drifts at 640 km would be {still[0] / ARCSEC:.2f} and "
+        f"{still[1] / ARCSEC:.3f} arcseconds a year, instead of {turning[0] / ARCSEC:.2f} and "
+        f"{turning[1] / ARCSEC:.3f}: only the motional effect depends on the Earth's rotation",
+    )
+
+
+@CHECKS.add("hung1982.I.purpose")
+def purpose() -> Finding:
+    return given("states the purpose of the experiment")

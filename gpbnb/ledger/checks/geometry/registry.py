@@ -8,5 +8,3 @@ CHECKS = Checks()
 CHAPTER = chapter("geometry")
 MINUTE = 60 * ARCSEC
 """An arc minute in radians."""
-DEROLL = "estimates-roll-once-more"
-"""The root error of (8) and (9)."""

@@ -74,7 +74,7 @@ def at(now: Any, before: Any) -> Callable[[Any], Any]:
     def value(index: Any) -> Any:
         if index == N:
             return now
-        if index == N - 1:
+        if index == N - 1 and before is not None:
             return before
         raise LookupError(f"got cycle {index}; needed a cycle at which this case has a value")
 
@@ -135,7 +135,8 @@ def covariances(case: Case, before: sp.Matrix) -> Names:
             names[f"DeltaP_{i + 1}{j + 1}"] = at(after[i, j] - before[i, j], None)
     grown = after - before
     names["P_ee"] = at(*(p[2, 2] + p[1, 1] - 2 * p[2, 1] for p in (after, before)))
-    names["P_dot_ee"] = at((grown[2, 2] + grown[1, 1] - 2 * grown[2, 1]) / case.period, None)
+    names["DeltaP_ee"] = at(grown[2, 2] + grown[1, 1] - 2 * grown[2, 1], None)
+    names["P_dot_ee"] = at(names["DeltaP_ee"](sp.Symbol("n")) / case.period, None)
     return names
 
 

@@ -14,14 +14,15 @@ from gpbnb.ledger.agreement import hold, vanishes
 from gpbnb.ledger.checks.integration.cases import Case, cases, constants, states
 from gpbnb.ledger.checks.integration.registry import CHAPTER, CHECKS, MAIN, eq
 from gpbnb.ledger.finding import Finding, Verdict, compare, given, unverifiable
+from gpbnb.ledger.formula import Words
 from gpbnb.ledger.statements import Statement
 
 # -- title, abstract, figure ----------------------------------------------------------------------
 
 
-@CHECKS.add(MAIN + "stitle.date")
-def date() -> Finding:
-    return given("date and report number of the document")
+@CHECKS.add(MAIN + "stitle.date", MAIN + "stitle.author")
+def title_page() -> Finding:
+    return given("title, author, date and report number of the document")
 
 
 @CHECKS.add(MAIN + "sreference.reference")
@@ -45,6 +46,12 @@ _POWERS = {
 }
 
 
+def _limited(printed: Statement) -> bool:
+    """Whether a claim restricts itself to inputs that vary slowly between updates."""
+    ranges = {part.label: part.printed for part in printed.parts if isinstance(part, Words)}
+    return {"for small $\\mu$": True, "for every $\\mu$": False}[ranges.get("range", "for every $\\mu$")]
+
+
 @CHECKS.add(MAIN + "sabstract.abstract-claim")
 def abstract(printed: Statement) -> Finding:
     mu = np.array([1e-3, 0.1, 1.0, 10.0, 100.0])
@@ -52,8 +59,9 @@ def abstract(printed: Statement) -> Finding:
     in_rms = float(np.log(theory.random_walk(6.0, 5.0, 7.0) / theory.random_walk(2.0, 5.0, 7.0)) / np.log(3))
     amplitude, bandwidth, frequency = (_POWERS[printed.says(name)] for name in ("amplitude", "bandwidth", "frequency"))
     away = np.maximum(abs(width - bandwidth), abs(rate - frequency)) + abs(in_rms - amplitude)
+    small = mu <= 0.1 if _limited(printed) else mu < np.inf
     return compare(
-        bool(np.all(away < 0.01)),
+        bool(np.all(away[small] < 0.01)),
         f"the error varies with the bandwidth and the frequency to the powers {width[0]:.2f} and "
         f"{rate[0]:.2f} at $\\mu=10^{{-3}}$, {width[2]:.2f} and {rate[2]:.2f} at $\\mu=1$, and "
         f"{width[-1]:.2f} and {rate[-1]:.2f} at $\\mu=100$; it varies with the rms to the power "
@@ -61,7 +69,6 @@ def abstract(printed: Statement) -> Finding:
         Verdict.INCONSISTENT,
         otherwise_note="the claim is true only of approximation (39) for small $\\mu$, not of (35); (39) is 1 % too "
         f"large at $\\mu={theory.validity(0.01):.2f}$ and 10 % at {theory.validity(0.1):.2f}",
-        root="abstract-states-small-mu-limit",
     )
 
 
@@ -181,7 +188,12 @@ def matrices(printed: Statement) -> Finding:
     x1, x2, n1, w = sp.symbols("x_1 x_2 n_p1 omega_bw")
     x, a, noise = (printed.relation(k).value({"matrix": sp.Matrix}) for k in (1, 2, 3))
     rates = sp.Matrix([-w * x1 + n1, x1])  # (1)
-    agrees = x == sp.Matrix([x1, x2]) and vanishes(a - rates.jacobian(x)) and vanishes(rates - a * x - noise)
+    agrees = (
+        printed.equates
+        and x == sp.Matrix([x1, x2])
+        and vanishes(a - rates.jacobian(x))
+        and vanishes(rates - a * x - noise)
+    )
     return compare(
         bool(agrees),
         (
@@ -259,9 +271,8 @@ def transition_integral(printed: Statement) -> Finding:
         f"(7) exceeds the printed integral by ${sp.latex(residual)}$: $\\Phi(\\tau)=I+\\int_0^\\tau A\\Phi\\,d\\tau_1$",
         Verdict.MISPRINT,
         otherwise_note="the $I$ is missing, although $\\Phi(0)=I$ is printed beside the equation, and the limits "
-        "are those of $t$, not of $\\tau$; the printed equation has only the solution $\\Phi=0$. (7) "
-        "is right, so nothing depends on the misprint. The scan may have lost the $I$; the wrong "
-        "limits are the author's, since both integrals have them",
+        "are those of $t$, not of $\\tau$; by the printed equation $\\Phi(0)$ would be an integral over nothing, zero. "
+        "(7) is right, so nothing depends on the misprint. Both integrals have the wrong limits",
     )
 
 
@@ -275,11 +286,13 @@ def noise_integral(printed: Statement) -> Finding:
     agrees = True
     for case in cases():
         _, _, driven = _driven(case)
+        noise = sp.Matrix([_FORCE.subs(TAU, TAU - constants(case)["t"](sp.Symbol("n") - 1)), 0])
         names = {
             **constants(case),
             "Phi": transition_in_time(case),
             "tau": TAU,
-            "n_underline_P": sp.Matrix([_FORCE.subs(TAU, TAU - constants(case)["t"](sp.Symbol("n") - 1)), 0]),
+            "n_underline_P": noise,
+            "n_underline_p": lambda time, noise=noise: noise.subs(TAU, time),
             "Int": _integral,
             "q_underline": {sp.Symbol("n"): driven},
         }

@@ -62,7 +62,7 @@ def rate_in_mu(printed: Statement) -> Finding:
             "by $1-\\phi_{11}$"
         ),
         Verdict.MISPRINT if ends else Verdict.WRONG,
-        otherwise_note="the author or the scan has lost the factor $T$, which the third expression has again; "
+        otherwise_note="the factor $T$ is missing, which the third expression has again; "
         f"{if_used('(34)')}; with $T=1$ the misprint has no effect",
     )
 
@@ -163,7 +163,7 @@ def units(printed: Statement) -> Finding:
 def exponential(printed: Statement) -> Finding:
     (link,) = printed.links({"mu": MU, "dots": sp.O(MU**4)})
     ours = sp.series(link.left, MU, 0, 4).removeO()
-    agrees = link.right.has(sp.Order) and vanishes(link.right.removeO() - ours)
+    agrees = printed.equates and link.right.has(sp.Order) and vanishes(link.right.removeO() - ours)
     return compare(bool(agrees), f"${sp.latex(ours, order='rev-lex')}$, plus terms of order $\\mu^4$ and higher")
 
 
@@ -174,14 +174,14 @@ def series(printed: Statement) -> Finding:
     first, second, third, fourth, last = (sp.cancel(sp.together(_rational(link))) for link in links)
     others = all(_order(gap) >= 2 for gap in (first, third, fourth)) and last == 0
     return compare(
-        bool(others and second == 0),
+        bool(printed.equates and others and second == 0),
         (
             "the cubic term of the numerator must be $\\frac1{12}\\mu^3$; everything else, including the "
             "result $\\frac16\\mu$, is right"
         ),
         Verdict.MISPRINT if others else Verdict.WRONG,
-        otherwise_note="the factor 2 in front halves the quadratic term but was not applied to the cubic term, due "
-        "to the author or the scan; the next line drops the cubic term, so nothing depends on it. If "
+        otherwise_note="the factor 2 in front halves the quadratic term but was not applied to the cubic term; "
+        "the next line drops the cubic term, so nothing depends on it. If "
         f"kept, it would add a term ${sp.latex(derivation.printed_37(sp.Rational(1, 6)) - MU / 6)}$ to an odd "
         "function of $\\mu$",
     )

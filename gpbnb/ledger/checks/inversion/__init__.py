@@ -5,8 +5,17 @@ from gpbnb.ledger.checks.inversion import (
     first_approach,
     numerical_example,
     resultant,
+    sentences,
     triangularization,
 )
 from gpbnb.ledger.checks.inversion.registry import CHECKS
 
-__all__ = ["CHECKS", "back_substitution", "first_approach", "numerical_example", "resultant", "triangularization"]
+__all__ = [
+    "CHECKS",
+    "back_substitution",
+    "first_approach",
+    "numerical_example",
+    "resultant",
+    "sentences",
+    "triangularization",
+]

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.inversion import derivation
-from gpbnb.ledger.checks.inversion.first_order import EPSILON, FirstOrder, joined, matrix
+from gpbnb.ledger.checks.inversion.first_order import EPSILON, FirstOrder, joined, matrix, quantity
 from gpbnb.ledger.checks.inversion.judging import Names
 
 Round = Callable[[FirstOrder], FirstOrder]
@@ -205,7 +205,9 @@ def entries(x: FirstOrder) -> list[list[FirstOrder]]:
 
 
 def column(x: FirstOrder, j: int = 1) -> FirstOrder:
-    """Return the jth column."""
+    """Return the jth column; LookupError if there is none."""
+    if not 1 <= j <= x.value.shape[1]:
+        raise LookupError(f"got column {j}; needed a number from 1 to {x.value.shape[1]}")
     return FirstOrder(x.value[:, j - 1 : j], x.slope[:, j - 1 : j])
 
 
@@ -320,7 +322,7 @@ def square(x: FirstOrder) -> Named:
 def substitutions(n: int) -> tuple[Names, ...]:
     """Return symbols of section 11.2 for random triangular systems of n rows; k and j are the indices of some entry."""
     found = []
-    for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1))):
+    for seed, (k, j, sign) in enumerate(((1, n, 1), (2, 3, -1), (1, 3, Fraction(1, 2)))):
         rng = random.Random(7000 + 10 * n + seed)
         upper = np.triu(random_matrix(rng, n, n)) + Fraction(0)
         right = random_matrix(rng, n, 1)
@@ -351,6 +353,7 @@ def substitutions(n: int) -> tuple[Names, ...]:
                 "Deltab": vector(right_change),
                 "Deltax": x_hat - x,
                 "A_D": FirstOrder(np.triu(upper, 1) + Fraction(0)),
+                "diag": lambda *numbers: diagonal([quantity(each).value for each in numbers]),
                 "M_A": on_diagonal(diagonal([Fraction(x) for x in roundings(n)[0][0]])),
                 "M_b": on_diagonal(of_right),
             }
@@ -400,6 +403,7 @@ def inverses(n: int = 3) -> tuple[Names, ...]:
                 "deltax": lambda c, d=error: column(d, int(c)),
                 "delta": lambda x, a=a, d=error: d if x == a.inv() else None,
                 "column": lambda x, c: column(x, int(c)),
+                "matrix": joined,
                 "E": e,
                 "D": e,
             }

@@ -13,8 +13,9 @@ from gpbnb.ledger.finding import Finding, Verdict, compare
 from gpbnb.ledger.statements import Statement
 
 Names = Mapping[str, Any]
-_SYMBOLS: dict[str, Callable[[Any, Any], Any]] = {
+SYMBOLS: dict[str, Callable[[Any, Any], Any]] = {
     "==": operator.eq,
+    "!=": operator.ne,
     "≈": operator.eq,  # to first order
     "<=": operator.le,
     ">=": lambda a, b: b <= a,
@@ -40,7 +41,7 @@ def holds(printed: Statement, environments: Iterable[Names], sharp: bool = True)
     attained: dict[int, bool] = {}
     for names in environments:
         for place, link in enumerate(printed.links({**COMMON, **names}, Fraction)):
-            if not _SYMBOLS[link.symbol](link.left, link.right):
+            if not SYMBOLS[link.symbol](link.left, link.right):
                 return False
             attained[place] = attained.get(place, False) or bool(link.left == link.right)
     return bool(attained) and (not sharp or all(attained.values()))

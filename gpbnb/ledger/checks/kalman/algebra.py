@@ -13,6 +13,7 @@ from typing import Any
 import sympy as sp
 
 from gpbnb.kalman import derivation as d
+from gpbnb.ledger.formula import Undefined
 from gpbnb.ledger.statements import Statement
 
 H, R, B, NORM_X = sp.symbols("H R B norm_x", positive=True)
@@ -123,6 +124,14 @@ def holds(printed: Statement, names: dict[str, Any]) -> bool:
     """
     links = printed.links(names)
     return bool(links) and all(_agree(link.left, link.symbol, link.right) for link in links)
+
+
+def follows(printed: Statement, names: dict[str, Any]) -> bool:
+    """Whether a printed chain follows from the report's own algebra; a chain in other terms does not."""
+    try:
+        return holds(printed, names)
+    except (Undefined, sp.PolynomialError):
+        return False
 
 
 def _agree(left: Any, symbol: str, right: Any) -> bool:

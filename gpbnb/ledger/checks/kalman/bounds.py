@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import operator
 from fractions import Fraction
 from typing import Any
 
+import sympy as sp
+
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+from gpbnb.arithmetic.rational import exact, max_norm
 from gpbnb.kalman import derivation, report_bounds, smallest
-from gpbnb.ledger.checks.kalman import algebra
-from gpbnb.ledger.checks.kalman.excess import exceeded, excess
+from gpbnb.ledger.checks.inversion.first_order import FirstOrder
+from gpbnb.ledger.checks.kalman import algebra, worst_case
+from gpbnb.ledger.checks.kalman.judging import bounded, judge
 from gpbnb.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.ledger.checks.kalman.steps import SIGNS
 from gpbnb.ledger.finding import Finding, Verdict, compare
@@ -23,31 +27,44 @@ _NO_BOUND = (
 _BETA = "; the prefactor is $\\beta$, as in the example, although the scans show B"
 
 
+def _several_steps(printed: Statement, names: dict[str, Any], note: str, otherwise: str = "") -> Finding:
+    instances = (*worst_case.several_steps(), *worst_case.tight_steps())
+    return bounded(printed, instances, names, note, SIGNS, otherwise)
+
+
 @CHECKS.add(*both("eq119"), *both("eq120"))
 def three_steps(printed: Statement) -> Finding:
-    right = algebra.holds(printed, algebra.three_steps(twice=True))
-    return exceeded(
-        "(119)",
-        right,
+    return _several_steps(
+        printed,
+        algebra.three_steps(twice=True),
         "(114) rests on bounds that fail, and roundings are counted twice; each term of (118) has "
-        "its own error, so the errors do not combine into one multiple of $x_3$"
-        + ("" if right else "; $3m+1$ is printed for $3n+1$"),
-        SIGNS,
+        "its own error, so the errors do not combine into one multiple of $x_3$",
+        "; $3m+1$ is printed for $3n+1$",
     )
 
 
+#: States, measurements, x_0 and inputs for (121). In the first two, each term of (120) has the same sign.
+_SCALARS = (
+    (2, 1, (20, -1, -2, -3)),
+    (3, 2, (30, -5, -1, -4)),
+    (1, 1, (2, 3, 5, 7)),
+    (1, 1, (2, -3, 5, -7)),
+    (1, 1, (-3, 1, 1, 1)),
+)
+
+
 def _instances() -> list[dict[str, Any]]:
-    """Return scalars for (121) with closed loops of 1 and inputs of different sign; the last input makes x_3 zero."""
+    """Return scalars for (121) with closed loops of 1 and inputs of different sign; the last inputs make x_3 zero."""
     found = []
-    for x_0, u_1, u_2, u_3 in ((2, 3, 5, 7), (2, -3, 5, -7), (-3, 1, 1, 1)):
-        values = [Fraction(each) for each in (x_0, u_1, u_2, u_3)]
+    for n, m, numbers in _SCALARS:
+        values = [Fraction(each) for each in numbers]
         counts = [derivation.count_start(derivation.TWICE[0])] + [
             derivation.count_input(*derivation.TWICE).subs(derivation.NTH, i) for i in (1, 2, 3)
         ]
-        at = {derivation.K: 3, derivation.N: 1, derivation.M: 1}
+        at = {derivation.K: 3, derivation.N: n, derivation.M: m}
         error = sum(int(count.subs(at)) * value for count, value in zip(counts, values, strict=True))
         found.append(
-            {"n": 1, "m": 1, "epsilon": 1, "F_3": 1, "F_2": 1, "norm": abs, "x_3": sum(values), "x_tilde_3": error}
+            {"n": n, "m": m, "epsilon": 1, "F_3": 1, "F_2": 1, "norm": abs, "x_3": sum(values), "x_tilde_3": error}
             | {f"u_{i}": values[i] for i in (1, 2, 3)}
         )
     return found
@@ -58,7 +75,8 @@ def norm_with_minus(printed: Statement) -> Finding:
     links = [link for names in _instances() for link in printed.links(names, Fraction)]
     last = links[-1]
     return compare(
-        all(link.symbol == "<=" and link.left <= link.right for link in links),
+        all(link.symbol == "<=" and link.left <= link.right for link in links)
+        and all(link.left == link.right for link in links[:2]),
         f"for $n=m=1$, $F_k=1$, $x_0=-3$ and $u_k=1$, the left side is ${last.left}\\epsilon$ and the "
         f"right side is ${last.right}\\epsilon$",
         otherwise_note=(
@@ -68,47 +86,46 @@ def norm_with_minus(printed: Statement) -> Finding:
     )
 
 
+#: Closed loops and inputs: one for which the norms (21) and (22) are not compatible, and one number.
+_LOOPS = (([["9/10", "9/10"], [0, 0]], [1, 1]), ([["3/2"]], [2]))
+
+
 @CHECKS.add(*both("s12.assumptions-before-122"))
 def assumptions(printed: Statement) -> Finding:
-    """Whether the smallest B that meets the printed assumptions bounds the terms of (122)."""
-    F, u = exact([["9/10", "9/10"], [0, 0]]), exact([1, 1])
-    need = max_norm(F @ F @ u)
-    names: dict[str, Any] = {"norm": lambda a: a, "F_k": column_sum_norm(F), "u_k": max_norm(u)}
-    loops, inputs = printed.relation(1).links(names, Fraction)[0], printed.relation(2).links(names, Fraction)[0]
-    least = {"F": loops.left, "u": inputs.left}
-    powers = [printed.relation(3).links(least | {"i": i}, Fraction)[0].left for i in range(3)]
+    """Whether the least F, u and B that meet the printed assumptions bound the terms of (122)."""
+    right, terms, least = True, [], []
+    for loop, entered in _LOOPS:
+        F, u = exact(loop), exact(entered)
+        names: dict[str, Any] = {"norm": FirstOrder.norm, "F_k": FirstOrder(F), "u_k": FirstOrder(u[:, None])}
+        of_loop, of_input = (printed.relation(i).links(names, Fraction)[0] for i in (1, 2))
+        norms = {"F": of_loop.left.value, "u": of_input.left.value}
+        of_terms = [printed.relation(3).links(norms | {"i": i}, Fraction)[0] for i in range(3)]
+        bounded_by = zip((of_loop, of_input, *of_terms), ("F", "u", "B", "B", "B"), strict=True)
+        right = right and all(link.symbol == "<=" and link.right == sp.Symbol(name) for link, name in bounded_by)
+        needed, powers = [max_norm(u), max_norm(F @ u), max_norm(F @ F @ u)], [link.left for link in of_terms]
+        right = right and (needed == powers if len(u) == 1 else all(map(operator.le, needed, powers)))
+        terms.append(needed[-1])
+        least.append(max(powers))
     return compare(
-        all(printed.relation(i).text.count("<=") for i in (1, 2, 3)) and need <= max(powers),
+        right,
         "for two steps with the closed loop $F=(0.9,0.9;0,0)$ and $u=(1,1)$, "
-        f"$\\|FFu\\|={float(need)}$, but the smallest $B$ is {float(max(powers))}",
+        f"$\\|FFu\\|={float(terms[0])}$; the smallest $B$ is {float(least[0])}",
         otherwise_note="the norms (21) and (22) are not compatible: $\\|Fu\\|\\le\\|F\\|\\|u\\|$ needs row sums",
         root="incompatible-norms",
     )
 
 
-@CHECKS.add(*both("eq122"))
-def three_steps_bounded(printed: Statement) -> Finding:
-    # Without inputs, (119) and (122) allow the same error.
-    return exceeded("(119)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS, name="(122)")
-
-
-@CHECKS.add("hung1984.II.eq124")
-def four_steps_bounded(printed: Statement) -> Finding:
-    return exceeded("(124)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS)
-
-
-@CHECKS.add("hung1984.II.eq125", "hung1982.III.eq124-125")
-def main_result(printed: Statement) -> Finding:
-    return exceeded("(125)", algebra.holds(printed, algebra.norms()), _NO_BOUND + _BETA, SIGNS)
+@CHECKS.add(*both("eq122"), *both("eq124"), *both("eq125"))
+def norm_bounds(printed: Statement) -> Finding:
+    return _several_steps(printed, algebra.norms(), _NO_BOUND + _BETA)
 
 
 @CHECKS.add(*both("s12.claim-main-result"))
 def claim_of_a_bound(printed: Statement) -> Finding:
-    times = excess("(125)")
-    bound = times <= 1
+    found = judge(statement("hung1984.II.eq125"), (*worst_case.several_steps(), *worst_case.tight_steps()))
     return compare(
-        printed.claims("equation (125)", {"gives the bound": bound, "does not give a bound": not bound}),
-        f"in four digits, the error of an example filter is {times:.3g} times what (125) allows",
+        printed.claims("equation (125)", {"gives the bound": found.right, "does not give a bound": not found.right}),
+        f"in four digits, the error of an example filter is {found.times:.3g} times what (125) allows",
         otherwise_note=_NO_BOUND,
         root=SIGNS,
     )

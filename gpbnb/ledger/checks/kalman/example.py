@@ -11,6 +11,7 @@ from gpbnb.display.tables import scientific
 from gpbnb.kalman import derivation, report_bounds
 from gpbnb.ledger.checks.kalman.registry import CHECKS
 from gpbnb.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.ledger.formula import Relation
 from gpbnb.ledger.registry import both
 from gpbnb.ledger.statements import Statement, statement
 
@@ -110,8 +111,9 @@ def _beta(printed: Statement, which: int, root: str, note: str) -> Finding:
     coefficient = coefficients()[which]
     beta = Fraction(1, coefficient)
     right = _number(printed, "beta", beta)
-    if printed.form.count("=="):
-        right = right and _terms(printed) == coefficient and printed.relation().value({}, Fraction) == 1
+    if any(isinstance(part, Relation) for part in printed.parts):
+        equation = printed.relation()
+        right = right and equation.equates and _terms(printed) == coefficient and equation.value({}, Fraction) == 1
     return compare(right, scientific(beta, 4), otherwise_note=note, root=root)
 
 
@@ -201,6 +203,6 @@ def name_of_the_experiment(printed: Statement) -> Finding:
     return compare(
         printed.claims("the experiment", {"GP-beta": False, "GP-B": True}),
         "GP-B",
-        Verdict.OCR,
+        Verdict.MISPRINT,
         otherwise_note="the scan shows β for B here, and B for β in (122)",
     )

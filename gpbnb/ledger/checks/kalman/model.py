@@ -51,12 +51,12 @@ def asterisk(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq98", "hung1984.II.eq98-repeated", "hung1984.II.eq111")
+@CHECKS.add(*both("eq98"), *both("eq98-repeated"), *both("eq111"))
 def estimate(printed: Statement) -> Finding:
     return compare(holds_exactly(printed), f"the equation gives the same estimate; {_EXACT}")
 
 
-@CHECKS.add("hung1984.II.eq99", "hung1984.II.s12.eq99-recalled")
+@CHECKS.add(*both("eq99"), *both("s12.eq99-recalled"))
 def gains(printed: Statement) -> Finding:
     cyclic = report_bounds.order(second=True) is None
     return compare(
@@ -67,19 +67,18 @@ def gains(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq100", "hung1982.III.eq98-101")
+@CHECKS.add(*both("eq100"))
 def prediction(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
         r"the covariance of $\Phi_{k-1}x_{k-1}+w_{k-1}$ contains $Q_{k-1}$",
         Verdict.INCONSISTENT,
-        otherwise_note="(100) prints $Q_k$; (102), which repeats it, has $Q_{k-1}$ in both reports. In the scan of "
-        "hung1982 neither this index nor that of $K$ in (101) is legible: we take the first from "
-        "hung1984 and the second from the context",
+        otherwise_note="(100) prints $Q_k$; (102), which repeats it, has $Q_{k-1}$ in both reports; where the scan of "
+        "hung1982 is not legible, we take the index from hung1984",
     )
 
 
-@CHECKS.add("hung1984.II.eq101")
+@CHECKS.add(*both("eq101"))
 def covariance(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
@@ -89,25 +88,16 @@ def covariance(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s12.eq100-recalled", "hung1984.II.s12.eq101-recalled", "hung1982.III.s12.recalled-98-101")
+@CHECKS.add(*both("s12.eq100-recalled"), *both("s12.eq101-recalled"))
 def recalled(printed: Statement) -> Finding:
     return compare(holds_exactly(printed), _EXACT)
 
 
-@CHECKS.add("hung1984.II.eq109", "hung1984.II.eq110")
+@CHECKS.add(*both("eq109"), *both("eq110"))
 def defined(printed: Statement) -> Finding:
     if holds_exactly(printed):
         return given("this defines $F_k$ or $u_k$; with this definition (111) gives the estimate of (98)")
     return compare(False, "with this definition (111) does not give the estimate of (98)")
-
-
-@CHECKS.add("hung1982.III.eq109-111")
-def closed_loop(printed: Statement) -> Finding:
-    return compare(
-        holds_exactly(printed),
-        f"the equation gives the same estimate; {_EXACT}",
-        note="where the scan is garbled, the text is restored from hung1984",
-    )
 
 
 @CHECKS.add("hung1984.II.eq118", "hung1982.III.eq118", "hung1984.II.eq123")
@@ -120,7 +110,7 @@ def unrolled_1982(printed: Statement) -> Finding:
     return compare(
         holds_exactly(printed),
         "the equation gives the estimate only with the term $u_4$",
-        Verdict.OCR,
+        Verdict.MISPRINT,
         otherwise_note="the scan has lost the last term, but the report must contain it: hung1984 prints it, and "
         "(124), which is the same in both reports, counts it",
     )

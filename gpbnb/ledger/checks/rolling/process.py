@@ -69,6 +69,7 @@ def signals() -> tuple[Names, ...]:
                 "n": fixed(n),
                 "c": fixed(carrier),
                 "d": fixed(demodulator),
+                "s_1": fixed(s * carrier),
                 "m": fixed(s * carrier + n),
                 "s_x": sx,
                 "s_y": sy,
@@ -182,9 +183,15 @@ def equivalent(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(entry("s1.carriers"), *(entry(e) for e in ("eq1", "eq2", "eq9", "eq6")))
+@CHECKS.add(entry("s1.carriers"), *(entry(e) for e in ("eq1", "eq9", "eq6")))
 def definitions() -> Finding:
     return given("states the model: carriers, rolled signal and measured signal")
+
+
+@CHECKS.add(entry("eq2"))
+def measured_signal(printed: Statement) -> Finding:
+    agrees = all(hold(printed.links(names)) for names in signals())
+    return compare(agrees, "the measured signal is the rolled signal of (1) plus the noise")
 
 
 @CHECKS.add(entry("eq3"))
@@ -222,7 +229,7 @@ def best_phase(printed: Statement) -> Finding:
     return compare(
         _ANGLES[printed.says("angle")] == best and printed.says("demodulation") == name,
         "$\\cos\\theta$ is largest at $\\theta=0$",
-        note="in two dimensions the strength does not depend on θ, but the direction does",
+        note="this is said of the one signal of (1) to (4); for the pair it holds in the channel of each signal",
     )
 
 
@@ -326,7 +333,7 @@ def one_over_t(printed: Statement) -> Finding:
         "halving the roll period divides the density of $1/f$ noise at the roll frequency by "
         f"{long / short:g}; noise with a $1/T$ law would double",
         Verdict.MISPRINT,
-        otherwise_note="T stands for f, due to the author or the scan; all other places have $1/f$",
+        otherwise_note="T stands for f; all other places have $1/f$",
     )
 
 

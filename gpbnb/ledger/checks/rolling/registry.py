@@ -1,4 +1,9 @@
-"""The register of the checks of hung1984, ch. III, and their common names."""
+"""The register of the checks of hung1984, ch. III, and their common names.
+
+One standard holds for the whole chapter. Equations (1) to (4) and section 4, which says so, consider a one-dimensional
+signal: what they state is judged for one signal. All other statements are about the experiment and are judged for its
+pair of signals, (5) to (8). There, strength and signal-to-noise ratio mean those of each signal in its own channel.
+"""
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.ledger.html import chapter
@@ -12,7 +17,7 @@ PRINTED = Rounding.documented()
 ALLOWED = 0.15
 """Error of a single source in mas, from the text on Figure II-2 in hung1982, ch. II."""
 ONE_DIMENSION = "roll-errors-in-one-dimension"
-"""The root error of judging roll errors by only one of the two signals."""
+"""The root error of judging a roll error of the experiment by only one of its two signals."""
 
 
 def entry(place: str) -> str:

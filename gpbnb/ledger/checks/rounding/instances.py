@@ -73,8 +73,8 @@ class Judgement:
 
 
 def relations(printed: Statement) -> tuple[Relation, ...]:
-    """Return the relations of a statement without dots, which can be evaluated."""
-    return tuple(part for part in printed.parts if isinstance(part, Relation) and "..." not in part.text)
+    """Return the relations of a statement, without products with dots, which cannot be evaluated."""
+    return tuple(part for part in printed.parts if isinstance(part, Relation) and "*...*" not in part.text)
 
 
 def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bool = False) -> Judgement:
@@ -83,20 +83,24 @@ def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bo
     Parameters
     ----------
     found : printed relations.
-    instances : the values of their names.
+    instances : the values of their names; where ``tight`` is true, the first bound of each relation must be attained.
     first_order : whether differences of second order are allowed; ``≈`` always allows them.
     """
     found = tuple(found)
     count = violated = 0
     attained: dict[int, bool] = {}
+    missed: set[int] = set()
     for names in instances:
-        links = [link for relation in found for link in relation.links(names, number=lambda q: q)]
+        links = [(k, link) for k, relation in enumerate(found) for link in relation.links(names, number=lambda q: q)]
         count += 1
-        violated += not all(link_holds(link, first_order) for link in links)
-        for i, link in enumerate(links):
-            if link.symbol not in ("==", "≈"):
-                attained[i] = attained.get(i, False) or _attains(link)
-    return Judgement(count, violated, tuple(i for i, reached in attained.items() if not reached))
+        violated += not all(link_holds(link, first_order) for _, link in links)
+        bounds = {i: (k, _attains(link)) for i, (k, link) in enumerate(links) if link.symbol not in ("==", "≈")}
+        for i, (_, reached) in bounds.items():
+            attained[i] = attained.get(i, False) or reached
+        if names.get("tight"):
+            first = {k: i for i, (k, _) in reversed(bounds.items())}
+            missed |= {i for i in first.values() if not bounds[i][1]}
+    return Judgement(count, violated, tuple(i for i, reached in attained.items() if not reached or i in missed))
 
 
 def link_holds(link: Link, first_order: bool = False) -> bool:
@@ -109,6 +113,8 @@ def link_holds(link: Link, first_order: bool = False) -> bool:
     match link.symbol:
         case "==" | "≈":
             return bool(np.all(abs(difference) <= slack))
+        case "!=":
+            return bool(np.any(abs(difference) > slack))
         case "<=" | "<":
             return bool(np.all(difference <= slack)) and (link.symbol == "<=" or bool(np.all(difference < slack)))
         case _:

@@ -111,7 +111,7 @@ def norm_property_v(printed: Statement) -> Finding:
     return compare(
         found.right,
         f"the printed relation {found}; with $\\le$ it holds in {at_most}",
-        Verdict.OCR if at_most == len(instances) else Verdict.WRONG,
+        Verdict.MISPRINT if at_most == len(instances) else Verdict.WRONG,
         otherwise_note="$\\le$ is meant, as hung1984 prints it; the scan also shows the $\\le$ of (13) as =",
     )
 
@@ -175,7 +175,7 @@ def beta_after_24(printed: Statement) -> Finding:
     return compare(
         found.right,
         f"$\\beta={beta / step}\\,b^{{1-t}}$, measured; the printed formula {found}",
-        Verdict.OCR,
+        Verdict.MISPRINT,
         otherwise_note="hung1982 prints $\\frac12$; this scan also shows other digits and letters as $\\epsilon$, "
         "such as the l of $fl$ in section 11",
     )

@@ -43,9 +43,9 @@ def sums(n: int | None = None) -> tuple[dict[str, Any], ...]:
     instances = []
     for count in (n,) if n else (3, 4, 6):
         worst = [BETA] * (count - 1)
-        alternating = [Fraction(10), Fraction(3), *(Fraction(-1, j) for j in range(3, count + 1))]
+        alternating = [Fraction(10), Fraction(3), *(Fraction(-1 - j % 2) for j in range(2, count))]
         equal = [Fraction(1, 2)] * 2 + [Fraction(1)] * (count - 2)
-        instances += [_sum_names(alternating, worst), _sum_names(equal, worst)]
+        instances += [_sum_names(alternating, worst) | {"tight": True}, _sum_names(equal, worst)]
         instances += [_sum_names(fractions(rng, count), small(rng, count - 1)) for _ in range(6)]
         instances += [_sum_names(fractions(rng, count), worst) for _ in range(6)]
     return tuple(instances)
@@ -194,5 +194,4 @@ def product_bound(printed: Statement) -> Finding:
         otherwise_note="the bound is too large by 2β and contradicts the report's own example, $2\\beta$ for "
         "$x_1x_2/y_1$, and hung1982 (20); even so it is not strict: the error for 20 factors of two "
         f"digits can be {exceeded}",
-        root="product-roundings-overcounted",
     )

@@ -1,0 +1,79 @@
+"""Author or scan: the rule, and the data to which it is applied."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from gpbnb import ledger
+from gpbnb.ledger import legibility
+from gpbnb.ledger.finding import DISAGREEMENTS, Verdict, compare, given
+from gpbnb.ledger.legibility import Damage, charged, load_legibility
+
+DAMAGES = load_legibility()
+PACKAGE = Path(legibility.__file__).parent
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return {row.statement.id: row for row in ledger.rows()}
+
+
+@pytest.fixture
+def damaged(monkeypatch):
+    """A statement a with a witness, and a statement b without one."""
+    found = {"a": Damage("a", "l", "c"), "b": Damage("b", "l")}
+    monkeypatch.setattr(legibility, "load_legibility", lambda: found)
+
+
+@pytest.mark.parametrize("verdict", DISAGREEMENTS)
+def test_a_witness_charges_the_scan(damaged, verdict):
+    author = compare(False, "1", verdict, "why", root="product")
+    found = charged("a", author)
+    assert (found.verdict, found.root) == (Verdict.OCR, "")
+    assert (found.recomputed, found.note, found.agrees) == ("1", "why", False)
+
+
+@pytest.mark.parametrize("key", ["b", "c"])
+def test_without_a_witness_the_author_is_charged(damaged, key):
+    author = compare(False, "1", Verdict.MISPRINT, "why")
+    assert charged(key, author) is author
+
+
+def test_a_statement_that_is_right_needs_nobody_to_charge(damaged):
+    for right in (compare(True, "1"), given("a definition")):
+        assert charged("a", right) is right
+
+
+def test_a_damage_shows_characters():
+    with pytest.raises(ValueError, match="got a blank scan for a; needed the characters"):
+        Damage("a", " ")
+
+
+def test_each_damage_belongs_to_a_statement_and_each_witness_is_right(rows):
+    assert set(DAMAGES) <= set(rows)
+    for damage in DAMAGES.values():
+        if damage.witness and damage.witness != damage.id:
+            assert rows[damage.witness].finding.verdict in (Verdict.VERIFIED, Verdict.GIVEN), damage.id
+
+
+def test_the_scan_is_charged_exactly_where_there_is_a_witness(rows):
+    charged_to_scan = {key for key, row in rows.items() if row.finding.verdict is Verdict.OCR}
+    assert charged_to_scan == {damage.id for damage in DAMAGES.values() if damage.witness}
+
+
+def test_no_check_charges_the_scan_by_itself():
+    def names(path):
+        return {ast.unparse(n) for n in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(n, ast.Attribute)}
+
+    assert [path.name for path in (PACKAGE / "checks").rglob("*.py") if "Verdict.OCR" in names(path)] == []
+
+
+def test_an_entry_shows_the_characters_of_a_damaged_scan(rows):
+    row = rows["hung1982.IV.eq9"]
+    page = next(page for page in ledger.PAGES if page.holds(row.statement))
+    html = ledger.ledger_page([row], page).html
+    assert '<p class="scan"><code>r33 Cut Swt Yy; = (9); -62 -Sut Cut Z,</code></p>' in html
+    assert html.index('class="scan"') < html.index("<details>")
+    legible = rows["hung1982.IV.six-frames"]
+    assert 'class="scan"' not in ledger.ledger_page([legible], page).html
