@@ -44,7 +44,6 @@ REASONS = (
     "gain not settled",
     "unstable loop",
     "too few digits",
-    "exact filter stopped",
     "another",
 )
 
@@ -288,7 +287,6 @@ def _unexamined(seed: int, drawn: Drawn) -> Row:
 def reason_of(text: str) -> str:
     """Return the short name of the reason why there is no bound for all time."""
     known = {
-        "exact filter stopped": "exact filter stopped",
         "with compiled loops": "no compiled loops",
         "range": "beyond the range",
         "normal numbers": "beyond the range",
