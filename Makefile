@@ -68,7 +68,7 @@ test-portable: .venv/made-for ## notebooks and numerical tests as on other machi
 	$(PY) scripts/portable.py $(if $(QUICK),--quick) $(SETTINGS)
 
 verify-sweeps: .venv/made-for ## a sample of every stored sweep computed again on this machine; SAMPLE=5 takes more cells
-	$(PY) -m gpbnb.sweeps verify --sample $(or $(SAMPLE),1)
+	$(PY) -m gpbnb.report.stored verify --sample $(or $(SAMPLE),1)
 
 notebooks: .venv/made-for ## execute the notebooks in place
 	$(PY) scripts/execute_notebooks.py
@@ -93,7 +93,7 @@ bench: .venv/made-for ## timings against peers, side by side
 	$(PY) -m benchmarks.year
 
 # yattag, which cosmic-ray uses, has no wheel.
-mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/budget/theory.py" or SINCE=HEAD~3 picks files, OPTIONS=--measure finds the tests of each line first
+mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/report/budget/theory.py" or SINCE=HEAD~3 picks files, OPTIONS=--measure finds the tests of each line first
 	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r tests/mutants/environment.txt
 	$(PY) -m tests.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(OPTIONS)
 

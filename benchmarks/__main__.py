@@ -12,7 +12,7 @@ from tqdm import tqdm
 from benchmarks import integration, kalman, multiply_add, rounding
 from benchmarks.figure import amount, draw
 from benchmarks.timing import Row, machine
-from gpbnb.display.tables import Table
+from gpbnb.report.display.tables import Table
 
 RESULTS = Path(__file__).parent / "results"
 

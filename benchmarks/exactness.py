@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gpbnb.arithmetic.kernels import backends
-from gpbnb.display.tables import Table
+from gpbnb.report.display.tables import Table
 
 PRECISIONS = {2: range(1, 54), 10: range(1, 19), 16: range(1, 14)}
 OPERATIONS = ("add", "subtract", "multiply", "divide", "sqrt", "round")

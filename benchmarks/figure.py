@@ -9,7 +9,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 
 from benchmarks.timing import Row
-from gpbnb.display.style import BLACK, OBSERVED, REFERENCE, figure, label, legend
+from gpbnb.report.display.style import BLACK, OBSERVED, REFERENCE, figure, label, legend
 
 
 def draw(table: Sequence[Row], path: Path) -> None:

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from benchmarks.timing import machine
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.display.tables import Table
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import guarantee, limits
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.report.display.tables import Table
 from gpbnb.wordlength.examples import cyclic
 
 RESULTS = Path(__file__).parent / "results"

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.timing import Row, medians, rows
-from gpbnb.integration import experiment, theory
+from gpbnb.report.integration import experiment, theory
 
 COUNT = 10_000_000
 CHUNK = 1 << 19  # cycles at a time, as in experiment.chunks

@@ -44,9 +44,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gpbnb.arithmetic import named
+from gpbnb.arithmetic import rounding as rules
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels import bits, elementwise, processor, rules
-from gpbnb.display.tables import Table
+from gpbnb.arithmetic.kernels import bits, elementwise, processor
+from gpbnb.report.display.tables import Table
 
 RESULTS = Path(__file__).parent / "results"
 SMALL: dict[str, tuple[FloatFormat, Any]] = {

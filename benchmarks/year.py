@@ -18,14 +18,15 @@ from tqdm import tqdm
 from benchmarks.kalman import numpy_step
 from benchmarks.timing import machine
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.display.tables import Table
-from gpbnb.kalman import gravity_probe_b, year_cases
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import TRUTH
-from gpbnb.kalman.mission import Mission
-from gpbnb.kalman.records import Records
-from gpbnb.kalman.simulation import BLOCK
+from gpbnb.filters.forms import Form
+from gpbnb.filters.parallel import Records
+from gpbnb.filters.run import Run
+from gpbnb.filters.simulation import BLOCK
+from gpbnb.report.display.tables import Table
+from gpbnb.report.gravity_probe_b import model as gravity_probe_b
+from gpbnb.report.gravity_probe_b import year_cases
+from gpbnb.report.gravity_probe_b.mission import Mission
+from gpbnb.report.gravity_probe_b.model import TRUTH
 
 RESULTS = Path(__file__).parent / "results"
 RECORDS = 100

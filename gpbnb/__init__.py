@@ -44,11 +44,11 @@ if TYPE_CHECKING:
         IBM_HEX64,
         TF32,
     )
-    from gpbnb.kalman.model import LinearModel
-    from gpbnb.kalman.precision import required_precision
-    from gpbnb.kalman.system import LinearSystem
+    from gpbnb.filters.model import LinearModel
     from gpbnb.wordlength.models import read_model
+    from gpbnb.wordlength.precision import required_precision
     from gpbnb.wordlength.records import survey_records
+    from gpbnb.wordlength.system import LinearSystem
 
 __version__ = "0.2.0"
 # fmt: off
@@ -69,12 +69,12 @@ _HOME = {
     "FixedFormat": "gpbnb.arithmetic.fixed",
     "FloatArray": "gpbnb.arithmetic.array",
     "FloatFormat": "gpbnb.arithmetic.formats",
-    "LinearModel": "gpbnb.kalman.model",
-    "LinearSystem": "gpbnb.kalman.system",
+    "LinearModel": "gpbnb.filters.model",
+    "LinearSystem": "gpbnb.wordlength.system",
     "Rounding": "gpbnb.arithmetic.formats",
     "peek": "gpbnb.arithmetic.exits",
     "read_model": "gpbnb.wordlength.models",
-    "required_precision": "gpbnb.kalman.precision",
+    "required_precision": "gpbnb.wordlength.precision",
     "survey_records": "gpbnb.wordlength.records",
 }
 

@@ -10,25 +10,25 @@ from collections.abc import Sequence
 COMMANDS = {
     "wordlength": "how many digits your own filter needs, with a report",
     "ledger": "every printed equation, number and claim, with its verdict",
-    "sweeps": "list the stored sweeps, or verify a sample of them",
-    "rolling": "compute the stored drift rates again",
-    "inversion": "compute the stored sweeps over inverses again",
-    "kalman.year": "compute the emulated years again",
-    "kalman.ensembles": "compute the random filters again",
-    "kalman.threshold": "compute the years of hundreds of records again",
-    "kalman.mission_runs": "compute the years of the mission model again",
-    "kalman.guarantee.horizon": "compute the bounds for a year of Gravity Probe B again",
-    "kalman.guarantee.survey": "compute the survey of guarantees again",
-    "kalman.guarantee.filters": "compute random Kalman filters against their guarantees again",
-    "kalman.guarantee.scalar": "compute the worst errors of scalar filters again",
-    "wordlength.guarantees": "compute the table of guarantees again",
+    "report.stored": "list the stored sweeps, or verify a sample of them",
+    "report.rolling": "compute the stored drift rates again",
+    "report.inversion": "compute the stored sweeps over inverses again",
+    "report.gravity_probe_b.year": "compute the emulated years again",
+    "report.kalman.ensembles": "compute the random filters again",
+    "report.gravity_probe_b.threshold": "compute the years of hundreds of records again",
+    "report.gravity_probe_b.mission_runs": "compute the years of the mission model again",
+    "report.gravity_probe_b.horizon": "compute the bounds for a year of Gravity Probe B again",
+    "report.guarantees.survey": "compute the survey of guarantees again",
+    "report.guarantees.filters": "compute random Kalman filters against their guarantees again",
+    "report.guarantees.scalar": "compute the worst errors of scalar filters again",
+    "report.guarantees.table": "compute the table of guarantees again",
 }
 """Commands, each also available as ``python -m gpbnb.<command>``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
-    lines = "\n".join(f"  {name:<24} {help_}" for name, help_ in COMMANDS.items())
+    lines = "\n".join(f"  {name:<34} {help_}" for name, help_ in COMMANDS.items())
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb",
         description="Rounding errors in recursive filters, integrators and matrix computations.",

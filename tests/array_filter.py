@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic import linalg
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters.model import LinearModel
 
 
 def estimates(

@@ -16,7 +16,7 @@ def ax(request):
     """An empty panel of a figure, whose title and axes get the names written out in `title_and_axes`."""
     import matplotlib.pyplot as plt
 
-    from gpbnb.display import style
+    from gpbnb.report.display import style
 
     figure, axes = style.figure()
     yield axes[0]

@@ -30,7 +30,7 @@ def names_of(ax: Axes) -> list[str]:
 
 
 def colour(artist: Artist) -> str:
-    """As written in gpbnb.display.style."""
+    """As written in gpbnb.report.display.style."""
     return to_hex(artist.get_color()).upper()
 
 

@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 import sympy as sp
 
-from gpbnb import ledger
-from gpbnb.display.derivation import Derivation
-from gpbnb.ledger.checking import Row, examine_once
-from gpbnb.ledger.finding import Finding, Verdict
-from gpbnb.ledger.registry import Checks
-from gpbnb.ledger.render import to_text
+from gpbnb.report import ledger
+from gpbnb.report.display.derivation import Derivation
+from gpbnb.report.ledger.checking import Row, examine_once
+from gpbnb.report.ledger.finding import Finding, Verdict
+from gpbnb.report.ledger.registry import Checks
+from gpbnb.report.ledger.render import to_text
 
 Change = Callable[[pytest.MonkeyPatch], None]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = (

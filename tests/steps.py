@@ -10,7 +10,7 @@ from functools import cache
 import sympy as sp
 from sympy.core.function import AppliedUndef
 
-from gpbnb.display.derivation import Derivation, Step
+from gpbnb.report.display.derivation import Derivation, Step
 
 UNEVALUATED = (sp.Integral, sp.Sum, sp.Limit, sp.Derivative)
 AMOUNT = sp.Symbol("amount", positive=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpbnb.display.tables import Table
+from gpbnb.report.display.tables import Table
 
 
 def by_header(table: Table) -> list[dict[str, str]]:

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.budget import theory as budget
-from gpbnb.geometry import theory as geometry
-from gpbnb.kalman import answers, ensembles, probability, threshold, year, year_cases
-from gpbnb.kalman.forms import Form
-from gpbnb.rolling import experiment as rolling_experiment
-from gpbnb.rolling import theory as rolling
-from gpbnb.rounding import experiment as rounding
+from gpbnb.filters.forms import Form
+from gpbnb.report.budget import theory as budget
+from gpbnb.report.geometry import theory as geometry
+from gpbnb.report.gravity_probe_b import answers, probability, threshold, year, year_cases
+from gpbnb.report.kalman import ensembles
+from gpbnb.report.rolling import experiment as rolling_experiment
+from gpbnb.report.rolling import theory as rolling
+from gpbnb.report.rounding import experiment as rounding
 
 BOOK = Path(__file__).resolve().parents[1] / "book"
 ARCSEC = math.pi / 180 / 3600
@@ -128,7 +129,7 @@ def test_filters_and_resets():
 
 
 def test_budget():
-    example = budget.read(files("gpbnb.budget") / "example.csv").budget
+    example = budget.read(files("gpbnb.report.budget") / "example.csv").budget
     shares = sorted(((100 * example.share(each), each.name) for each in example.sources), reverse=True)
     text = alt("budget", "fig-own")
     numbers = [f"{share:.0f}" for share, _ in shares]

@@ -13,16 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding, linalg, required_precision
-from gpbnb.budget import theory as budget
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.guarantee.bound import guarantee
-from gpbnb.kalman.named import form_named, rounding_named, whole_number
-from gpbnb.kalman.requirement import Requirement
-from gpbnb.kalman.simulation import Simulation
-from gpbnb.rounding import theory
+from gpbnb.bounds.guarantee import guarantee
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.named import form_named, rounding_named, whole_number
+from gpbnb.filters.simulation import Simulation
+from gpbnb.report.budget import theory as budget
+from gpbnb.report.rounding import theory
 from gpbnb.sweeps import plain_integer, plain_number
 from gpbnb.wordlength.models import read_model
 from gpbnb.wordlength.records import survey_records
+from gpbnb.wordlength.requirement import Requirement
 
 # GPBNB_EXAMPLES=20000 tries more.
 EXAMPLES = int(os.environ.get("GPBNB_EXAMPLES", "400"))

@@ -16,8 +16,8 @@ from sphinx.application import Sphinx
 from sphinx.errors import ConfigError
 from sphinx.util.docutils import docutils_namespace
 
-from gpbnb.ledger import PAGES, load_statements
-from gpbnb.ledger.page import address
+from gpbnb.report.ledger import PAGES, load_statements
+from gpbnb.report.ledger.page import address
 
 FOLDER = Path(__file__).resolve().parents[1] / "book" / "_ext"
 

@@ -14,16 +14,17 @@ import pytest
 from test_commands import COMMANDS
 
 from gpbnb import __main__ as top
-from gpbnb.inversion import __main__ as inversion
-from gpbnb.inversion import stored as stored_inversion
-from gpbnb.kalman import ensembles
-from gpbnb.kalman.guarantee import horizon, survey
-from gpbnb.ledger import __main__ as ledger
-from gpbnb.rolling import __main__ as rolling
+from gpbnb.report.gravity_probe_b import horizon
+from gpbnb.report.guarantees import survey
+from gpbnb.report.guarantees import table as guarantees
+from gpbnb.report.inversion import __main__ as inversion
+from gpbnb.report.inversion import stored as stored_inversion
+from gpbnb.report.kalman import ensembles
+from gpbnb.report.ledger import command as ledger
+from gpbnb.report.rolling import __main__ as rolling
 from gpbnb.sweeps import read
 from gpbnb.sweeps.sweep import Sweep
 from gpbnb.wordlength import __main__ as wordlength
-from gpbnb.wordlength import guarantees
 
 LIMITS = "guarantee and probable: largest size of each {} of the filter without rounding"
 SWEPT = {
@@ -33,7 +34,7 @@ SWEPT = {
 }
 #: What each command does, and each option with its default and what it is for.
 OPTIONS = {
-    "inversion.__main__": (
+    "report.inversion.__main__": (
         "Recompute the long sweeps",
         {
             "sweeps": (["variants", "random"], "sweeps to compute: variants, random; default: both"),
@@ -42,11 +43,11 @@ OPTIONS = {
             "--directory": (".cache/inversion", "folder for saved progress"),
         },
     ),
-    "rolling.__main__": (
+    "report.rolling.__main__": (
         "drift rates of all gyros, about 40 s of processor time",
         {"--output": (".cache/drift_rates", "folder for drift_rates.csv and saved progress")},
     ),
-    "kalman.year": (
+    "report.gravity_probe_b.year": (
         "Run the filters for a year",
         {
             "--directory": (".cache/year", "folder for saved progress"),
@@ -55,28 +56,28 @@ OPTIONS = {
             "--output": (".cache/year", "folder for year.csv and year.json"),
         },
     ),
-    "kalman.ensembles": (
+    "report.kalman.ensembles": (
         "random filters",
         {
             "--repeats": (34, "number of trials for each kind, format and form"),
             "--output": (".cache/ensembles", "folder for the two files"),
         },
     ),
-    "kalman.threshold": (
+    "report.gravity_probe_b.threshold": (
         "A year for hundreds of measurement records",
         {
             "--directory": (".cache/threshold", "folder for saved progress"),
             **{name: ({"--cells": 21, "--store": False}.get(name), words) for name, words in SWEPT.items()},
         },
     ),
-    "kalman.mission_runs": (
+    "report.gravity_probe_b.mission_runs": (
         "A year of the mission model",
         {
             "--directory": (".cache/mission", "folder for saved progress"),
             **{name: ({"--cells": 18, "--store": False}.get(name), words) for name, words in SWEPT.items()},
         },
     ),
-    "kalman.guarantee.horizon": (
+    "report.gravity_probe_b.horizon": (
         "error bounds for a year of Gravity Probe B",
         {
             "precision": (53, "bits of the significand"),
@@ -84,7 +85,7 @@ OPTIONS = {
             "--output": (".cache/horizon", "folder for horizon.csv"),
         },
     ),
-    "kalman.guarantee.survey": (
+    "report.guarantees.survey": (
         "emulated runs with their guarantees",
         {
             "--sample": (0, "number of rows to recompute and compare"),
@@ -93,7 +94,7 @@ OPTIONS = {
             "--output": (".cache/guarantee", "folder for survey.csv"),
         },
     ),
-    "kalman.guarantee.filters": (
+    "report.guarantees.filters": (
         "random Kalman filters with their guarantees",
         {
             "--rows": (3000, "number of filters to compute"),
@@ -101,14 +102,14 @@ OPTIONS = {
             "--output": (".cache/filters", "folder for filters.csv and saved progress"),
         },
     ),
-    "kalman.guarantee.scalar": (
+    "report.guarantees.scalar": (
         "worst errors of scalar filters",
         {
             "--rows": (500, "number of filters to compute"),
             "--output": (".cache/scalar", "folder for scalar.csv and saved progress"),
         },
     ),
-    "wordlength.guarantees": (
+    "report.guarantees.table": (
         "table of guarantees",
         {
             "words": (None, "only the filters whose names contain one of these words; keep the other stored rows"),
@@ -133,7 +134,7 @@ OPTIONS = {
             "--report": (None, "HTML file to write, with a JSON file of the same name beside it"),
         },
     ),
-    "ledger.__main__": (
+    "ledger": (
         "Check every statement of the three documents",
         {
             "--format": ("csv", "default: csv"),
@@ -148,18 +149,18 @@ OPTIONS = {
 LISTED = {
     "wordlength": "how many digits your own filter needs",
     "ledger": "every printed equation, number and claim, with its verdict",
-    "sweeps": "list the stored sweeps, or verify a sample of them",
-    "rolling": "compute the stored drift rates again",
-    "inversion": "compute the stored sweeps over inverses again",
-    "kalman.year": "compute the emulated years again",
-    "kalman.ensembles": "compute the random filters again",
-    "kalman.threshold": "compute the years of hundreds of records again",
-    "kalman.mission_runs": "compute the years of the mission model again",
-    "kalman.guarantee.horizon": "compute the bounds for a year of Gravity Probe B again",
-    "kalman.guarantee.survey": "compute the survey of guarantees again",
-    "kalman.guarantee.filters": "compute random Kalman filters against their guarantees again",
-    "kalman.guarantee.scalar": "compute the worst errors of scalar filters again",
-    "wordlength.guarantees": "compute the table of guarantees again",
+    "report.stored": "list the stored sweeps, or verify a sample of them",
+    "report.rolling": "compute the stored drift rates again",
+    "report.inversion": "compute the stored sweeps over inverses again",
+    "report.gravity_probe_b.year": "compute the emulated years again",
+    "report.kalman.ensembles": "compute the random filters again",
+    "report.gravity_probe_b.threshold": "compute the years of hundreds of records again",
+    "report.gravity_probe_b.mission_runs": "compute the years of the mission model again",
+    "report.gravity_probe_b.horizon": "compute the bounds for a year of Gravity Probe B again",
+    "report.guarantees.survey": "compute the survey of guarantees again",
+    "report.guarantees.filters": "compute random Kalman filters against their guarantees again",
+    "report.guarantees.scalar": "compute the worst errors of scalar filters again",
+    "report.guarantees.table": "compute the table of guarantees again",
 }
 
 
@@ -223,8 +224,8 @@ def test_a_command_gets_its_own_arguments(monkeypatch):
     ran = []
     monkeypatch.setattr(sys, "argv", ["before"])
     monkeypatch.setattr(runpy, "run_module", lambda name, run_name, **_: ran.append((name, run_name, sys.argv)))
-    assert top.main(["kalman.year", "--steps", "100"]) == 0
-    assert ran == [("gpbnb.kalman.year", "__main__", ["kalman.year", "--steps", "100"])]
+    assert top.main(["report.gravity_probe_b.year", "--steps", "100"]) == 0
+    assert ran == [("gpbnb.report.gravity_probe_b.year", "__main__", ["report.gravity_probe_b.year", "--steps", "100"])]
 
 
 def test_an_unknown_command_is_told_the_known_ones(capsys):
@@ -232,7 +233,7 @@ def test_an_unknown_command_is_told_the_known_ones(capsys):
         top.main(["bake"])
     shown = capsys.readouterr().err
     assert shown.startswith("usage: python -m gpbnb ")
-    assert "got 'bake'; needed one of wordlength, ledger, sweeps, rolling, inversion, kalman.year" in shown
+    assert "got 'bake'; needed one of wordlength, ledger, report.stored, report.rolling, report.inversion" in shown
 
 
 # -- what the options change --------------------------------------------------------------------------------
@@ -313,7 +314,7 @@ def test_ensembles_say_how_they_were_made(monkeypatch, tmp_path):
     monkeypatch.setattr(ensembles, "lines", lambda seed, outcomes: [])
     assert ensembles.main(["--repeats", "3", "--output", str(tmp_path)]) == 0
     made = ensembles.provenance(tmp_path)
-    assert made["command"] == "python -m gpbnb.kalman.ensembles"
+    assert made["command"] == "python -m gpbnb.report.kalman.ensembles"
     assert made["formats"] == [str(ensembles.FORMATS[0])]
     assert made["trials"] == len(ensembles.tasks(3))
     assert made["steps"] == ensembles.tasks(1)[0].steps

@@ -47,12 +47,18 @@ def helped():
 
 
 def test_the_commands_are_found():
-    assert {"gpbnb.rolling", "gpbnb.inversion", "gpbnb.ledger", "gpbnb.sweeps", "gpbnb.kalman.year"} <= set(COMMANDS)
+    assert {
+        "gpbnb.report.rolling",
+        "gpbnb.report.inversion",
+        "gpbnb.ledger",
+        "gpbnb.report.stored",
+        "gpbnb.report.gravity_probe_b.year",
+    } <= set(COMMANDS)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_help_only_helps(command, helped):
-    """Asked for help, `gpbnb.rolling` computed for 40 s and wrote its table into the package."""
+    """Asked for help, `gpbnb.report.rolling` computed for 40 s and wrote its table into the package."""
     before = stored()
     status, printed, errors = helped(command)
     assert status == 0, errors
@@ -62,7 +68,12 @@ def test_help_only_helps(command, helped):
 
 @pytest.mark.parametrize(
     "module",
-    ["gpbnb.rolling.__main__", "gpbnb.inversion.__main__", "gpbnb.kalman.threshold", "gpbnb.kalman.mission_runs"],
+    [
+        "gpbnb.report.rolling.__main__",
+        "gpbnb.report.inversion.__main__",
+        "gpbnb.report.gravity_probe_b.threshold",
+        "gpbnb.report.gravity_probe_b.mission_runs",
+    ],
 )
 def test_long_commands_write_to_the_given_folder(module, monkeypatch, tmp_path):
     """With the computation replaced: each file goes to the folder, and the package stays as it is."""

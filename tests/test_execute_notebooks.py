@@ -17,7 +17,7 @@ from gpbnb import caching
 ROOT = Path(__file__).resolve().parents[1]
 CODE = {
     "kernels": "from gpbnb.arithmetic.kernels import exact\n\nprint(exact.__name__)",
-    "data": "from gpbnb.budget import theory\n\nprint(theory.__name__)",
+    "data": "from gpbnb.report.budget import theory\n\nprint(theory.__name__)",
 }
 
 
@@ -84,7 +84,7 @@ def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     assert "kernels.ipynb, cell 1:" in wrong
     assert "+stdout: another kernel" in wrong
     # One notebook depends on the new data, the other has new code.
-    with next((package / "budget").glob("*.csv")).open("a") as data:
+    with next((package / "report" / "budget").glob("*.csv")).open("a") as data:
         data.write("\n")
     change(book / "kernels.ipynb", "print(exact.__name__)", "print(6 * 7)")
     assert executed(copy()) == {"kernels", "data"}

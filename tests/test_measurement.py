@@ -1,4 +1,4 @@
-"""gpbnb.measurement: rotations against scipy, and the measurement matrix against the chain of printed matrices."""
+"""measurement: rotations against scipy, and the measurement matrix against the chain of printed matrices."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from gpbnb import measurement as m
+from gpbnb.report import measurement as m
 
 SEEDED = settings(derandomize=True, deadline=None, database=None)
 
@@ -280,6 +280,6 @@ def test_bad_input_is_refused(call, message):
 
 
 def test_importing_is_light():
-    code = "import sys, gpbnb.measurement; print(*{'sympy', 'matplotlib', 'scipy', 'numba'} & set(sys.modules))"
+    code = "import sys, gpbnb.report.measurement; print(*{'sympy', 'matplotlib', 'scipy', 'numba'} & set(sys.modules))"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.split() == []

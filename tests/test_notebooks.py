@@ -141,7 +141,7 @@ def test_outputs_have_no_digits_that_differ_between_processors(path):
             wrong = [each for each in long_numbers(cell) if (path.stem, each) not in exact]
             assert not wrong, (
                 f"{path.name}, cell {number} stores {', '.join(dict.fromkeys(wrong))}: print at most {MOST_DIGITS} "
-                "digits, use gpbnb.display.glue, or add an exact number to tests/exact_outputs.csv with its reason"
+                "digits, use report.display.glue, or add an exact number to tests/exact_outputs.csv with its reason"
             )
 
 

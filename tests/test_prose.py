@@ -24,14 +24,15 @@ from scipy.integrate import quad
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels import doubledouble
-from gpbnb.budget import theory as budget
-from gpbnb.integration import theory as integration
-from gpbnb.kalman import report_bounds, year, year_cases
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import YEAR
-from gpbnb.rolling import experiment as rolling_experiment
-from gpbnb.rolling import flicker
-from gpbnb.rolling import theory as rolling
+from gpbnb.filters.forms import Form
+from gpbnb.report.budget import theory as budget
+from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b.model import YEAR
+from gpbnb.report.integration import theory as integration
+from gpbnb.report.kalman import report_bounds
+from gpbnb.report.rolling import experiment as rolling_experiment
+from gpbnb.report.rolling import flicker
+from gpbnb.report.rolling import theory as rolling
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(ROOT / "book").glob("*.ipynb"), *(ROOT / "book").glob("*.md")])
@@ -182,7 +183,7 @@ def exact_up_to_degree_five(first: sp.Expr, second: sp.Expr) -> bool:
 
 
 def stored_guarantee(name: str, column: str) -> float:
-    table = files("gpbnb.wordlength") / "guarantees.csv"
+    table = files("gpbnb.report.guarantees") / "guarantees.csv"
     lines = [line for line in table.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return next(float(row[column]) for row in csv.DictReader(lines) if row["name"] == name)
 

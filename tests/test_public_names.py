@@ -15,9 +15,9 @@ HOMES = {
     "arithmetic.exits": "peek",
     "arithmetic.named": "BINARY16 BINARY32 BINARY64 BINARY128 BFLOAT16 TF32 FP8_E4M3 FP8_E5M2 DECIMAL32 DECIMAL64 "
     "DECIMAL128 IBM_HEX32 IBM_HEX64 IBM_704",
-    "kalman.model": "LinearModel",
-    "kalman.system": "LinearSystem",
-    "kalman.precision": "required_precision",
+    "filters.model": "LinearModel",
+    "wordlength.system": "LinearSystem",
+    "wordlength.precision": "required_precision",
     "wordlength.models": "read_model",
     "wordlength.records": "survey_records",
 }

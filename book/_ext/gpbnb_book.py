@@ -14,7 +14,7 @@ from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 from sphinx.util.fileutil import copy_asset
 
-from gpbnb.display.tables import POWER
+from gpbnb.report.display.tables import POWER
 
 # A tenth of the 24 MB in the package: TeX input, CHTML output, and the speech rules of English.
 MATHJAX_PARTS = (

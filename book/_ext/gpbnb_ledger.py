@@ -17,7 +17,7 @@ ERRORS = ("wrong", "inconsistent", "not reproduced")
 @cache
 def ledger():
     """The package of the ledger, which takes seconds to import: meanwhile the notebooks run already."""
-    from gpbnb import ledger
+    from gpbnb.report import ledger
 
     return ledger
 

@@ -13,8 +13,8 @@ from gpbnb.arithmetic.conversion import entries, exact_ratio
 from gpbnb.arithmetic.exits import check_exit, entering
 from gpbnb.arithmetic.functions import kept, lines, power
 from gpbnb.arithmetic.kernels.backends import Backend, Components
-from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.text import at_entry, decimal_text, in_columns, place
 
 if TYPE_CHECKING:

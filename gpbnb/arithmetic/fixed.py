@@ -25,9 +25,9 @@ from gpbnb.arithmetic.kernels.limited_backends import (
     restart,
     run_tag,
 )
-from gpbnb.arithmetic.kernels.rules import Limits, Order, Rounding, Rules, rounding_named
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Limits, Order, Rounding, Rules, rounding_named
 
 _POLICIES = ("raise", "saturate", "wrap")
 

@@ -17,7 +17,7 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.exits import lifted
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.limited_backends import check_order
-from gpbnb.arithmetic.kernels.rules import Order
+from gpbnb.arithmetic.rounding import Order
 
 if TYPE_CHECKING:
     from gpbnb.arithmetic.fixed import FixedFormat

@@ -15,7 +15,7 @@ from __future__ import annotations
 from fractions import Fraction
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.rules import Rounding
+from gpbnb.arithmetic.rounding import Rounding
 
 
 def _ieee(base: int, precision: int, emax: int) -> FloatFormat:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels.exact import ExactKernel, integer_text, kernel
 from gpbnb.arithmetic.kernels.limited import LimitedKernel
-from gpbnb.arithmetic.kernels.rules import Rounding
+from gpbnb.arithmetic.rounding import Rounding
 
 
 def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:

@@ -1,6 +1,6 @@
 """Sweeps, which are long computations in cells: with seeds, progress, resumption, any executor, and checked results.
 
-``python -m gpbnb.sweeps verify`` recomputes a sample of every stored sweep on this machine and compares the results.
+``python -m gpbnb.report.stored verify`` recomputes a sample of every stored sweep on this machine, and compares.
 """
 
 from gpbnb.sweeps.numbers import plain_integer, plain_number

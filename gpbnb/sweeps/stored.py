@@ -1,4 +1,4 @@
-"""Verify stored sweeps, for the command ``python -m gpbnb.sweeps``."""
+"""Verify stored sweeps, for the command ``python -m gpbnb.report.stored``."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def verify(sweeps: Sequence[Sweep[Any]], count: int, seed: int, progress: bool =
 def run(sweeps: Sequence[Sweep[Any]], arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status, 1 if a file is damaged or a value differs."""
     parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.sweeps", description="List or check the sweeps stored in the package."
+        prog="python -m gpbnb.report.stored", description="List or check the sweeps stored in the package."
     )
     commands = parser.add_subparsers(dest="command", required=True)
     commands.add_parser("list", help="name, command and provenance of each stored sweep")

@@ -9,15 +9,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-from gpbnb.kalman.guarantee.bound import limits
-from gpbnb.kalman.guarantee.envelope import Limits
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.named import form_named, rounding_named
-from gpbnb.kalman.requirement import Basis
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.bounds.envelope import Limits
+from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named, rounding_named
 from gpbnb.sweeps import plain_number
 from gpbnb.wordlength.models import read_measurements, read_model
 from gpbnb.wordlength.report import study
+from gpbnb.wordlength.requirement import Basis
+from gpbnb.wordlength.system import LinearSystem
 
 EPILOG = """
 The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. A filter may have known inputs

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32, BINARY64, TF32
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.simulation import Simulation
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.simulation import Simulation
 
 #: The states of :func:`tilt`, and their units.
 TILT_STATES = (("tilt", "°"), ("rate", "°/s"), ("gyro bias", "°/s"))

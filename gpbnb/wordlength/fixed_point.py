@@ -26,13 +26,13 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.rules import Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.filter_run import log_spaced, reference
-from gpbnb.kalman.guarantee.linear import LinearFilter, peak_gain
-from gpbnb.kalman.guarantee.program import MULTIPLY, SUBTRACT, Program, innovation_program
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.system import is_stable
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.linear import LinearFilter, peak_gain
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.program import MULTIPLY, SUBTRACT, Program, innovation_program
+from gpbnb.filters.run import log_spaced, reference
+from gpbnb.wordlength.system import is_stable
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits

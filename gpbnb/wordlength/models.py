@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.filters.model import LinearModel
 from gpbnb.sweeps import plain_number
+from gpbnb.wordlength.system import LinearSystem
 
 KALMAN = ("Phi", "H", "Q", "R", "x0", "P0")
 """Keys of a Kalman filter in a TOML file."""
 
 INPUTS = ("B", "u", "b", "d", "steps")
-"""Further keys of a Kalman filter, for known inputs and offsets; see :class:`gpbnb.kalman.model.LinearModel`."""
+"""Further keys of a Kalman filter, for known inputs and offsets; see :class:`gpbnb.filters.model.LinearModel`."""
 
 SYSTEM = ("A", "B")
 """Keys of a linear system in a TOML file; ``C``, ``D`` and ``x0`` are optional. Each model may have a ``name``."""

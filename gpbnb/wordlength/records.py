@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.array_forms import AnyForm
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.missing import real_numbers
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.named import form_named, whole_number
-from gpbnb.kalman.precision import survey_formats
-from gpbnb.kalman.requirement import Basis, checked_tolerance
+from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.forms import Form
+from gpbnb.filters.inputs import simulated_measurements
+from gpbnb.filters.missing import real_numbers
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named, whole_number
 from gpbnb.sweeps import Column, Sweep
+from gpbnb.wordlength.precision import survey_formats
+from gpbnb.wordlength.requirement import Basis, checked_tolerance
 
 
 class RecordCell(NamedTuple):
@@ -86,13 +86,13 @@ def survey_records(
     chunk: int = 1,
     progress: bool = False,
 ) -> RecordSurvey:
-    """Run a filter on many records in many formats; see :func:`gpbnb.kalman.precision.survey`.
+    """Run a filter on many records in many formats; see :func:`gpbnb.wordlength.precision.survey`.
 
     Parameters
     ----------
     records : (records, steps, m), or a list of (steps, m) of any lengths, NaN where a measurement is missing. Or the
         number of records to simulate, with the seeds 0, 1, …, of `steps` steps each.
-    tolerance, form, basis : as for :func:`gpbnb.kalman.precision.required_precision`; basis "emulation" or "bound".
+    tolerance, form, basis : as for :func:`gpbnb.wordlength.precision.required_precision`; basis "emulation" or "bound".
     formats : formats of any base, rounding and range, with compiled loops.
     executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
     directory : folder for finished records. After an interruption, the same call resumes; other arguments start a new

@@ -11,18 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.kalman.array_forms import AnyForm
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.envelope import Limits
-from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.missing import without_missing
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.named import form_named
-from gpbnb.kalman.precision import largest_errors, required_precision
-from gpbnb.kalman.requirement import Basis, Requirement
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.bounds.envelope import Limits
+from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.forms import Form
+from gpbnb.filters.inputs import simulated_measurements
+from gpbnb.filters.missing import without_missing
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named
 from gpbnb.sweeps import machine
-from gpbnb.wordlength.study import binary_ranges
+from gpbnb.wordlength.precision import largest_errors, required_precision
+from gpbnb.wordlength.ranges import binary_ranges
+from gpbnb.wordlength.requirement import Basis, Requirement
+from gpbnb.wordlength.system import LinearSystem
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
@@ -109,13 +109,12 @@ def study(
     ----------
     z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
     steps : number of steps to simulate; by default the number of measurements, or 1000.
-    bases : as in :func:`gpbnb.kalman.precision.required_precision`; the first gives the answer.
+    bases : as in :func:`gpbnb.wordlength.precision.required_precision`; the first gives the answer.
     tell : function called with a line of text before each search.
-    within : result of :func:`gpbnb.kalman.guarantee.bound.limits`, for the bases "guarantee" and "probable".
+    within : result of :func:`gpbnb.bounds.guarantee.limits`, for the bases "guarantee" and "probable".
 
-    Raises
-    ------
-    ValueError : for a reason given in :func:`gpbnb.kalman.precision.required_precision`; missing measurements with a
+    Raises ------ ValueError : for a reason given in :func:`gpbnb.wordlength.precision.required_precision`; missing
+    measurements with a
         basis that holds for all of them.
     OverflowError : for a reason given there.
     """

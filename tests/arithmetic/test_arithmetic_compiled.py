@@ -7,8 +7,8 @@ import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.guarantee.linear import state_space
+from gpbnb.bounds.linear import state_space
+from gpbnb.filters.run import Run
 
 REFUSED = [
     (FloatFormat(2, 53, "even"), "got 53 digits of base 2, rounded even; needed at most 52 "),

@@ -10,9 +10,9 @@ from drawn import BLACK, BLUE, GREEN, GREY, NAVY, PINK, PURPLE, at, look, named,
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_hex
 
-from gpbnb.budget import figures
-from gpbnb.budget.experiment import Draws
-from gpbnb.budget.theory import Budget, ErrorForm, Kind, Source
+from gpbnb.report.budget import figures
+from gpbnb.report.budget.experiment import Draws
+from gpbnb.report.budget.theory import Budget, ErrorForm, Kind, Source
 
 
 @pictured

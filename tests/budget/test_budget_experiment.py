@@ -1,4 +1,4 @@
-"""gpbnb.budget: derivations hold, and simulated budgets and averages agree with them."""
+"""gpbnb.report.budget: derivations hold, and simulated budgets and averages agree with them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.budget import derivation, experiment, theory
-from gpbnb.budget.theory import Budget
+from gpbnb.report.budget import derivation, experiment, theory
+from gpbnb.report.budget.theory import Budget
 
-EXAMPLE = theory.read(files("gpbnb.budget") / "example.csv")
+EXAMPLE = theory.read(files("gpbnb.report.budget") / "example.csv")
 
 
 DERIVATIONS = steps.Derivations(derivation.equal_sources, derivation.averages)

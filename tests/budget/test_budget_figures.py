@@ -1,4 +1,4 @@
-"""gpbnb.budget.figures and tables: what is shown is the result."""
+"""gpbnb.report.budget.figures and tables: what is shown is the result."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from matplotlib.collections import LineCollection
 from tabulated import by_header
 
-from gpbnb.budget import experiment, figures, tables, theory
-from gpbnb.display import style
+from gpbnb.report.budget import experiment, figures, tables, theory
+from gpbnb.report.display import style
 
-READING = theory.read(files("gpbnb.budget") / "example.csv")
+READING = theory.read(files("gpbnb.report.budget") / "example.csv")
 BUDGET = READING.budget
 
 

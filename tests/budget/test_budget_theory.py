@@ -1,4 +1,4 @@
-"""gpbnb.budget.theory: sums, shares, factors of averaging, and the file that holds a budget."""
+"""gpbnb.report.budget.theory: sums, shares, factors of averaging, and the file that holds a budget."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gpbnb.budget import theory
-from gpbnb.budget.theory import Budget, ErrorForm, Kind, Source
+from gpbnb.report.budget import theory
+from gpbnb.report.budget.theory import Budget, ErrorForm, Kind, Source
 
 SEEDED = settings(derandomize=True, deadline=None, database=None)
 

@@ -11,14 +11,14 @@ import steps
 import sympy as sp
 from mpmath import mp
 
-from gpbnb.calculators import derivation, forms
-from gpbnb.calculators.derivation import named, step
-from gpbnb.calculators.javascript import Definition, symbol
-from gpbnb.integration import derivation as integration
-from gpbnb.kalman import report_bounds
-from gpbnb.rolling import derivation as rolling
-from gpbnb.rolling import theory
-from gpbnb.rounding import derivation as rounding
+from gpbnb.report.calculators import derivation, forms
+from gpbnb.report.calculators.derivation import named, step
+from gpbnb.report.calculators.javascript import Definition, symbol
+from gpbnb.report.integration import derivation as integration
+from gpbnb.report.kalman import report_bounds
+from gpbnb.report.rolling import derivation as rolling
+from gpbnb.report.rolling import theory
+from gpbnb.report.rounding import derivation as rounding
 
 BY_ID = {each.id: each for each in forms.CALCULATORS}
 

@@ -9,8 +9,8 @@ import pytest
 import sympy as sp
 from mpmath import mp
 
-from gpbnb.calculators import derivation
-from gpbnb.calculators.javascript import (
+from gpbnb.report.calculators import derivation
+from gpbnb.report.calculators.javascript import (
     Definition,
     fraction_coefficients,
     print_expression,
@@ -19,7 +19,7 @@ from gpbnb.calculators.javascript import (
     symbol,
     taylor,
 )
-from gpbnb.integration import derivation as integration
+from gpbnb.report.integration import derivation as integration
 
 X, Y = symbol("x"), symbol("y")
 

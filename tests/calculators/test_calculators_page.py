@@ -11,7 +11,7 @@ from fractions import Fraction
 import pytest
 from markup import Elements
 
-from gpbnb.calculators import forms, page
+from gpbnb.report.calculators import forms, page
 
 CALCULATORS = pytest.mark.parametrize("calculator", forms.CALCULATORS, ids=lambda each: each.id)
 

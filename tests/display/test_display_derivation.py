@@ -1,11 +1,11 @@
-"""gpbnb.display.derivation: steps that check themselves."""
+"""gpbnb.report.display.derivation: steps that check themselves."""
 
 from __future__ import annotations
 
 import pytest
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step, errors, first_order, over, together, unevaluated
+from gpbnb.report.display.derivation import Derivation, Step, errors, first_order, over, together, unevaluated
 
 X, Y = sp.symbols("x y")
 N = sp.Symbol("n", integer=True, positive=True)

@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 
-from gpbnb.display import glue
+from gpbnb.report.display import glue
 
 
 @pytest.mark.parametrize(
@@ -48,6 +48,6 @@ def test_the_record_is_that_of_myst_nb(monkeypatch):
 
 
 def test_nothing_of_the_book_is_needed():
-    code = "import sys; sys.modules['myst_nb'] = None; from gpbnb.display.glue import glue; glue('x', 1.5)"
+    code = "import sys; sys.modules['myst_nb'] = None; from gpbnb.report.display.glue import glue; glue('x', 1.5)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""gpbnb.display.style: the one figure style."""
+"""gpbnb.report.display.style: the one figure style."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb, to_rgba
 
-from gpbnb.display import style
+from gpbnb.report.display import style
 
 
 @pytest.fixture(autouse=True)

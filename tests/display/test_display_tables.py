@@ -1,4 +1,4 @@
-"""gpbnb.display.tables: Markdown tables with math."""
+"""gpbnb.report.display.tables: Markdown tables with math."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BINARY32, IBM_HEX32
-from gpbnb.display.tables import Table, arithmetic, digits, one_line, scientific, short
+from gpbnb.report.display.tables import Table, arithmetic, digits, one_line, scientific, short
 
 
 def cells(line):

@@ -1,4 +1,4 @@
-"""gpbnb.geometry.derivation: every step holds, and the algebra means what the numbers do."""
+"""gpbnb.report.geometry.derivation: every step holds, and the algebra means what the numbers do."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb import measurement as m
-from gpbnb.geometry import derivation, theory
+from gpbnb.report import measurement as m
+from gpbnb.report.geometry import derivation, theory
 
 DERIVATIONS = steps.Derivations(
     derivation.turns,
@@ -118,7 +118,7 @@ def test_number_of_steps():
 
 @pytest.mark.parametrize("sequence", derivation.SEQUENCES)
 def test_the_symbolic_rotation_is_the_numeric_one(sequence):
-    """Rodrigues' formula here, elementary matrices in gpbnb.measurement."""
+    """Rodrigues' formula here, elementary matrices in gpbnb.report.measurement."""
     values = (0.3, -0.7, 1.1)
     symbolic = derivation.exact(derivation.ALPHA, sequence).subs(dict(zip(derivation.ALPHA, values, strict=True)))
     # entries up to one, a few roundings each

@@ -11,8 +11,8 @@ from drawn import BLACK, BLUE, GREEN, GREY, NAVY, ORANGE, PINK, PURPLE, SKY, at,
 from matplotlib.colors import to_hex
 from matplotlib.text import Annotation
 
-from gpbnb.display import style
-from gpbnb.geometry import figures, theory
+from gpbnb.report.display import style
+from gpbnb.report.geometry import figures, theory
 
 ARCSEC = np.pi / 180 / 3600
 MAS = ARCSEC / 1000

@@ -1,4 +1,4 @@
-"""gpbnb.geometry.experiment: a simulated year with exact rotations agrees with the analysis, within third order."""
+"""geometry.experiment: a simulated year with exact rotations agrees with the analysis, within third order."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gpbnb.geometry import experiment, theory
-from gpbnb.geometry.theory import Case
-from gpbnb.measurement import ARCSEC, MAS, deroll, rotation, spin_in_readout, star_in_telescope, theta_of
+from gpbnb.report.geometry import experiment, theory
+from gpbnb.report.geometry.theory import Case
+from gpbnb.report.measurement import ARCSEC, MAS, deroll, rotation, spin_in_readout, star_in_telescope, theta_of
 
 SEEDED = settings(derandomize=True, deadline=None, database=None)
 

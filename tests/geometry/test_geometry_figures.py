@@ -1,4 +1,4 @@
-"""gpbnb.geometry.figures and tables: what is drawn is the result."""
+"""gpbnb.report.geometry.figures and tables: what is drawn is the result."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from tabulated import by_header
 
-from gpbnb.display import style
-from gpbnb.geometry import experiment, figures, tables, theory
-from gpbnb.measurement import ARCSEC, MAS, deroll, spin_in_readout, theta_of
+from gpbnb.report.display import style
+from gpbnb.report.geometry import experiment, figures, tables, theory
+from gpbnb.report.measurement import ARCSEC, MAS, deroll, spin_in_readout, theta_of
 
 CASE = theory.Case().with_angle("gamma1", 20 * ARCSEC).with_angle("gamma2", 10 * ARCSEC)
 

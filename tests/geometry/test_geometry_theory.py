@@ -1,4 +1,4 @@
-"""gpbnb.geometry.theory: closed forms against the expansion by sympy and against sums written out."""
+"""gpbnb.report.geometry.theory: closed forms against the expansion by sympy and against sums written out."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from gpbnb.geometry import derivation, theory
-from gpbnb.geometry.derivation import ALPHA, BETA, GAMMA, PHI
-from gpbnb.geometry.theory import Case
-from gpbnb.measurement import ARCSEC, MAS, deroll
+from gpbnb.report.geometry import derivation, theory
+from gpbnb.report.geometry.derivation import ALPHA, BETA, GAMMA, PHI
+from gpbnb.report.geometry.theory import Case
+from gpbnb.report.measurement import ARCSEC, MAS, deroll
 
 NAMES = dict(zip(theory.SINGLE, (*ALPHA, *BETA, *GAMMA), strict=True))
 

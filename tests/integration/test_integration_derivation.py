@@ -1,4 +1,4 @@
-"""gpbnb.integration.derivation: every step holds, and means what the numbers of the theory do."""
+"""gpbnb.report.integration.derivation: every step holds, and means what the numbers of the theory do."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.integration import derivation, theory
-from gpbnb.integration.derivation import MU, OMEGA, TAU, TIME, P, T
+from gpbnb.report.integration import derivation, theory
+from gpbnb.report.integration.derivation import MU, OMEGA, TAU, TIME, P, T
 
 DERIVATIONS = steps.Derivations(
     derivation.transition,

@@ -1,4 +1,4 @@
-"""gpbnb.integration.derivatives: the least error of weighted samples, and rules that use derivatives."""
+"""gpbnb.report.integration.derivatives: the least error of weighted samples, and rules that use derivatives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 import sympy as sp
 from scipy import integrate
 
-from gpbnb.integration import derivation, theory
+from gpbnb.report.integration import derivation, theory
 
 FIRST = theory.first_order(1.7, 3.0)
 RINGING = theory.resonant(1.3, 3.0, 0.2)

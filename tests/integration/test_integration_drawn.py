@@ -12,8 +12,8 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, Circle, FancyArrowPatch, Rectangle
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.integration import experiment, figures, theory
-from gpbnb.integration.experiment import Accuracy, Sweep
+from gpbnb.report.integration import experiment, figures, theory
+from gpbnb.report.integration.experiment import Accuracy, Sweep
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 

@@ -1,4 +1,4 @@
-"""gpbnb.integration.experiment: simulations against exact variances, emulation against exact arithmetic and theory."""
+"""integration.experiment: simulations against exact variances, emulation against exact arithmetic and theory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.integration import experiment, theory
+from gpbnb.report.integration import experiment, theory
 
 FIRST = theory.first_order(1.7, 3.0)
 RINGING = theory.resonant(1.3, 3.0, 0.2)

@@ -1,4 +1,4 @@
-"""gpbnb.integration.figures and tables: what is shown is the result; axes say what it is and in which unit."""
+"""gpbnb.report.integration.figures and tables: what is shown is the result; axes say what it is and in which unit."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from matplotlib.patches import Circle, Rectangle
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.display import style
-from gpbnb.integration import experiment, figures, tables, theory
+from gpbnb.report.display import style
+from gpbnb.report.integration import experiment, figures, tables, theory
 
 
 def line(ax, label):

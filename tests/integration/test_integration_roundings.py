@@ -1,4 +1,4 @@
-"""gpbnb.integration.theory: errors of t-digit arithmetic against simulated roundings and each other."""
+"""gpbnb.report.integration.theory: errors of t-digit arithmetic against simulated roundings and each other."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.integration import theory
+from gpbnb.report.integration import theory
 
 CHOP = Rounding.CHOP
 

@@ -1,4 +1,4 @@
-"""gpbnb.integration.theory: closed forms against mpmath, quadrature, recursions and each other."""
+"""gpbnb.report.integration.theory: closed forms against mpmath, quadrature, recursions and each other."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import integrate
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.integration import experiment, inputs, theory
+from gpbnb.report.integration import experiment, inputs, theory
 
 RULES = list(theory.RULES.values())
 each_rule = pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)

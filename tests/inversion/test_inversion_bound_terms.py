@@ -13,7 +13,7 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.bounds import gamma_probabilistic
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, inverse_of
-from gpbnb.inversion import bounds
+from gpbnb.bounds import inverse as bounds
 
 FMT = FloatFormat(2, 16)
 ENTRIES = [["0.25", "1.5", "-0.75"], ["-3", "0.5", "1.25"], ["1", "-2.5", "2"]]

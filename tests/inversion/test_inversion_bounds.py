@@ -1,4 +1,4 @@
-"""gpbnb.inversion.bounds: never below the true error, not far above it where promised, and honest where they fail."""
+"""gpbnb.bounds.inverse: never below the true error, not far above it where promised, and honest where they fail."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from gpbnb import required_precision
 from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion import bounds
+from gpbnb.bounds import inverse as bounds
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.costs: operations are counted, ratios are those of single trials, and what is sharp is dear."""
+"""inversion.costs: operations are counted, ratios are those of single trials, and what is sharp is dear."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion import costs, experiment
+from gpbnb.report.inversion import costs, experiment
 
 
 class Counted:

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.derivation: every step holds, for every n, and means what the matrices do."""
+"""gpbnb.report.inversion.derivation: every step holds, for every n, and means what the matrices do."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.display.derivation import first_order
-from gpbnb.inversion import derivation, theory
+from gpbnb.report.display.derivation import first_order
+from gpbnb.report.inversion import derivation, theory
 
 DERIVATIONS = steps.Derivations(
     derivation.first_approach,

@@ -11,9 +11,9 @@ from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion import figures
-from gpbnb.inversion.example import Column, Wordlength
-from gpbnb.inversion.experiment import Frozen, Trial
+from gpbnb.report.inversion import figures
+from gpbnb.report.inversion.example import Column, Wordlength
+from gpbnb.report.inversion.experiment import Frozen, Trial
 
 #: Figure III-1 of hung1984: what follows from what.
 ARROWS = {

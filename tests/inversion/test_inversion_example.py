@@ -1,4 +1,4 @@
-"""gpbnb.inversion.example: Table 1 computed again, and the searches, which find what is there to be found."""
+"""gpbnb.report.inversion.example: Table 1 computed again, and the searches, which find what is there to be found."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import inverse_of
-from gpbnb.inversion import example, existence, procedure
-from gpbnb.inversion.example import PLACES, PRINTED, Wordlength
-from gpbnb.inversion.procedure import Reading
+from gpbnb.report.inversion import example, existence, procedure
+from gpbnb.report.inversion.example import PLACES, PRINTED, Wordlength
+from gpbnb.report.inversion.procedure import Reading
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 MORE = Wordlength("t = places + 1", NEAREST)

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.experiment: trials are what they say, and the kept sweeps are what the command computes."""
+"""gpbnb.report.inversion.experiment: trials are what they say, and the kept sweeps are what the command computes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion import __main__ as command
-from gpbnb.inversion import bounds, experiment, procedure, theory
-from gpbnb.inversion.procedure import Reading
+from gpbnb.bounds import inverse as bounds
+from gpbnb.report.inversion import __main__ as command
+from gpbnb.report.inversion import experiment, procedure, theory
+from gpbnb.report.inversion.procedure import Reading
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FMT = FloatFormat(2, 24)
@@ -224,7 +225,7 @@ class TestKept:
     def test_provenance_and_sums(self, sweep):
         kept = experiment.frozen(sweep)
         assert kept.provenance["seed"] == str(experiment.SEED)
-        assert kept.provenance["command"] == f"python -m gpbnb.inversion {sweep}"
+        assert kept.provenance["command"] == f"python -m gpbnb.report.inversion {sweep}"
         assert "python-flint" in kept.provenance["versions"]
         assert kept.provenance["commit"]
         cells, names = experiment.SWEEPS[sweep]
@@ -298,7 +299,7 @@ class TestCommand:
         for _ in range(2):  # the second time, the folder exists
             assert command.main(given) == 0
         text = (folder / "small.csv").read_text(encoding="utf-8")
-        assert "\n# command: python -m gpbnb.inversion small\n# seed: 1984\n# cells: 2 of 3\n" in text
+        assert "\n# command: python -m gpbnb.report.inversion small\n# seed: 1984\n# cells: 2 of 3\n" in text
         assert text.count("\nrandom,2:24:nearest,yes,2,ball,5,") == 2
         assert "small.csv: 10 inversions" in capsys.readouterr().out
 

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.figures: what is drawn is the result; axes, legends and colours say what it is."""
+"""gpbnb.report.inversion.figures: what is drawn is the result; axes, legends and colours say what it is."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from drawn import colour, legend_of, names_of
 from matplotlib.patches import FancyArrowPatch
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.display import style
-from gpbnb.inversion import example, experiment, figures
-from gpbnb.inversion.experiment import Frozen
+from gpbnb.report.display import style
+from gpbnb.report.inversion import example, experiment, figures
+from gpbnb.report.inversion.experiment import Frozen
 
 FMT = FloatFormat(2, 24)
 

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.procedure: the boxes of Figure III-1, digit for digit and against their formulas written out."""
+"""inversion.procedure: the boxes of Figure III-1, digit for digit and against their formulas written out."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion import procedure
-from gpbnb.inversion.procedure import FORMS, NORMS, Reading
+from gpbnb.report.inversion import procedure
+from gpbnb.report.inversion.procedure import FORMS, NORMS, Reading
 
 FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 8), (3, 5), (10, 4), (16, 3)) for r in Rounding.documented()]
 each_format = pytest.mark.parametrize("fmt", FORMATS, ids=str)

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.tables: each line says what was computed."""
+"""gpbnb.report.inversion.tables: each line says what was computed."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.inversion import costs, example, existence, experiment, tables
-from gpbnb.inversion.experiment import Frozen
+from gpbnb.report.inversion import costs, example, existence, experiment, tables
+from gpbnb.report.inversion.experiment import Frozen
 
 PRINTED = example.PRINTED["bound"]
 

@@ -1,4 +1,4 @@
-"""gpbnb.inversion.theory: each bound as printed or derived, and whether it is one."""
+"""gpbnb.report.inversion.theory: each bound as printed or derived, and whether it is one."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import pytest
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, exact, row_sum_norm
-from gpbnb.inversion import theory
-from gpbnb.inversion.theory import Perturbation, Reduction
+from gpbnb.report.inversion import theory
+from gpbnb.report.inversion.theory import Perturbation, Reduction
 
 BETA = Fraction(1, 2000)
 

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.answers: the digits that a year asks for."""
+"""gpbnb.report.gravity_probe_b.answers: the digits that a year asks for."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.display import style
-from gpbnb.kalman import answers, figures, report_bounds, year, year_cases
-from gpbnb.wordlength import study
+from gpbnb.report.display import style
+from gpbnb.report.gravity_probe_b import answers, year, year_cases
+from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
+from gpbnb.report.kalman import figures, report_bounds
+from gpbnb.report.wordlengths import study
 
 
 def test_the_answers_are_those_of_the_example_and_of_the_years():
@@ -89,7 +91,7 @@ def test_only_the_usual_model_counts():
 def test_the_picture_shows_each_answer_on_the_tolerance():
     _, axes = style.figure()
     found = answers.find_answers()
-    figures.digits_needed(found, axes[0])
+    gravity_probe_b_figures.digits_needed(found, axes[0])
     shown = {line.get_label(): line for line in axes[0].lines}
     marked = {"printed answers": found.printed, "formula": found.formula, "all faults corrected": found.corrected}
     for name, places in marked.items():
@@ -103,7 +105,7 @@ def test_the_picture_shows_each_answer_on_the_tolerance():
 def test_the_headline_says_beside_each_mark_what_it_is():
     _, axes = style.figure()
     ax, found = axes[0], answers.find_answers()
-    figures.headline(found, ax)
+    gravity_probe_b_figures.headline(found, ax)
     words = {text.get_text(): text.xy for text in ax.texts}
     for place in found.printed:
         assert words[f"{place} printed"] == (place, 6606)
@@ -134,7 +136,7 @@ def test_every_figure_draws_the_same_bound(monkeypatch):
     found = answers.find_answers()
     counts = report_bounds.coefficients(*report_bounds.EXAMPLE)
     lines = []
-    for draw in (figures.headline, figures.digits_needed):
+    for draw in (gravity_probe_b_figures.headline, gravity_probe_b_figures.digits_needed):
         _, axes = style.figure()
         drawn.clear()
         draw(found, axes[0])

@@ -15,17 +15,19 @@ from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import load
-from gpbnb.kalman import bounded_run, bounded_steps
-from gpbnb.kalman.bounded_run import BoundedRun
-from gpbnb.kalman.factors import covariance_of_factors
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import bound, gains, horizon
-from gpbnb.kalman.guarantee.bound import from_schedule, limits
-from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits, units
-from gpbnb.kalman.guarantee.linear import LinearFilter, _peak_gain, state_space
-from gpbnb.kalman.guarantee.program import Builder, Program, steps_in_python
-from gpbnb.kalman.kernels.bounded import widened
-from gpbnb.kalman.model import LinearModel
+from gpbnb.bounds import bounded_run, gains
+from gpbnb.bounds import guarantee as bound
+from gpbnb.bounds.bounded_run import BoundedRun
+from gpbnb.bounds.envelope import GAIN, LOOP, ROUNDING, Certificate, Disturbances, Limits, units
+from gpbnb.bounds.guarantee import from_schedule, limits
+from gpbnb.bounds.linear import LinearFilter, _peak_gain, state_space
+from gpbnb.filters import bounded_steps
+from gpbnb.filters.factors import covariance_of_factors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.bounded import widened
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.program import Builder, Program, steps_in_python
+from gpbnb.report.gravity_probe_b import horizon
 
 FMT = FloatFormat(2, 24)
 

@@ -13,11 +13,11 @@ from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.wordlength.precision import required_precision
 from tests.array_filter import estimates
 
 STEPS = 40

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.contraction: a bound that no trajectory exceeds, and that some come near."""
+"""gpbnb.filters.contraction: a bound that no trajectory exceeds, and that some come near."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import contraction, exact_step
-from gpbnb.kalman.kernels import contraction as kernels_contraction
+from gpbnb.filters import contraction
+from gpbnb.filters.kernels import contraction as kernels_contraction
+from gpbnb.report.kalman import exact_step
 
 UNIT = 2.0**-102
 

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.covariance: roundings of textbook covariances are undone and reported; other faults are refused."""
+"""gpbnb.filters.covariance: roundings of textbook covariances are undone and reported; other faults are refused."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 from scipy.linalg import expm
 
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.covariance import REPAIR_TOLERANCE, factor, in_floats
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision
+from gpbnb.filters.covariance import REPAIR_TOLERANCE, factor, in_floats
+from gpbnb.filters.model import LinearModel
+from gpbnb.wordlength.precision import required_precision
 
 
 def white_noise(n, dt, size):

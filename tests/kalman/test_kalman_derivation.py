@@ -1,4 +1,4 @@
-"""gpbnb.kalman.derivation: every step holds, would not if it were wrong, and means what exact filters do."""
+"""gpbnb.report.kalman.derivation: every step holds, would not if it were wrong, and means what exact filters do."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import steps
 import sympy as sp
 
 from gpbnb.arithmetic.rational import exact, inverse_of
-from gpbnb.kalman import derivation, exact_step
+from gpbnb.report.kalman import derivation, exact_step
 
 DERIVATIONS = steps.Derivations(
     derivation.report,

@@ -29,11 +29,13 @@ from drawn import (
 from matplotlib.colors import to_hex
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import figures, year, year_cases
-from gpbnb.kalman.answers import Answers
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import figures as guarantee_figures
-from gpbnb.kalman.probability import Share
+from gpbnb.filters.forms import Form
+from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
+from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b.answers import Answers
+from gpbnb.report.gravity_probe_b.probability import Share
+from gpbnb.report.guarantees import figures as guarantee_figures
+from gpbnb.report.kalman import figures
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 STEPS = np.array([1, 10, 100])
@@ -72,7 +74,7 @@ def test_years(ax, quantity, values, words):
         run(24, CHOP, Form.JOSEPH, 1000.0),
         run(7, NEAREST, Form.UD, 1e4, base=10),
     ]
-    *curves, tolerance = figures.years(runs, quantity, ax, tolerance=0.3)
+    *curves, tolerance = gravity_probe_b_figures.years(runs, quantity, ax, tolerance=0.3)
     for curve, size in zip(curves, (1.0, 10.0, 100.0, 1000.0, 1e4), strict=True):
         assert at(curve, *((step, size * v) for step, v in zip((1, 10, 100), values, strict=True) if v))
     assert [look(curve) for curve in curves] == [
@@ -97,7 +99,7 @@ def test_years(ax, quantity, values, words):
 @pictured
 def test_lines_and_level(ax):
     curves = [(name, [1, 2], [i + 3.0, i + 5.0]) for i, name in enumerate(("first", "second", "third", "last"))]
-    artists = figures.lines(curves, ax)
+    artists = gravity_probe_b_figures.lines(curves, ax)
     for i, line in enumerate(artists):
         assert at(line, (1, i + 3), (2, i + 5))
     assert {line.get_label(): look(line)[:2] for line in artists} == {
@@ -106,7 +108,7 @@ def test_lines_and_level(ax):
         "third": (ORANGE, "-."),
         "last": (GREEN, "-"),
     }
-    level = figures.level("printed", 9.0, ax)
+    level = gravity_probe_b_figures.level("printed", 9.0, ax)
     assert (look(level)[:2], level.get_label(), set(level.get_ydata())) == ((ORANGE, "-"), "printed", {9.0})
     return ax.figure
 
@@ -150,7 +152,7 @@ def answers():
 
 @pictured
 def test_digits_needed(ax):
-    figures.digits_needed(answers(), ax)
+    gravity_probe_b_figures.digits_needed(answers(), ax)
     lines = {line.get_label(): line for line in ax.lines}
     assert list(lines) == legend_of(ax)
     assert at(lines["Hung (1984), nearest"], (digits(24), 4), (digits(32), 8))
@@ -195,7 +197,7 @@ def test_digits_needed(ax):
 
 @pictured
 def test_headline(ax):
-    figures.headline(answers(), ax)
+    gravity_probe_b_figures.headline(answers(), ax)
     chopped, rounded, printed, corrected, goal, drift, marks = ax.lines
     assert at(chopped, (digits(24, True), 32), (digits(40, True), 128))
     assert at(rounded, (digits(24), 4), (digits(32), 8), (digits(40), 64))
@@ -279,7 +281,7 @@ def test_shares(ax):
         share("9 states", 24, [8.0, 4.0, 6.0]),
         share("7 states", 32, [0.5, 0.25]),
     ]
-    *artists, tolerance = figures.shares(found, ax, tolerance=2.5)
+    *artists, tolerance = gravity_probe_b_figures.shares(found, ax, tolerance=2.5)
     first, second, median, third, other = artists
     assert at(first, (24 + 0.15 - 0.3, 1), (24 + 0.45 - 0.3, 3))
     assert at(second, (32 + 0.15 - 0.3, 0.25), (32 + 0.45 - 0.3, 0.5))
@@ -295,7 +297,7 @@ def test_shares(ax):
     assert set(tolerance.get_ydata()) == {2.5}
     assert ax.get_xlabel() == "bits"
     ax.clear()
-    figures.shares([found[0]._replace(fmt=FloatFormat(10, 8))], ax)
+    gravity_probe_b_figures.shares([found[0]._replace(fmt=FloatFormat(10, 8))], ax)
     assert ax.get_xlabel() == "decimal digits"
     return ax.figure
 

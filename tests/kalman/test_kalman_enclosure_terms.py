@@ -14,11 +14,12 @@ from flint import arb, arb_mat, ctx
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, inverse_of
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import bound, enclosure, gains
-from gpbnb.kalman.guarantee.enclosure import Enclosed
-from gpbnb.kalman.guarantee.envelope import Certificate, Disturbances, Limits
-from gpbnb.kalman.guarantee.linear import state_space
+from gpbnb.bounds import enclosure, gains
+from gpbnb.bounds import guarantee as bound
+from gpbnb.bounds.enclosure import Enclosed
+from gpbnb.bounds.envelope import Certificate, Disturbances, Limits
+from gpbnb.bounds.linear import state_space
+from gpbnb.filters.forms import Form
 
 UNIT, UP = F(1, 64), F(33, 32)
 

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.ensembles: trials come out the same wherever they run, and none is lost when workers die."""
+"""gpbnb.report.kalman.ensembles: trials come out the same wherever they run, and none is lost when workers die."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from distributed import Client, KilledWorker
 from executors import Failing, local_cluster
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import ensembles
-from gpbnb.kalman.bounded_run import emulate_with_bound
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
-from gpbnb.kalman.forms import Form
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.report.kalman import ensembles
+from gpbnb.report.kalman.ensembles import FORMATS, KINDS, Outcome, Task, random_model, summaries, sweep, tasks, trial
 from gpbnb.sweeps import read
 
 SINGLE = FloatFormat(2, 24)

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.exact_step: a step worked by hand."""
+"""gpbnb.report.kalman.exact_step: a step worked by hand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.kalman import exact_step
+from gpbnb.report.kalman import exact_step
 
 
 def test_a_step_worked_by_hand():

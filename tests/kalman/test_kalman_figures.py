@@ -1,4 +1,4 @@
-"""gpbnb.kalman.figures: what is drawn is the result; axes, legends and colours say what it is."""
+"""gpbnb.report.kalman.figures: what is drawn is the result; axes, legends and colours say what it is."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ import pytest
 from drawn import colour, legend_of
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.display import style
-from gpbnb.kalman import ensembles, figures, report_bounds, smallest, year, year_cases
-from gpbnb.kalman.answers import decimal_digits
-from gpbnb.kalman.bounded_run import emulate_with_bound
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.report.display import style
+from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
+from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b.answers import decimal_digits
+from gpbnb.report.kalman import ensembles, figures, report_bounds, smallest
 
 USUAL = year_cases.MODELS[0]
 TWENTY_FOUR = year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG)
@@ -35,7 +37,7 @@ def test_decimal_digits_invert_8(fmt, number):
 
 def test_years(ax, runs):
     chosen = [runs[TWENTY_FOUR], runs[TWENTY_FOUR._replace(form=Form.UD, rounding=Rounding.CHOP)]]
-    *curves, tolerance = figures.years(chosen, "rate", ax, tolerance=1.0)
+    *curves, tolerance = gravity_probe_b_figures.years(chosen, "rate", ax, tolerance=1.0)
     for curve, run in zip(curves, chosen, strict=True):
         assert np.array_equal(curve.get_xdata(), run.steps)
         assert np.array_equal(curve.get_ydata(), np.maximum(*np.abs(run.rate).T))
@@ -48,7 +50,7 @@ def test_years(ax, runs):
 
 @pytest.mark.parametrize("quantity", ["gain", "covariance"])
 def test_years_of_a_norm(ax, runs, quantity):
-    (curve,) = figures.years([runs[TWENTY_FOUR]], quantity, ax)
+    (curve,) = gravity_probe_b_figures.years([runs[TWENTY_FOUR]], quantity, ax)
     assert np.array_equal(curve.get_ydata(), getattr(runs[TWENTY_FOUR], quantity))
     assert "no unit" in ax.get_ylabel()
 
@@ -56,28 +58,28 @@ def test_years_of_a_norm(ax, runs, quantity):
 def test_years_refuse_what_they_cannot_draw(ax, runs):
     run = runs[TWENTY_FOUR]
     with pytest.raises(ValueError, match="got quantity 'speed'; needed one of drift, rate"):
-        figures.years([run], "speed", ax)
+        gravity_probe_b_figures.years([run], "speed", ax)
     with pytest.raises(ValueError, match="got 8 curves; needed at most 7"):
-        figures.years([run] * 8, "rate", ax)
+        gravity_probe_b_figures.years([run] * 8, "rate", ax)
     reference = year.Year(run.case.reference, *(getattr(run, name) for name in list(vars(run))[1:]))
     with pytest.raises(ValueError, match="got the reference among the runs"):
-        figures.years([reference], "rate", ax)
+        gravity_probe_b_figures.years([reference], "rate", ax)
 
 
 def test_lines_and_levels(ax):
     curves = [("a", [1, 2], [3, 4]), ("b", [1, 2], [5, 6]), ("c", [1, 2], [7, 8])]
-    artists = figures.lines(curves, ax)
+    artists = gravity_probe_b_figures.lines(curves, ax)
     assert [(a.get_label(), list(a.get_ydata())) for a in artists] == [(name, y) for name, _, y in curves]
     assert [colour(a) for a in artists] == [style.REFUTED, style.REFUTED, style.VALID]
     assert artists[0].get_linestyle() != artists[1].get_linestyle()
-    assert list(figures.level("d", 9.0, ax).get_ydata()) == [9, 9]
+    assert list(gravity_probe_b_figures.level("d", 9.0, ax).get_ydata()) == [9, 9]
 
 
 def test_year_end(ax, runs):
     cases = [TWENTY_FOUR, TWENTY_FOUR._replace(precision=32), TWENTY_FOUR._replace(rounding=Rounding.CHOP)]
     faults = {"printed": {}}
     answers = [("print", [9, 17]), ("formula", [10, 16]), ("seen", [10.3])]
-    artists = figures.year_end([runs[case] for case in cases], ax, 1.0, faults, answers)
+    artists = gravity_probe_b_figures.year_end([runs[case] for case in cases], ax, 1.0, faults, answers)
     rounded, chopped, line, tolerance, *checkpoint_steps = artists
     ends = [max(np.abs(runs[case].drift[-1]).max(), np.abs(runs[case].rate[-1]).max()) for case in cases]
     assert np.allclose(rounded.get_xdata(), [decimal_digits(case.fmt) for case in cases[:2]], rtol=1e-15)

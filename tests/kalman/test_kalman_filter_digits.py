@@ -10,11 +10,11 @@ import pytest
 from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, model, run
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import smallest
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import gravity_probe_b
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.report.gravity_probe_b.model import gravity_probe_b
+from gpbnb.report.kalman import smallest
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 

@@ -12,13 +12,13 @@ from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, mod
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import exact_step
-from gpbnb.kalman.bounded_run import BoundedRun, emulate_with_bound
-from gpbnb.kalman.emulation import compare_runs, emulate
-from gpbnb.kalman.filter_run import Run, log_spaced, reference
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.simulation import BLOCK, Simulation
+from gpbnb.bounds.bounded_run import BoundedRun, emulate_with_bound
+from gpbnb.filters.emulation import compare_runs, emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, log_spaced, reference
+from gpbnb.filters.simulation import BLOCK, Simulation
+from gpbnb.report.kalman import exact_step
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 

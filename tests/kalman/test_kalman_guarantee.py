@@ -11,26 +11,22 @@ import pytest
 
 from gpbnb import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.exact_step import exact_step
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import adversary, bound, derivation, gains
-from gpbnb.kalman.guarantee.adversary import attack, ceiling, random_errors
-from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits, unit_disturbances
-from gpbnb.kalman.guarantee.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
-from gpbnb.kalman.guarantee.gains import pack, schedule
-from gpbnb.kalman.guarantee.linear import biquad, controller, error_coefficients, peak_gain, state_space
-from gpbnb.kalman.guarantee.probable import probable_error, separate_roundings
-from gpbnb.kalman.guarantee.program import (
-    advance,
-    innovation_program,
-    loop_program,
-    sequential_program,
-    steps_in_python,
-)
-from gpbnb.kalman.guarantee.published import fixif_longitudinal, nile_local_level
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision
+from gpbnb.bounds import adversary, gains
+from gpbnb.bounds import guarantee as bound
+from gpbnb.bounds.adversary import attack, ceiling, random_errors
+from gpbnb.bounds.envelope import GAIN, LOOP, ROUNDING, START, certify, disturbances, units
+from gpbnb.bounds.gains import pack, schedule
+from gpbnb.bounds.guarantee import from_schedule, guarantee, limits, unit_disturbances
+from gpbnb.bounds.linear import biquad, controller, error_coefficients, peak_gain, state_space
+from gpbnb.bounds.probable import probable_error, separate_roundings
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.program import advance, innovation_program, loop_program, sequential_program, steps_in_python
+from gpbnb.filters.run import Run
+from gpbnb.report.guarantees import derivation
+from gpbnb.report.guarantees.published import fixif_longitudinal, nile_local_level
+from gpbnb.report.kalman.exact_step import exact_step
+from gpbnb.wordlength.precision import required_precision
 
 FORMATS = [
     FloatFormat(2, 24),

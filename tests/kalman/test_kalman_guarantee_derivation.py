@@ -1,11 +1,11 @@
-"""gpbnb.kalman.guarantee.derivation: every step holds, would not if it were wrong, and is named for what it derives."""
+"""guarantees.derivation: every step holds, would not if it were wrong, and is named for what it derives."""
 
 from __future__ import annotations
 
 import pytest
 import steps
 
-from gpbnb.kalman.guarantee import derivation
+from gpbnb.report.guarantees import derivation
 
 DERIVATIONS = steps.Derivations(
     derivation.recursion,

@@ -10,13 +10,13 @@ from flint import arb
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.exact_step import exact_step
-from gpbnb.kalman.filter_run import Run, reference_states
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import derivation
-from gpbnb.kalman.guarantee.bound import Guarantee, Limits, guarantee, limits
-from gpbnb.kalman.guarantee.enclosure import FORMS, Enclosed, enclose, gain, predicted, updated
-from gpbnb.kalman.model import LinearModel
+from gpbnb.bounds.enclosure import FORMS, Enclosed, enclose, gain, predicted, updated
+from gpbnb.bounds.guarantee import Guarantee, Limits, guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.report.guarantees import derivation
+from gpbnb.report.kalman.exact_step import exact_step
 from gpbnb.wordlength.examples import cyclic
 
 FORMATS = [FloatFormat(2, 12), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5)]

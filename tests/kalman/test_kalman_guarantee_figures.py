@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gpbnb import FloatFormat
-from gpbnb.display.style import figure
-from gpbnb.kalman.guarantee.adversary import attack, random_errors
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.figures import bound_of, draw_errors, errors_of
+from gpbnb.bounds.adversary import attack, random_errors
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.report.display.style import figure
+from gpbnb.report.guarantees.figures import bound_of, draw_errors, errors_of
 from gpbnb.wordlength.examples import tracker
 
 

@@ -12,12 +12,12 @@ from independent_filter import Arithmetic, ExactFilter, Filter, Model, Refused
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import filters, scalar
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.random_filters import DETERMINISTIC, KINDS, LIMITED, RANGES, Drawn, draw
-from gpbnb.kalman.model import LinearModel
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.report.guarantees import filters, scalar
+from gpbnb.report.guarantees.random_filters import DETERMINISTIC, KINDS, LIMITED, RANGES, Drawn, draw
 
 
 def arithmetic(fmt, **changed):

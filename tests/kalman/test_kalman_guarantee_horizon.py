@@ -12,13 +12,13 @@ from tabulated import by_header
 
 from gpbnb import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import YEAR
-from gpbnb.kalman.guarantee import horizon
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
-from gpbnb.kalman.model import LinearModel
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.report.gravity_probe_b import horizon
+from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
+from gpbnb.report.gravity_probe_b.model import YEAR
 
 STEPS = 50
 

@@ -12,15 +12,15 @@ from oracles import rounded
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.array_forms import ArrayForm
-from gpbnb.kalman.array_run import ArrayRun
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.gains import schedule
-from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
-from gpbnb.wordlength.study import companion_run
+from gpbnb.bounds.gains import schedule
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run
+from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
+from gpbnb.report.wordlengths.study import companion_run
 
 Matrix = list[list[Fraction]]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat
-from gpbnb.kalman.guarantee import bound
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.reach import Reach, forward, nothing, onward, support, take_in, width
+from gpbnb.bounds import guarantee as bound
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.bounds.reach import Reach, forward, nothing, onward, support, take_in, width
 from gpbnb.wordlength.examples import tracker
 
 STEPS, N, COLUMNS = 60, 3, 4

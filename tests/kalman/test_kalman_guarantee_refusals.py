@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from gpbnb import FixedFormat, FloatFormat, LinearModel, LinearSystem, Rounding
-from gpbnb.kalman.filter_run import Run, reference_states
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee import gains
-from gpbnb.kalman.guarantee.adversary import attack
-from gpbnb.kalman.guarantee.bound import from_schedule, guarantee, limits
-from gpbnb.kalman.guarantee.envelope import Disturbances, Limits, columns
-from gpbnb.kalman.guarantee.gains import schedule
-from gpbnb.kalman.guarantee.horizon import bounds_in_blocks
-from gpbnb.kalman.guarantee.linear import state_space
-from gpbnb.kalman.guarantee.probable import probable_error
-from gpbnb.kalman.guarantee.storing import stored_sizes, storing_errors
-from gpbnb.kalman.precision import required_precision
+from gpbnb.bounds import gains
+from gpbnb.bounds.adversary import attack
+from gpbnb.bounds.envelope import Disturbances, Limits, columns
+from gpbnb.bounds.gains import schedule
+from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
+from gpbnb.bounds.linear import state_space
+from gpbnb.bounds.probable import probable_error
+from gpbnb.bounds.storing import stored_sizes, storing_errors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.report.gravity_probe_b.horizon import bounds_in_blocks
+from gpbnb.wordlength.precision import required_precision
 
 FORMAT = FloatFormat(2, 11)
 Asked = Callable[[LinearModel, Any, FloatFormat], Any]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from exact_terms import UNIT, UP, fractions, plain, same
 
-from gpbnb.kalman.guarantee import envelope, reach
-from gpbnb.kalman.guarantee.reach import Reach
+from gpbnb.bounds import envelope, reach
+from gpbnb.bounds.reach import Reach
 
 
 @pytest.fixture

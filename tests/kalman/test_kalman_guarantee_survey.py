@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.guarantee import survey
-from gpbnb.kalman.guarantee.published import dynamax_tracking, filterpy_fusion, px4_landing_target
+from gpbnb.report.guarantees import survey
+from gpbnb.report.guarantees.published import dynamax_tracking, filterpy_fusion, px4_landing_target
 
 
 def test_a_sample_recomputes_no_row_twice(monkeypatch: pytest.MonkeyPatch) -> None:

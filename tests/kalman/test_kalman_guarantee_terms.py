@@ -16,9 +16,9 @@ from exact_terms import UNIT, UP, fractions, plain, same
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman.guarantee import enclosure, envelope, reach
-from gpbnb.kalman.guarantee.envelope import Limits, units
-from gpbnb.kalman.guarantee.program import (
+from gpbnb.bounds import enclosure, envelope, reach
+from gpbnb.bounds.envelope import Limits, units
+from gpbnb.filters.program import (
     ADD,
     MULTIPLY,
     Builder,

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.independent: one model counts once."""
+"""gpbnb.report.kalman.independent: one model counts once."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import ensembles, independent
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.independent import first_steps, stored_shares
-from gpbnb.kalman.probability import interval
+from gpbnb.filters.forms import Form
+from gpbnb.report.confidence import interval
+from gpbnb.report.kalman import ensembles, independent
+from gpbnb.report.kalman.independent import first_steps, stored_shares
 
 
 def test_the_stored_sweep_has_170_models():

@@ -9,18 +9,18 @@ import pytest
 
 from gpbnb import BINARY64, FloatFormat, LinearModel, Rounding, required_precision
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.array_forms import ArrayForm
-from gpbnb.kalman.array_run import ArrayRun
-from gpbnb.kalman.bounded_run import BoundedRun
-from gpbnb.kalman.emulation import compare_runs, emulate
-from gpbnb.kalman.exact_step import exact_step
-from gpbnb.kalman.filter_run import Run, reference
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.model import LinearModel as Model
-from gpbnb.kalman.precision import survey
-from gpbnb.kalman.simulation import Simulation, fine_resolution
+from gpbnb.bounds.bounded_run import BoundedRun
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.emulation import compare_runs, emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.inputs import simulated_measurements
+from gpbnb.filters.model import LinearModel as Model
+from gpbnb.filters.run import Run, reference
+from gpbnb.filters.simulation import Simulation, fine_resolution
+from gpbnb.report.kalman.exact_step import exact_step
+from gpbnb.wordlength.precision import survey
 
 FORMS = (*Form, *ArrayForm)
 STEPS = 40

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.mission: the known signal against the sky, and a filter that finds out what the signal shows."""
+"""gravity_probe_b.mission: the known signal against the sky, and a filter that finds out what the signal shows."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import mission, mission_runs
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.lockstep import Lockstep
-from gpbnb.kalman.mission import PARAMETERS, STATES, Mission
-from gpbnb.kalman.records import Records
-from gpbnb.kalman.simulation import BLOCK
+from gpbnb.filters.forms import Form
+from gpbnb.filters.lockstep import Lockstep
+from gpbnb.filters.parallel import Records
+from gpbnb.filters.simulation import BLOCK
+from gpbnb.report.gravity_probe_b import mission, mission_runs
+from gpbnb.report.gravity_probe_b.mission import PARAMETERS, STATES, Mission
 
 YEAR = np.linspace(0, 3_153_600, 2001).astype(np.int64)
 

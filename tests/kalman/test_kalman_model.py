@@ -1,4 +1,4 @@
-"""gpbnb.kalman.model: what is refused, and the model of Gravity Probe B against its geometry."""
+"""gpbnb.filters.model: what is refused, and the model of Gravity Probe B against its geometry."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.covariance import factor
-from gpbnb.kalman.gravity_probe_b import STATES, YEAR, gravity_probe_b
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters.covariance import factor
+from gpbnb.filters.model import LinearModel
+from gpbnb.report.gravity_probe_b.model import STATES, YEAR, gravity_probe_b
 
 GOOD = {
     "Phi": [["0.9", "0.1"], [0, "0.8"]],

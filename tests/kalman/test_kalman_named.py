@@ -1,12 +1,12 @@
-"""gpbnb.kalman.named: forms of the filter and roundings by name."""
+"""gpbnb.filters.named: forms of the filter and roundings by name."""
 
 from __future__ import annotations
 
 import pytest
 
-from gpbnb.kalman.array_forms import ArrayForm
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.named import form_named
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.forms import Form
+from gpbnb.filters.named import form_named
 
 NAMES = {
     "innovation": Form.INNOVATION,

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.precise_reference: filters whose reference double-double cannot compute."""
+"""gpbnb.filters.reference: filters whose reference double-double cannot compute."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import filter_run, precise_reference
-from gpbnb.kalman.exact_step import exact_step
-from gpbnb.kalman.filter_run import Run, reference, reference_states
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters import reference as precise_reference
+from gpbnb.filters import run as filter_run
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, reference, reference_states
+from gpbnb.report.kalman.exact_step import exact_step
 
 EYE = np.eye(2, dtype=int)
 Z = np.array([[1.5, 3.0], [-0.25, -0.5], [2.0, 4.0], [0.75, 1.5], [1.0, 2.0]])
@@ -94,7 +95,7 @@ def test_only_such_models_need_it(monkeypatch):
     def never(model, z):
         raise AssertionError("the reference was computed again")
 
-    monkeypatch.setattr("gpbnb.kalman.filter_run.precise_steps", never)
+    monkeypatch.setattr("gpbnb.filters.run.precise_steps", never)
     expected = exactly(sensor("1e-6"), Z)[0]
     assert distance(reference_states(sensor("1e-6"), Z), expected) < 1e-18
     with pytest.raises(AssertionError, match="computed again"):

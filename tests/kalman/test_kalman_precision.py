@@ -1,4 +1,4 @@
-"""gpbnb.kalman.precision: the smallest precision that meets a tolerance is that, and says what it rests on."""
+"""gpbnb.wordlength.precision: the smallest precision that meets a tolerance is that, and says what it rests on."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import precision
-from gpbnb.kalman.bounded_run import emulate_with_bound
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import Run, reference
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import limits
-from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.missing import real_numbers, without_missing
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.named import form_named
-from gpbnb.kalman.precision import required_precision
-from gpbnb.kalman.requirement import listed
-from gpbnb.kalman.simulation import Simulation, fine_resolution
-from gpbnb.kalman.system import LinearSystem, unobserved
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.inputs import simulated_measurements
+from gpbnb.filters.missing import real_numbers, without_missing
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named
+from gpbnb.filters.run import Run, reference
+from gpbnb.filters.simulation import Simulation, fine_resolution
+from gpbnb.wordlength import precision
+from gpbnb.wordlength.precision import required_precision
+from gpbnb.wordlength.requirement import listed
+from gpbnb.wordlength.system import LinearSystem, unobserved
 
 STEPS = 60
 MODEL = LinearModel(

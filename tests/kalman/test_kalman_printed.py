@@ -1,4 +1,4 @@
-"""gpbnb.kalman.printed: what (125) allows a run, against theory in exact numbers."""
+"""gpbnb.report.kalman.printed: what (125) allows a run, against theory in exact numbers."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, max_norm, row_sum_norm
-from gpbnb.kalman import exact_step, printed, report_bounds
-from gpbnb.kalman.filter_run import Checkpoints, reference
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Checkpoints, reference
+from gpbnb.report.kalman import exact_step, printed, report_bounds
 
 TWO = LinearModel(
     Phi=[[["1", "0.5"], ["0", "0.9"]], [["1", "0.25"], ["0", "0.8"]]],

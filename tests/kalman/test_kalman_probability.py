@@ -1,4 +1,4 @@
-"""gpbnb.kalman.probability: confidence intervals against their definition, and the precision that follows from them."""
+"""gravity_probe_b.probability: confidence intervals against their definition, and the precision they give."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import pytest
 from scipy import stats
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import mission_runs, probability, threshold
-from gpbnb.kalman.probability import Needed, Share, interval, needed, quantile_limit, records_needed, shares
+from gpbnb.report import confidence as probability
+from gpbnb.report.confidence import interval, quantile_limit, records_needed
+from gpbnb.report.gravity_probe_b import mission_runs, threshold
+from gpbnb.report.gravity_probe_b.probability import Needed, Share, needed, shares
 from gpbnb.sweeps import Table
 
 

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.kernels.products: the digits of the products of :mod:`gpbnb.arithmetic`, entry by entry."""
+"""gpbnb.filters.kernels.products: the digits of the products of :mod:`gpbnb.arithmetic`, entry by entry."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.products import add_transposed, product_by_columns, product_with_units
-from gpbnb.kalman.model import LinearModel
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.products import add_transposed, product_by_columns, product_with_units
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
 
 
 @compiled

@@ -11,16 +11,16 @@ import pytest
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import Run, reference_states
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.adversary import attack
-from gpbnb.kalman.guarantee.bound import guarantee, limits
-from gpbnb.kalman.guarantee.envelope import ROUNDING, units
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision, survey
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.bounds.adversary import attack
+from gpbnb.bounds.envelope import ROUNDING, units
+from gpbnb.bounds.guarantee import guarantee, limits
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.wordlength.precision import required_precision, survey
 from gpbnb.wordlength.records import survey_records
+from gpbnb.wordlength.system import LinearSystem
 
 HALF = {"emin": -14, "emax": 15, "rounding": "even"}
 WALK = LinearModel([[1]], [[1]], [["0.01"]], [[1]], [0], [[1]])

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.records: many records through one gain get the digits of single runs, each in its own."""
+"""gpbnb.filters.parallel: many records through one gain get the digits of single runs, each in its own."""
 
 from __future__ import annotations
 
@@ -11,16 +11,26 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import threshold
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.kernels.records import pairs_as_floats, update_largest
-from gpbnb.kalman.lockstep import REFERENCE, error_rows, run_lockstep
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.records import Records
-from gpbnb.kalman.threshold import CELLS, FORMS, STATES, Cell, SimpleYear, compute, lockstep, rows, sample
-from gpbnb.kalman.year_cases import MODELS, model
-from gpbnb.kalman.year_cases import simulation as year_simulation
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.records import pairs_as_floats, update_largest
+from gpbnb.filters.lockstep import REFERENCE, error_rows, run_lockstep
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.parallel import Records
+from gpbnb.filters.run import Run
+from gpbnb.report.gravity_probe_b import threshold
+from gpbnb.report.gravity_probe_b.threshold import (
+    CELLS,
+    FORMS,
+    STATES,
+    Cell,
+    SimpleYear,
+    compute,
+    lockstep,
+    rows,
+    sample,
+)
+from gpbnb.report.gravity_probe_b.year_cases import MODELS, model
+from gpbnb.report.gravity_probe_b.year_cases import simulation as year_simulation
 
 STEPS, COUNT = 300, 5
 
@@ -157,7 +167,7 @@ def test_measurements_reference_and_formats_are_timed_apart(monkeypatch):
     """A clock goes on by 1, 10, 100, 1000 and 10000 seconds during the parts of a block, which has three formats."""
     readings = iter([0, 1, 11, 111, 1111, 11111])
     clock = SimpleNamespace(process_time=lambda: next(readings))
-    monkeypatch.setattr("gpbnb.kalman.lockstep.time", clock)  # not that of pytest and coverage.py
+    monkeypatch.setattr("gpbnb.filters.lockstep.time", clock)  # not that of pytest and coverage.py
     whole = lockstep(dataclasses.replace(SMALL, precisions=(20, 22, 24)), 100)
     whole.advance()
     assert whole.seconds.tolist() == [1, 10, 100, 1000, 10000]

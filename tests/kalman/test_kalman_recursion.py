@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, LinearSystem, required_precision
-from gpbnb.kalman.array_run import ArrayRun
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.guarantee.bound import limits
-from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.precision import survey
+from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.forms import Form
+from gpbnb.filters.inputs import simulated_measurements
 from gpbnb.wordlength import examples
+from gpbnb.wordlength.precision import survey
 
 Z = np.random.default_rng(3).standard_normal(200)
 

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.report_bounds: the counts of the report and its closing example."""
+"""gpbnb.report.kalman.report_bounds: the counts of the report and its closing example."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import sympy as sp
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import derivation, report_bounds
+from gpbnb.report.kalman import derivation, report_bounds
 
 # -- counts ---------------------------------------------------------------------------------------
 

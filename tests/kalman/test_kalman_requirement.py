@@ -1,4 +1,4 @@
-"""gpbnb.kalman.requirement: an answer in words."""
+"""gpbnb.wordlength.requirement: an answer in words."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman.requirement import Requirement, listed
+from gpbnb.wordlength.requirement import Requirement, listed
 
 FOUND = Requirement(FloatFormat(10, 9, "chop"), "bound", 60, ((8, 2.0), (9, 0.4567), (10, 0.04)))
 NONE = Requirement(None, "emulation", 60, ((52, 3.0), (53, 2.0)))

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.sensitivity: by how many bits a choice moves the answer, for errors that are known."""
+"""gpbnb.report.gravity_probe_b.sensitivity: by how many bits a choice moves the answer, for errors that are known."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import answers, tables, year, year_cases
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.probability import Share
-from gpbnb.kalman.sensitivity import Moved, median_precision, sensitivity, single_record
+from gpbnb.filters.forms import Form
+from gpbnb.report.gravity_probe_b import answers, tables, year, year_cases
+from gpbnb.report.gravity_probe_b.probability import Share
+from gpbnb.report.gravity_probe_b.sensitivity import Moved, median_precision, sensitivity, single_record
 
 
 def share(precision, error, setting="simple", states="deviation", form="hung", rounding=Rounding.NEAREST, records=3):

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.smallest: filters of one and two states that violate the bounds of the report."""
+"""gpbnb.report.kalman.smallest: filters of one and two states that violate the bounds of the report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import smallest
+from gpbnb.report.kalman import smallest
 
 FORMATS = [
     FloatFormat(b, t, rounding)

@@ -1,4 +1,4 @@
-"""gpbnb.kalman: a covariance that a format makes indefinite is stored with raised variances, in every form."""
+"""gpbnb.report.kalman: a covariance that a format makes indefinite is stored with raised variances, in every form."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import pytest
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman import array_run
-from gpbnb.kalman.array_forms import ArrayForm
-from gpbnb.kalman.array_run import ArrayRun, _double_doubles
-from gpbnb.kalman.array_steps import predict_root, predict_ud
-from gpbnb.kalman.bounded_run import emulate_with_bound
-from gpbnb.kalman.covariance import Repair, is_definite, raised_until
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.factors import covariance_of_factors
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.inputs import simulated_measurements
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision
+from gpbnb.bounds.bounded_run import emulate_with_bound
+from gpbnb.filters import array_run
+from gpbnb.filters.array_forms import ArrayForm
+from gpbnb.filters.array_run import ArrayRun, _double_doubles
+from gpbnb.filters.array_steps import predict_root, predict_ud
+from gpbnb.filters.covariance import Repair, is_definite, raised_until
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.factors import covariance_of_factors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.inputs import simulated_measurements
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run
+from gpbnb.wordlength.precision import required_precision
 
 STEPS = ("0.001", "0.005", "0.01", "0.02", "0.04", "0.05", "0.1", "0.2", "0.3", "0.7")
 FORMATS = (FloatFormat(2, 8), FloatFormat(2, 24), FloatFormat(2, 24, Rounding.CHOP), FloatFormat(10, 5))

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.system: linear filters against rounded Fractions, their bounds, and what is refused."""
+"""gpbnb.wordlength.system: linear filters against rounded Fractions, their bounds, and what is refused."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
-from gpbnb.kalman.guarantee import linear
-from gpbnb.kalman.guarantee.bound import from_schedule, limits
-from gpbnb.kalman.guarantee.linear import peak_gain
-from gpbnb.kalman.guarantee.probable import probable_error
-from gpbnb.kalman.precision import required_precision
-from gpbnb.kalman.system import LinearSystem, is_stable
+from gpbnb.bounds import linear
+from gpbnb.bounds.guarantee import from_schedule, limits
+from gpbnb.bounds.linear import peak_gain
+from gpbnb.bounds.probable import probable_error
+from gpbnb.wordlength.precision import required_precision
+from gpbnb.wordlength.system import LinearSystem, is_stable
 
 BUTTERWORTH = LinearSystem(*signal.tf2ss(*signal.butter(4, 0.05)), name="Butterworth")
 SMALL = LinearSystem([["0.9", "0.2"], [0, "-0.5"]], [["0.1"], [1]], [[1, "0.3"]], [["0.25"]])

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.tables: what the chapter's tables say."""
+"""gpbnb.report.kalman.tables: what the chapter's tables say."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import ensembles, independent, printed, report_bounds, smallest, tables, year, year_cases
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import gravity_probe_b
-from gpbnb.kalman.probability import Share, interval
-from gpbnb.kalman.requirement import Requirement
+from gpbnb.filters.forms import Form
+from gpbnb.report.confidence import interval
+from gpbnb.report.gravity_probe_b import tables as gravity_probe_b_tables
+from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b.model import gravity_probe_b
+from gpbnb.report.gravity_probe_b.probability import Share
+from gpbnb.report.kalman import ensembles, independent, printed, report_bounds, smallest, tables
+from gpbnb.wordlength.requirement import Requirement
 
 
 def cells(table):
@@ -140,7 +143,7 @@ def test_the_largest_violating_noise():
 
 
 def test_the_states():
-    table = tables.states(gravity_probe_b())
+    table = gravity_probe_b_tables.states(gravity_probe_b())
     rows = cells(table)
     assert table.title == "10 states"
     assert by_header(table)[8] == {
@@ -176,7 +179,7 @@ def run(**changes):
 
 
 def test_year_ends():
-    table = tables.year_ends([run(), run(indefinite=12345)])
+    table = gravity_probe_b_tables.year_ends([run(), run(indefinite=12345)])
     assert table.header[:4] == ("arithmetic", "form", "error of the drift (mas)", "error of the rate (mas/yr)")
     assert table.title == "2 years"
     assert by_header(table)[0] == {
@@ -192,11 +195,11 @@ def test_year_ends():
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5; first non-positive variance at step 12,345"
     other = run(case=run().case._replace(model=year_cases.MODELS[1]))
-    table = tables.year_ends([run(), other])
+    table = gravity_probe_b_tables.year_ends([run(), other])
     assert table.header[0] == "model"
     assert [row[0] for row in cells(table)] == list(year_cases.MODELS[:2])
     with pytest.raises(ValueError, match="got the reference"):
-        tables.year_ends([run(case=run().case.reference)])
+        gravity_probe_b_tables.year_ends([run(case=run().case.reference)])
 
 
 def test_slack():
@@ -204,7 +207,7 @@ def test_slack():
     terms = printed.Terms(10, 2, *(np.array([size]) for size in (7.0, 5.0, 2.0, 2.0)))
     zeros = (np.zeros(2), np.zeros(2), np.zeros(2))
     bounds = year.Bounds(run().case.reference, run().steps, np.zeros((2, 2)), np.array([[0, 0], [0, 0.125]]), *zeros)
-    table = tables.slack([run()], [bounds], terms)
+    table = gravity_probe_b_tables.slack([run()], [bounds], terms)
     row = cells(table)[0]
     first, second = report_bounds.coefficients(k, 10, 2)
     assert table.title == "bound over error, 1 years"
@@ -220,7 +223,7 @@ def test_slack():
     assert row[:3] == ["24 bits", "0.5", tables.short(beta * (7 * first + 5 * second) / 0.5)]
     assert row[-1] == "1.25000"
     with pytest.raises(ValueError, match="needed one up to step 3"):
-        tables.slack(
+        gravity_probe_b_tables.slack(
             [run(steps=np.array([1, 3]))],
             [year.Bounds(*[*vars(bounds).values()][:1], np.array([1, 2]), *[*vars(bounds).values()][2:])],
             terms,
@@ -274,7 +277,7 @@ def test_requirements():
         ("one", Requirement(FloatFormat(2, 9), "bound", 5, ((8, 2.0), (9, 0.5432)))),
         ("two", Requirement(None, "emulation", 5, ((8, 2.0),))),
     ]
-    table = tables.requirements(answers)
+    table = gravity_probe_b_tables.requirements(answers)
     assert table.title == "2 answers"
     assert by_header(table)[0] == {
         "filter": "one",
@@ -295,7 +298,7 @@ def share(precision, within, records, **changes):
 
 def test_shares():
     """Nine errors of 0.1 and one of 2: the 90 % quantile lies a tenth of the way from the ninth to the last."""
-    table = tables.shares([share(32, 9, 10, quantile_limit=0.5432)])
+    table = gravity_probe_b_tables.shares([share(32, 9, 10, quantile_limit=0.5432)])
     assert table.title == "records that stay within a milliarcsecond for a year"
     assert by_header(table) == [
         {
@@ -315,8 +318,8 @@ def test_shares():
 def test_needed_precisions():
     found = [share(32, 9, 10), share(33, 300, 300), share(27, 5, 5, states="deviation")]
     chopped = share(36, 1, 30)._replace(fmt=FloatFormat(2, 36, Rounding.CHOP))
-    assert cells(tables.needed_precisions([chopped]))[0][2:5] == ["none", "–", "–"]
-    table = tables.needed_precisions(found)
+    assert cells(gravity_probe_b_tables.needed_precisions([chopped]))[0][2:5] == ["none", "–", "–"]
+    table = gravity_probe_b_tables.needed_precisions(found)
     assert table.title == "smallest precision that stays within a milliarcsecond"
     assert by_header(table)[0] == {
         "model and states": "simple, absolute",
@@ -329,7 +332,7 @@ def test_needed_precisions():
     }
     row = ["simple, deviation", "hung, nearest", "27 bits", "5 of 5", "0.549 to 1.000", "27 bits", "none"]
     assert cells(table)[1] == row
-    decimal = tables.needed_precisions([share(10, 5, 5, fmt=FloatFormat(10, 10))])
+    decimal = gravity_probe_b_tables.needed_precisions([share(10, 5, 5, fmt=FloatFormat(10, 10))])
     assert cells(decimal)[0][2] == "10 digits"
 
 
@@ -355,7 +358,7 @@ def test_first_steps_and_shares_by_form():
 
 
 def test_the_parameters_of_the_mission():
-    table = tables.parameters()
+    table = gravity_probe_b_tables.parameters()
     assert table.title == "parameters of the mission model"
     assert by_header(table)[7] == {
         "parameter": "right ascension of IM Pegasi",
@@ -374,7 +377,7 @@ def test_what_a_bound_costs():
     found = SimpleNamespace(history=history, state=bound)
     reference = SimpleNamespace(steps=np.array([1, k]), rate=np.array([[0, 0], [0, 0.125]]))
     first, second = report_bounds.coefficients(k, 10, 2)
-    table = tables.bound_costs([(fmt, found)], terms, reference, 8.2)
+    table = gravity_probe_b_tables.bound_costs([(fmt, found)], terms, reference, 8.2)
     rows = cells(table)
     assert table.title == "what a bound costs, after 3 steps"
     assert by_header(table)[1] == {

@@ -1,4 +1,4 @@
-"""gpbnb.kalman.year: what is stored comes out again, digit for digit, and a run that is interrupted goes on."""
+"""gravity_probe_b.year: what is stored comes out again, digit for digit, and a run that is interrupted goes on."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman import answers, contraction, year, year_cases, year_runs
-from gpbnb.kalman.bounded_run import BoundedRun
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import Run, reference
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.gravity_probe_b import TRUTH, YEAR
-from gpbnb.kalman.simulation import BLOCK
-from gpbnb.kalman.stored import same_errors
-from gpbnb.kalman.year import HEADER
-from gpbnb.kalman.year_cases import BOUNDED_CASES, CASES, MODELS, Case
-from gpbnb.kalman.year_runs import ResumableRun, run_cases
+from gpbnb.bounds.bounded_run import BoundedRun
+from gpbnb.filters import contraction
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run, reference
+from gpbnb.filters.simulation import BLOCK
+from gpbnb.report.gravity_probe_b import answers, year, year_cases, year_runs
+from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
+from gpbnb.report.gravity_probe_b.stored import same_errors
+from gpbnb.report.gravity_probe_b.year import HEADER
+from gpbnb.report.gravity_probe_b.year_cases import BOUNDED_CASES, CASES, MODELS, Case
+from gpbnb.report.gravity_probe_b.year_runs import ResumableRun, run_cases
 from gpbnb.sweeps import read
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -295,7 +296,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch, capsys):
     here.mkdir()
     assert year.main(given) == 0
     origin = read(here / "year.csv", year.COLUMNS, "").provenance
-    assert (origin["command"], origin["seed"]) == ("python -m gpbnb.kalman.year", "1984")
+    assert (origin["command"], origin["seed"]) == ("python -m gpbnb.report.gravity_probe_b.year", "1984")
     runs = year.load(here)
     assert [run.case for run in runs] == list(CASES[:3])
     assert all(run.steps.tolist() == list(year_cases.checkpoint_steps(100)) for run in runs)

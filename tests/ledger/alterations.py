@@ -8,8 +8,8 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
 
-from gpbnb.ledger.formula import Number, Part, Relation, Words, has_dotted_matrix
-from gpbnb.ledger.statements import Statement
+from gpbnb.report.ledger.formula import Number, Part, Relation, Words, has_dotted_matrix
+from gpbnb.report.ledger.statements import Statement
 
 COMPARISON = "comparison"
 """Begins the name of an alteration that exchanges = with ≠, or makes an inequality an equation."""

@@ -5,7 +5,7 @@ import textwrap
 
 import pytest
 
-from gpbnb.ledger import load_statements, select
+from gpbnb.report.ledger import load_statements, select
 
 CHECKED = tuple(entry.id for entry in select(load_statements(), "hung1984", "I"))
 
@@ -17,8 +17,8 @@ def topic(tmp_path, monkeypatch):
 
     def make(name, body):
         source = (
-            "from gpbnb.ledger.finding import Verdict, answer, compare, unverifiable\n"
-            "from gpbnb.ledger.registry import Checks\n\nCHECKS = Checks()\n\n"
+            "from gpbnb.report.ledger.finding import Verdict, answer, compare, unverifiable\n"
+            "from gpbnb.report.ledger.registry import Checks\n\nCHECKS = Checks()\n\n"
         )
         (tmp_path / f"{name}.py").write_text(source + textwrap.dedent(body), encoding="utf-8")
         return name

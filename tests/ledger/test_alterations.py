@@ -10,14 +10,14 @@ import faults
 import pytest
 from alterations import COMPARISON, altered
 
-from gpbnb.ledger.checks import TOPICS
-from gpbnb.ledger.checks.rounding import instances, introduction, matrices, products, sums
-from gpbnb.ledger.corrections import load_corrections
-from gpbnb.ledger.finding import DISAGREEMENTS, Verdict
-from gpbnb.ledger.formula import Undefined, Words
-from gpbnb.ledger.registry import takes_statement
-from gpbnb.ledger.statements import Statement, load_statements
-from gpbnb.rounding import experiment
+from gpbnb.report.ledger.checks import TOPICS
+from gpbnb.report.ledger.checks.rounding import instances, introduction, matrices, products, sums
+from gpbnb.report.ledger.corrections import load_corrections
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
+from gpbnb.report.ledger.formula import Undefined, Words
+from gpbnb.report.ledger.registry import takes_statement
+from gpbnb.report.ledger.statements import Statement, load_statements
+from gpbnb.report.rounding import experiment
 
 CHECKED = {key: checks for checks in TOPICS.values() for key in checks}
 MOST = 5

@@ -9,10 +9,11 @@ from dataclasses import replace
 import pytest
 from forks import answering
 
-from gpbnb import caching, ledger
-from gpbnb.ledger import cache, checking
-from gpbnb.ledger.checks import TOPICS
-from gpbnb.ledger.statements import load_statements
+from gpbnb import caching
+from gpbnb.report import ledger
+from gpbnb.report.ledger import cache, checking
+from gpbnb.report.ledger.checks import TOPICS
+from gpbnb.report.ledger.statements import load_statements
 
 # Loads the libraries once. For each line of input, a process of its own loads the package as it is then, examines the
 # entries that the line names, and says which checks were run.
@@ -21,8 +22,8 @@ import json, os, sys
 import flint, gmpy2, mpmath, numba, numpy, sympy, sympy.combinatorics.polyhedron, sympy.tensor.tensor, tqdm
 
 def answer(line):
-    from gpbnb.ledger import checking
-    from gpbnb.ledger.statements import load_statements
+    from gpbnb.report.ledger import checking
+    from gpbnb.report.ledger.statements import load_statements
 
     ran, examine = [], checking.examine
 
@@ -64,16 +65,16 @@ def test_exactly_the_checks_that_depend_on_a_change_are_run_again(copy):
     first = copy(*SAMPLE)
     assert sorted(first["ran"]) == sorted(SAMPLE)
     # The page that shows findings and the other topics change nothing.
-    append(copy.package / "ledger" / "page.py", "# changed\n")
-    append(copy.package / "rolling" / "theory.py", "# changed\n")
+    append(copy.package / "report" / "ledger" / "page.py", "# changed\n")
+    append(copy.package / "report" / "rolling" / "theory.py", "# changed\n")
     assert copy(*SAMPLE) == {"ran": [], "outcomes": first["outcomes"]}
     append(copy.package / "arithmetic" / "kernels" / "binary.py", "# changed\n")
     assert sorted(copy(*SAMPLE)["ran"]) == sorted(SAMPLE)
-    append(copy.package / "integration" / "theory.py", "# changed\n")
+    append(copy.package / "report" / "integration" / "theory.py", "# changed\n")
     assert copy(*SAMPLE)["ran"] == [INTEGRATION]
-    append(copy.package / "geometry" / "derivation.py", "# changed\n")
+    append(copy.package / "report" / "geometry" / "derivation.py", "# changed\n")
     assert copy(*SAMPLE)["ran"] == [GEOMETRY]
-    (copy.package / "rounding" / "stored.csv").write_text("1\n")  # data beside the sources
+    (copy.package / "report" / "rounding" / "stored.csv").write_text("1\n")  # data beside the sources
     assert copy(*SAMPLE)["ran"] == [ROUNDING]
 
 

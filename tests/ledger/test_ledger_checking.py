@@ -8,11 +8,11 @@ import sys
 import pytest
 from faults import RECORDED
 
-from gpbnb.ledger import Row, agreement, counts, load_statements, rows
-from gpbnb.ledger.checking import TOPICS, in_reading_order, owners
-from gpbnb.ledger.finding import Verdict, compare
-from gpbnb.ledger.registry import takes_statement
-from gpbnb.ledger.statements import Statement
+from gpbnb.report.ledger import Row, agreement, counts, load_statements, rows
+from gpbnb.report.ledger.checking import TOPICS, in_reading_order, owners
+from gpbnb.report.ledger.finding import Verdict, compare
+from gpbnb.report.ledger.registry import takes_statement
+from gpbnb.report.ledger.statements import Statement
 
 INVENTORY = load_statements()
 
@@ -34,7 +34,7 @@ def test_topics_check_entries_of_the_inventory_only():
 def test_each_topic_has_the_checks_of_its_own_module():
     assert list(TOPICS) == ["rounding", "inversion", "kalman", "rolling", "integration", "budget", "geometry"]
     for name, checks in TOPICS.items():
-        assert checks is importlib.import_module(f"gpbnb.ledger.checks.{name}").CHECKS
+        assert checks is importlib.import_module(f"gpbnb.report.ledger.checks.{name}").CHECKS
 
 
 def test_every_entry_has_a_finding_on_record():

@@ -13,15 +13,15 @@ from pathlib import Path
 
 import pytest
 
-from gpbnb.ledger import __main__ as command
-from gpbnb.ledger import load_statements, rows, table
-from gpbnb.ledger.render import to_csv
+from gpbnb.report.ledger import command as command
+from gpbnb.report.ledger import load_statements, rows, table
+from gpbnb.report.ledger.render import to_csv
 
 INVENTORY = load_statements()
 CHECKED = [entry for entry in INVENTORY if entry.id.startswith("hung1984.I.")]
 # The command with other topics: what they check is known, and quick.
 DRIVER = (
-    "import sys; from importlib import import_module; from gpbnb.ledger import __main__ as command;"
+    "import sys; from importlib import import_module; from gpbnb.report.ledger import command;"
     "command.TOPICS = {name: import_module(name).CHECKS for name in sys.argv.pop(1).split()};"
     "sys.exit(command.main(sys.argv[1:]))"
 )

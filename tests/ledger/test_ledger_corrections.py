@@ -2,9 +2,9 @@
 
 import pytest
 
-from gpbnb.ledger import load_statements
-from gpbnb.ledger.corrections import Correction, load_corrections, read_corrections
-from gpbnb.ledger.statements import Statement
+from gpbnb.report.ledger import load_statements
+from gpbnb.report.ledger.corrections import Correction, load_corrections, read_corrections
+from gpbnb.report.ledger.statements import Statement
 
 HEAD = "id,form,text,reason"
 PRINTED = Statement("hung1984.II.x", "hung1984", "II", "1", "x", "equation", "{{1}} [the scan is torn]", "a == b")

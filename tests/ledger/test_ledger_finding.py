@@ -1,4 +1,4 @@
-"""gpbnb.ledger.finding: what a finding may be, how verdicts follow, and the registry of checks."""
+"""gpbnb.report.ledger.finding: what a finding may be, how verdicts follow, and the registry of checks."""
 
 import dataclasses
 
@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import sympy
 
-from gpbnb.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
-from gpbnb.ledger.registry import Checks
-from gpbnb.ledger.statements import Statement
+from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.report.ledger.registry import Checks
+from gpbnb.report.ledger.statements import Statement
 
 ALLOWED = {
     ("verified", True),

@@ -1,4 +1,4 @@
-"""gpbnb.ledger.formula: read, evaluate and typeset the machine-readable form of a statement."""
+"""gpbnb.report.ledger.formula: read, evaluate and typeset the machine-readable form of a statement."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from gpbnb.ledger.agreement import prints_side
-from gpbnb.ledger.formula import Link, Number, Relation, Undefined, Words, read
+from gpbnb.report.ledger.agreement import prints_side
+from gpbnb.report.ledger.formula import Link, Number, Relation, Undefined, Words, read
 
 
 def exact(value):

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from gpbnb import ledger
-from gpbnb.ledger import legibility
-from gpbnb.ledger.finding import DISAGREEMENTS, Verdict, compare, given
-from gpbnb.ledger.legibility import Damage, charged, load_legibility
+from gpbnb.report import ledger
+from gpbnb.report.ledger import legibility
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict, compare, given
+from gpbnb.report.ledger.legibility import Damage, charged, load_legibility
 
 DAMAGES = load_legibility()
 PACKAGE = Path(legibility.__file__).parent

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from markup import Elements
 
-from gpbnb import ledger
-from gpbnb.ledger import Row, load_statements, page
-from gpbnb.ledger.corrections import load_corrections
-from gpbnb.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, given, unverifiable
-from gpbnb.ledger.html import typeset
-from gpbnb.ledger.statements import DOCUMENTS, Statement
+from gpbnb.report import ledger
+from gpbnb.report.ledger import Row, load_statements, page
+from gpbnb.report.ledger.corrections import load_corrections
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.report.ledger.html import typeset
+from gpbnb.report.ledger.statements import DOCUMENTS, Statement
 
 BOOK = Path(__file__).resolve().parents[2] / "book"
 FINDINGS = (

@@ -11,10 +11,10 @@ import pytest
 from markdown_it import MarkdownIt
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-from gpbnb.ledger import Row, load_statements, table
-from gpbnb.ledger.finding import Verdict, answer, compare, unverifiable
-from gpbnb.ledger.render import to_csv, to_json, to_markdown, to_text
-from gpbnb.ledger.statements import Statement
+from gpbnb.report.ledger import Row, load_statements, table
+from gpbnb.report.ledger.finding import Verdict, answer, compare, unverifiable
+from gpbnb.report.ledger.render import to_csv, to_json, to_markdown, to_text
+from gpbnb.report.ledger.statements import Statement
 
 ENTRY = Statement("hung1984.II.eq20", "hung1984", "II", "6", "eq (20)", "equation", r"$|\tilde Q/Q|\le(n+m+1)\beta$")
 FINDINGS = {

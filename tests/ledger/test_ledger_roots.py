@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from gpbnb import ledger
-from gpbnb.ledger import counts, load_roots
-from gpbnb.ledger.finding import Verdict
+from gpbnb.report import ledger
+from gpbnb.report.ledger import counts, load_roots
+from gpbnb.report.ledger.finding import Verdict
 
 ERRATA = Path(__file__).resolve().parents[2] / "book" / "errata.md"
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from gpbnb.ledger import load_statements, quote, select
-from gpbnb.ledger.statements import HEADER, Statement
+from gpbnb.report.ledger import load_statements, quote, select
+from gpbnb.report.ledger.statements import HEADER, Statement
 
 HEAD = ",".join(HEADER)
 GOOD = "hung1984.II.eq14,hung1984,II,4,eq (14),equation,$\\beta_c=2\\beta$,"

@@ -7,11 +7,11 @@ from itertools import combinations
 import pytest
 import sympy as sp
 
-from gpbnb.ledger import load_statements
-from gpbnb.ledger.checking import examine_once
-from gpbnb.ledger.finding import DISAGREEMENTS, Verdict
-from gpbnb.ledger.formula import Number, Relation, Words
-from gpbnb.ledger.statements import Statement
+from gpbnb.report.ledger import load_statements
+from gpbnb.report.ledger.checking import examine_once
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Verdict
+from gpbnb.report.ledger.formula import Number, Relation, Words
+from gpbnb.report.ledger.statements import Statement
 
 MATRICES = ("A", "B", "C", "D", "E", "F", "H", "I", "M", "P", "P_kp", "Phi", "phi", "R", "u", "x", "K_k")
 NAMES = {

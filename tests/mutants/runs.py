@@ -264,8 +264,8 @@ class Collected:
             # Files that had a fault for a while are again as they were imported.
             importlib.import_module("gpbnb.caching")._IMPORTED = time.time()
             # Findings of the checks are kept by the sources in files, which do not have the fault.
-            importlib.import_module("gpbnb.ledger.cache")._folder = lambda: None
-            importlib.import_module("gpbnb.ledger.cache")._file.cache_clear()
+            importlib.import_module("gpbnb.report.ledger.cache")._folder = lambda: None
+            importlib.import_module("gpbnb.report.ledger.cache")._file.cache_clear()
             chosen: dict[str, pytest.Item] = {}
             for test in tests:
                 items = self.items.get(test.partition("::")[0], ())

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gpbnb.calculators import forms
-from gpbnb.calculators import page as html
+from gpbnb.report.calculators import forms
+from gpbnb.report.calculators import page as html
 
 ADDRESS = "book/calculators.html"
 CALCULATORS = pytest.mark.parametrize("calculator", forms.CALCULATORS, ids=lambda each: each.id)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gpbnb.calculators import forms
-from gpbnb.calculators.page import show
+from gpbnb.report.calculators import forms
+from gpbnb.report.calculators.page import show
 
 ADDRESS = "book/calculators.html"
 CALCULATORS = pytest.mark.parametrize("calculator", forms.CALCULATORS, ids=lambda each: each.id)

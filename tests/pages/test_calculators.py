@@ -13,8 +13,8 @@ import sympy as sp
 from mpmath import mp
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.calculators import forms
-from gpbnb.calculators.page import show
+from gpbnb.report.calculators import forms
+from gpbnb.report.calculators.page import show
 
 from . import axe
 from . import browser as tools

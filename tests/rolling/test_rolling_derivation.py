@@ -1,4 +1,4 @@
-"""gpbnb.rolling.derivation: every step holds, and a wrong one would be found out."""
+"""gpbnb.report.rolling.derivation: every step holds, and a wrong one would be found out."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.rolling import derivation
+from gpbnb.report.rolling import derivation
 
 DERIVATIONS = steps.Derivations(
     derivation.one_dimension,

@@ -12,9 +12,9 @@ import pytest
 from drawn import BLUE, GREEN, GREY, ORANGE, PURPLE, at, look, named, near, pictured, points_of, spans_of
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.rolling import experiment, figures
-from gpbnb.rolling.experiment import LowPass
-from gpbnb.rolling.spectra import Slope, Spectra, Spectrum
+from gpbnb.report.rolling import experiment, figures
+from gpbnb.report.rolling.experiment import LowPass
+from gpbnb.report.rolling.spectra import Slope, Spectra, Spectrum
 
 YEAR = 365 * 86400
 

@@ -1,4 +1,4 @@
-"""gpbnb.rolling.experiment: simulations against closed forms, within their standard errors; refusals."""
+"""gpbnb.report.rolling.experiment: simulations against closed forms, within their standard errors; refusals."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 from scipy import signal
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.ledger.checks.rolling import material
-from gpbnb.rolling import experiment, stored, theory
-from gpbnb.rolling.flicker import record
-from gpbnb.rolling.stored import SWEEP
-from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
+from gpbnb.report.ledger.checks.rolling import material
+from gpbnb.report.rolling import experiment, stored, theory
+from gpbnb.report.rolling.flicker import record
+from gpbnb.report.rolling.stored import SWEEP
+from gpbnb.report.rolling.theory import DRIFTS, LEVEL, YEAR
 
 
 def rng(seed=0):

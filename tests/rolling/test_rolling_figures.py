@@ -1,4 +1,4 @@
-"""gpbnb.rolling.figures: what is drawn is the result, beside theory; axes have quantity and unit."""
+"""gpbnb.report.rolling.figures: what is drawn is the result, beside theory; axes have quantity and unit."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from drawn import colour, names_of
 from matplotlib.container import ErrorbarContainer
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.display import style
-from gpbnb.ledger.checks.rolling import material
-from gpbnb.rolling import experiment, figures, theory
+from gpbnb.report.display import style
+from gpbnb.report.ledger.checks.rolling import material
+from gpbnb.report.rolling import experiment, figures, theory
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""gpbnb.rolling.flicker: the response, the density over four decades, causality, reproducibility, bounded memory."""
+"""rolling.flicker: the response, the density over four decades, causality, reproducibility, bounded memory."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from gpbnb.rolling import experiment, theory
-from gpbnb.rolling.flicker import LONGEST, exponentials, flicker, record
+from gpbnb.report.rolling import experiment, theory
+from gpbnb.report.rolling.flicker import LONGEST, exponentials, flicker, record
 
 LEVEL = 7.0
 

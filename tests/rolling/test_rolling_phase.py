@@ -1,4 +1,4 @@
-"""gpbnb.rolling.phase: the weight of the fit, against the derivation, quadrature and simulated years."""
+"""gpbnb.report.rolling.phase: the weight of the fit, against the derivation, quadrature and simulated years."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 from scipy import integrate
 from tabulated import by_header
 
-from gpbnb.measurement import YEAR
-from gpbnb.rolling import derivation, experiment, phase, tables, theory
+from gpbnb.report.measurement import YEAR
+from gpbnb.report.rolling import derivation, experiment, phase, tables, theory
 
 LIMIT = theory.largest_phase(theory.DRIFTS, 1.0)
 

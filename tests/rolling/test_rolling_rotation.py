@@ -11,7 +11,7 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.rolling import experiment, rotations, theory
+from gpbnb.report.rolling import experiment, rotations, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [

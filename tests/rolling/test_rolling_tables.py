@@ -1,4 +1,4 @@
-"""gpbnb.rolling.tables: every number in a cell is that of theory or experiment."""
+"""gpbnb.report.rolling.tables: every number in a cell is that of theory or experiment."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.measurement import YEAR
-from gpbnb.rolling import experiment, tables, theory
+from gpbnb.report.measurement import YEAR
+from gpbnb.report.rolling import experiment, tables, theory
 
 
 def test_registers():

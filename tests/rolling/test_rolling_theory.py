@@ -1,4 +1,4 @@
-"""gpbnb.rolling.theory: closed forms against quadrature, sums and the printed numbers."""
+"""gpbnb.report.rolling.theory: closed forms against quadrature, sums and the printed numbers."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 from scipy import integrate, signal, special
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.rolling import derivation, theory
-from gpbnb.rolling.theory import DRIFTS, LEVEL, YEAR
+from gpbnb.report.rolling import derivation, theory
+from gpbnb.report.rolling.theory import DRIFTS, LEVEL, YEAR
 
 CHOP = Rounding.CHOP
 

@@ -1,4 +1,4 @@
-"""gpbnb.rounding.derivation: every step holds, for general n, and means what the numbers do."""
+"""gpbnb.report.rounding.derivation: every step holds, for general n, and means what the numbers do."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 import steps
 import sympy as sp
 
-from gpbnb.display.derivation import first_order
-from gpbnb.rounding import derivation, theory
+from gpbnb.report.display.derivation import first_order
+from gpbnb.report.rounding import derivation, theory
 
 DERIVATIONS = steps.Derivations(
     derivation.one_rounding,

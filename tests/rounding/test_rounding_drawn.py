@@ -12,7 +12,7 @@ from drawn import BLUE, GREEN, ORANGE, PINK, PURPLE, at, look, named, near, pict
 from matplotlib.colors import to_hex
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.rounding import figures
+from gpbnb.report.rounding import figures
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 

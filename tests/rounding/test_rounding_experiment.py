@@ -1,4 +1,4 @@
-"""gpbnb.rounding.experiment: what is computed, beside what oracles compute, and beside its bounds."""
+"""gpbnb.report.rounding.experiment: what is computed, beside what oracles compute, and beside its bounds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import sympy as sp
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm
-from gpbnb.rounding import derivation, experiment, theory
+from gpbnb.report.rounding import derivation, experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FOUR = FloatFormat(10, 4)

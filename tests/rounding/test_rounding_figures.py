@@ -1,4 +1,4 @@
-"""gpbnb.rounding.figures: what is drawn is the result; axes, legends and colours say what it is."""
+"""gpbnb.report.rounding.figures: what is drawn is the result; axes, legends and colours say what it is."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from drawn import colour, names_of
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm
-from gpbnb.display import style
-from gpbnb.rounding import experiment, figures, theory
+from gpbnb.report.display import style
+from gpbnb.report.rounding import experiment, figures, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 TWO = FloatFormat(10, 2)

@@ -1,4 +1,4 @@
-"""gpbnb.rounding.tables: every number in a cell is that of the trials."""
+"""gpbnb.report.rounding.tables: every number in a cell is that of the trials."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.rounding import experiment, tables
+from gpbnb.report.rounding import experiment, tables
 
 TWO = FloatFormat(10, 2)
 FOUR = FloatFormat(10, 4)

@@ -1,4 +1,4 @@
-"""gpbnb.rounding.theory: each bound as printed or derived, and whether it is one."""
+"""gpbnb.report.rounding.theory: each bound as printed or derived, and whether it is one."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flint import fmpq_mat
 from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import column_sum_norm, exact
-from gpbnb.rounding import theory
+from gpbnb.report.rounding import theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 BETA = Fraction(1, 2000)

@@ -11,7 +11,7 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.rounding import experiment, theory
+from gpbnb.report.rounding import experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from gpbnb.inversion.experiment import SWEEPS as INVERSIONS
-from gpbnb.inversion.experiment import format_name
-from gpbnb.sweeps.__main__ import SWEEPS
+from gpbnb.report.inversion.experiment import SWEEPS as INVERSIONS
+from gpbnb.report.inversion.experiment import format_name
+from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps.sweep import cell_key
 
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import gpbnb
-from gpbnb.kalman import year
-from gpbnb.kalman.stored import YEAR, first_steps
+from gpbnb.report.gravity_probe_b import year
+from gpbnb.report.gravity_probe_b.stored import YEAR, first_steps
+from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps import DamagedFileError
-from gpbnb.sweeps.__main__ import SWEEPS
 
 PACKAGE = Path(gpbnb.__file__).parent
 #: Sweeps of which a cell, or its first steps, takes seconds; `make verify-sweeps` computes cells of the others.

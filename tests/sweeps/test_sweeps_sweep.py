@@ -15,9 +15,9 @@ import pytest
 from distributed import Client, KilledWorker
 from executors import Failing, local_cluster
 
+from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps import Column, DamagedFileError, Sweep, read, write
 from gpbnb.sweeps import sweep as sweep_module
-from gpbnb.sweeps.__main__ import SWEEPS
 from gpbnb.sweeps.command import INTERRUPTED, run_command
 from gpbnb.sweeps.stored import run, verify
 from gpbnb.sweeps.sweep import ATTEMPTS, machine

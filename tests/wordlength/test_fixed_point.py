@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.kernels.rules import Rounding
-from gpbnb.kalman.guarantee.linear import biquad, controller, state_space
-from gpbnb.kalman.guarantee.program import steps_in_python
-from gpbnb.kalman.simulation import Simulation
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.linear import biquad, controller, state_space
+from gpbnb.filters.program import steps_in_python
+from gpbnb.filters.simulation import Simulation
 from gpbnb.wordlength import examples, fixed_point
 from gpbnb.wordlength.fixed_point import ScaledFilter
 

@@ -14,10 +14,13 @@ from tabulated import by_header
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
-from gpbnb.kalman.guarantee.linear import biquad
-from gpbnb.kalman.guarantee.published import fixif_longitudinal
-from gpbnb.wordlength import figures, fixed_point, guarantees, processor_tables
-from gpbnb.wordlength.processors import PROCESSORS, Outcome, Processor, Sum
+from gpbnb.bounds.linear import biquad
+from gpbnb.report.guarantees import table as guarantees
+from gpbnb.report.guarantees.published import fixif_longitudinal
+from gpbnb.report.processors import tables as processor_tables
+from gpbnb.report.processors.experiment import PROCESSORS, Outcome, Processor, Sum
+from gpbnb.report.wordlengths import figures
+from gpbnb.wordlength import fixed_point
 
 
 def test_outcomes_show_errors_or_why_there_is_none() -> None:

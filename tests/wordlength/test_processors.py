@@ -13,10 +13,11 @@ from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
-from gpbnb.kalman.filter_run import Run
-from gpbnb.kalman.forms import Form
-from gpbnb.wordlength import examples, processors
-from gpbnb.wordlength.processors import Processor
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run
+from gpbnb.report.processors import experiment as processors
+from gpbnb.report.processors.experiment import Processor
+from gpbnb.wordlength import examples
 from tests.array_filter import estimates
 
 STEPS = 60

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from gpbnb import FloatFormat, LinearModel, Rounding
-from gpbnb.kalman.precision import survey, survey_formats
 from gpbnb.wordlength import examples
 from gpbnb.wordlength import records as module
+from gpbnb.wordlength.precision import survey, survey_formats
 from gpbnb.wordlength.records import RecordSurvey, survey_records
 
 FORMATS = [FloatFormat(2, 10), FloatFormat(2, 24), FloatFormat(10, 5), FloatFormat(2, 12, Rounding.CHOP)]

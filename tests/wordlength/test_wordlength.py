@@ -12,18 +12,21 @@ import small_filter
 from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.display import style
-from gpbnb.integration.theory import needed_precision
-from gpbnb.inversion.bounds import smallest_precision
-from gpbnb.kalman import gravity_probe_b, year, year_cases
-from gpbnb.kalman.emulation import emulate
-from gpbnb.kalman.filter_run import log_spaced, reference
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision, survey
-from gpbnb.kalman.report_bounds import coefficients
-from gpbnb.kalman.requirement import Requirement
-from gpbnb.wordlength import examples, figures, guarantees, study, tables
+from gpbnb.bounds.inverse import smallest_precision
+from gpbnb.filters.emulation import emulate
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import log_spaced, reference
+from gpbnb.report.display import style
+from gpbnb.report.gravity_probe_b import model as gravity_probe_b
+from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.guarantees import table as guarantees
+from gpbnb.report.integration.theory import needed_precision
+from gpbnb.report.kalman.report_bounds import coefficients
+from gpbnb.report.wordlengths import figures, study, tables
+from gpbnb.wordlength import examples, ranges
+from gpbnb.wordlength.precision import required_precision, survey
+from gpbnb.wordlength.requirement import Requirement
 
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)
@@ -151,7 +154,7 @@ def test_a_run_that_left_the_tolerance_does_not_come_back():
 def test_spans_hold_every_number():
     checkpoints = reference(TILT, Z, log_spaced(300, 16))
     numbers = {"estimate": checkpoints.x, "gain": checkpoints.K, "covariance": checkpoints.P}
-    found = {each.name: each for each in study.binary_ranges(TILT, Z)}
+    found = {each.name: each for each in ranges.binary_ranges(TILT, Z)}
     for name, values in numbers.items():
         sizes = np.abs(values.astype(float)).ravel()
         sizes = sizes[sizes > 0]
@@ -194,7 +197,7 @@ def test_what_the_watch_of_a_state_refuses():
             study.update_stagnation(TILT, Z, 2, [FloatFormat(2, 12)], last=last)
     assert study.bits_hiding_process_noise(TILT, Z, 0) == math.inf
     with pytest.raises(ValueError, match="NaN or infinity"):
-        study.binary_ranges(TILT, Z * math.nan)
+        ranges.binary_ranges(TILT, Z * math.nan)
 
 
 def test_largest_estimate():
@@ -352,7 +355,7 @@ def test_cells():
         }
     ]
     spans = tables.binary_ranges(
-        [study.BinaryRange("gain", -20, 3), study.BinaryRange("all", -2000, 2000), study.BinaryRange("x", -14, 15)]
+        [ranges.BinaryRange("gain", -20, 3), ranges.BinaryRange("all", -2000, 2000), ranges.BinaryRange("x", -14, 15)]
     )
     assert spans.header == ("numbers", "smallest", "largest", "normal in")
     assert spans.title == "3 kinds of numbers"

@@ -17,14 +17,14 @@ import pytest
 from markup import Elements
 
 from gpbnb import __main__ as top
-from gpbnb.kalman.guarantee.bound import limits
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.precision import required_precision
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.bounds.guarantee import limits
+from gpbnb.filters.model import LinearModel
 from gpbnb.wordlength import __main__ as command
 from gpbnb.wordlength.__main__ import main
 from gpbnb.wordlength.models import read_measurements, read_model
+from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.report import Answer, Report, study
+from gpbnb.wordlength.system import LinearSystem
 
 MODEL = """
 name = "tracker <1>"

@@ -9,7 +9,7 @@ import pytest
 from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, at, labelled, legend_of, look, pictured
 from matplotlib.colors import to_hex
 
-from gpbnb.wordlength import figures
+from gpbnb.report.wordlengths import figures
 
 #: Bits of the significand in IEEE 754, the hidden one included.
 STANDARD = {"binary16": 11, "binary32": 24, "binary64": 53}

@@ -23,10 +23,10 @@ from filterpy.kalman import (
 )
 from scipy import signal
 
-from gpbnb.kalman.filter_run import reference_states
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import reference_states
 from gpbnb.wordlength.models import read_model
+from gpbnb.wordlength.system import LinearSystem
 
 STEPS = 40
 RNG = np.random.default_rng(5)

@@ -1,4 +1,4 @@
-"""gpbnb.wordlength.study: the emulation against numbers of other types, computed one by one."""
+"""gpbnb.report.wordlengths.study: the emulation against numbers of other types, computed one by one."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ import pytest
 from small_filter import run
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.kalman.filter_run import reference
-from gpbnb.kalman.forms import Form
-from gpbnb.kalman.model import LinearModel
-from gpbnb.wordlength import examples, study
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import reference
+from gpbnb.report.wordlengths import study
+from gpbnb.wordlength import examples
 
 TILT = examples.tilt()
 Z = examples.tilt_measurements(300)

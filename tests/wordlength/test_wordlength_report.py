@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from gpbnb.kalman.model import LinearModel
-from gpbnb.kalman.system import LinearSystem
+from gpbnb.filters.model import LinearModel
 from gpbnb.wordlength.report import Answer, Report, study
+from gpbnb.wordlength.system import LinearSystem
 
 REPORT = Report(
     name="tracker",

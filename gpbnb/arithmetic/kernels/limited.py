@@ -12,7 +12,7 @@ from math import isqrt
 from typing import cast
 
 from gpbnb.arithmetic.kernels.exact import ZERO, ExactKernel, Pair
-from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Limits, Rounding, Rules
+from gpbnb.arithmetic.rounding import DRAW_BITS, Limits, Rounding, Rules
 
 _MASK = 2**64 - 1
 

@@ -12,7 +12,7 @@ from gpbnb.arithmetic.kernels import tags
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Backend, Compiled, Components, Exact, Floats, Pairs
 from gpbnb.arithmetic.kernels.exact import ExactKernel
 from gpbnb.arithmetic.kernels.limited import LimitedKernel, limited_kernel
-from gpbnb.arithmetic.kernels.rules import DRAW_BITS, Order, Rounding, Rules
+from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules
 
 _CODES = {
     Rounding.NEAREST: tags.AWAY,

@@ -18,8 +18,8 @@ import numpy as np
 from gpbnb.arithmetic.kernels.binary import LEAST
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.rules import DRAW_BITS
 from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, ODD, UP, Even, Mode, Random, Sixteen, Two
+from gpbnb.arithmetic.rounding import DRAW_BITS
 
 EXACT_PRODUCT = 26  # bits; products of numbers this short are exact in float64
 _ONE = np.int64(1)

@@ -7,7 +7,7 @@ import pytest
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.exact import ZERO
 from gpbnb.arithmetic.kernels.limited import limited_kernel
-from gpbnb.arithmetic.kernels.rules import Rounding, Rules
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
 
 @pytest.mark.parametrize("rounding", Rounding, ids=str)

@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.budget: the state of the ledger of ch. I and II, and that each check can come out otherwise."""
+"""ledger.checks.budget: the state of the ledger of ch. I and II, and that each check can come out otherwise."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import faults
 import numpy as np
 import pytest
 
-from gpbnb.budget import derivation, experiment, theory
-from gpbnb.ledger.checks import budget as checks
-from gpbnb.ledger.checks.budget import general, sources, title
-from gpbnb.ledger.finding import Verdict
+from gpbnb.report.budget import derivation, experiment, theory
+from gpbnb.report.ledger.checks import budget as checks
+from gpbnb.report.ledger.checks.budget import general, sources, title
+from gpbnb.report.ledger.finding import Verdict
 
 INVENTORY = faults.INVENTORY
 # What ch. III of 1984 left open is decided by the checks of another topic.

@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.geometry: every statement of ch. IV has a check, and the verdicts are the known ones."""
+"""gpbnb.report.ledger.checks.geometry: every statement of ch. IV has a check, and the verdicts are the known ones."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from gpbnb.display.derivation import Derivation, Step
-from gpbnb.geometry import derivation, theory
-from gpbnb.ledger.checks import geometry as checks
-from gpbnb.ledger.checks.geometry import angles, definitions, equations, frames, precessions
-from gpbnb.ledger.finding import Verdict
-from gpbnb.ledger.statements import statement
-from gpbnb.measurement import ARCSEC, deroll, rotation
+from gpbnb.report.display.derivation import Derivation, Step
+from gpbnb.report.geometry import derivation, theory
+from gpbnb.report.ledger.checks import geometry as checks
+from gpbnb.report.ledger.checks.geometry import angles, definitions, equations, frames, precessions
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.statements import statement
+from gpbnb.report.measurement import ARCSEC, deroll, rotation
 
 INVENTORY = faults.INVENTORY
 ENTRIES = [entry for entry in INVENTORY if entry.id in checks.CHECKS]

@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.integration: every statement of savage2016 has a check, and the verdicts are the known ones."""
+"""ledger.checks.integration: every statement of savage2016 has a check, and the verdicts are the known ones."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import pytest
 import sympy as sp
 from faults import breaks, plus, replace, times
 
-from gpbnb import ledger
-from gpbnb.integration import derivation, experiment, theory
-from gpbnb.ledger.checks import integration as checks
-from gpbnb.ledger.checks.integration import cases, covariance, model, open_items, result
-from gpbnb.ledger.finding import Verdict
-from gpbnb.ledger.statements import statement
+from gpbnb.report import ledger
+from gpbnb.report.integration import derivation, experiment, theory
+from gpbnb.report.ledger.checks import integration as checks
+from gpbnb.report.ledger.checks.integration import cases, covariance, model, open_items, result
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.statements import statement
 
 ENTRIES = ledger.select(faults.INVENTORY, "savage2016")
 MAIN = "savage2016.main."

@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.inversion: each statement has a check, and the true values it is compared with are right."""
+"""ledger.checks.inversion: each statement has a check, and the true values it is compared with are right."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from faults import breaks, finding
 
-from gpbnb import ledger
-from gpbnb.inversion import example, procedure, theory
-from gpbnb.ledger.checks.inversion import (
+from gpbnb.report import ledger
+from gpbnb.report.inversion import example, procedure, theory
+from gpbnb.report.ledger.checks.inversion import (
     CHECKS,
     environments,
     first_approach,
@@ -23,11 +23,11 @@ from gpbnb.ledger.checks.inversion import (
     resultant,
     triangularization,
 )
-from gpbnb.ledger.checks.inversion.first_order import EPSILON, FirstOrder, matrix
-from gpbnb.ledger.checks.inversion.judging import holds
-from gpbnb.ledger.finding import Verdict
-from gpbnb.ledger.registry import both
-from gpbnb.ledger.statements import Statement, statement
+from gpbnb.report.ledger.checks.inversion.first_order import EPSILON, FirstOrder, matrix
+from gpbnb.report.ledger.checks.inversion.judging import holds
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.registry import both
+from gpbnb.report.ledger.statements import Statement, statement
 
 INVENTORY = faults.INVENTORY
 ENTRIES = (

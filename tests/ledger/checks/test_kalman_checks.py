@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.kalman: each entry of sections 12 to 14 has a check, and each check can come out otherwise."""
+"""ledger.checks.kalman: each entry of sections 12 to 14 has a check, and each check can come out otherwise."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ import sympy as sp
 from alterations import altered
 from faults import always, breaks, finding, replace
 
-from gpbnb import ledger
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.kalman import contraction, derivation, report_bounds, smallest
-from gpbnb.ledger.checks import kalman as checks
-from gpbnb.ledger.checks.kalman import algebra, bounds, example, filter_run, judging, remarks, steps, worst_case
-from gpbnb.ledger.finding import Verdict
+from gpbnb.filters import contraction
+from gpbnb.report import ledger
+from gpbnb.report.kalman import derivation, report_bounds, smallest
+from gpbnb.report.ledger.checks import kalman as checks
+from gpbnb.report.ledger.checks.kalman import algebra, bounds, example, filter_run, judging, remarks, steps, worst_case
+from gpbnb.report.ledger.finding import Verdict
 
 INVENTORY = faults.INVENTORY
 ENTRIES = (

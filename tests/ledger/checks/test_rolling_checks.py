@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.rolling: every statement of the chapter has a check, and the verdicts are the known ones."""
+"""ledger.checks.rolling: every statement of the chapter has a check, and the verdicts are the known ones."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from faults import always, breaks, replace, times
 
-from gpbnb import ledger
-from gpbnb.ledger.checks import rolling as checks
-from gpbnb.ledger.checks.rolling import frequency, material, noise, phase, process, registry, setting
-from gpbnb.ledger.finding import Verdict
-from gpbnb.ledger.statements import statement
-from gpbnb.rolling import derivation, experiment, theory
+from gpbnb.report import ledger
+from gpbnb.report.ledger.checks import rolling as checks
+from gpbnb.report.ledger.checks.rolling import frequency, material, noise, phase, process, registry, setting
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.statements import statement
+from gpbnb.report.rolling import derivation, experiment, theory
 
 ENTRIES = ledger.select(faults.INVENTORY, "hung1984", "III")
 

@@ -1,4 +1,4 @@
-"""gpbnb.ledger.checks.rounding: each statement of the sections has a check, and the check depends on the code."""
+"""ledger.checks.rounding: each statement of the sections has a check, and the check depends on the code."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from faults import all_of, breaks, finding, replace, times
 
-from gpbnb import ledger
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
-from gpbnb.ledger.checks import rounding as checks
-from gpbnb.ledger.checks.rounding import (
+from gpbnb.report import ledger
+from gpbnb.report.ledger.checks import rounding as checks
+from gpbnb.report.ledger.checks.rounding import (
     instances,
     introduction,
     matrices,
@@ -25,10 +25,10 @@ from gpbnb.ledger.checks.rounding import (
     representation,
     sums,
 )
-from gpbnb.ledger.finding import Verdict
-from gpbnb.ledger.formula import Link
-from gpbnb.ledger.statements import statement
-from gpbnb.rounding import derivation, experiment, theory
+from gpbnb.report.ledger.finding import Verdict
+from gpbnb.report.ledger.formula import Link
+from gpbnb.report.ledger.statements import statement
+from gpbnb.report.rounding import derivation, experiment, theory
 
 INVENTORY = faults.INVENTORY
 ENTRIES = (

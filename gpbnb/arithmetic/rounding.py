@@ -1,0 +1,87 @@
+"""Rules of a number format: how it rounds, and its range."""
+
+from __future__ import annotations
+
+from enum import Enum
+from fractions import Fraction
+from typing import Literal, NamedTuple
+
+
+class Rounding(Enum):
+    """How a number with too many digits is rounded to a format."""
+
+    #: To nearest, ties away from zero; hung1984, ch. II, (3).
+    NEAREST = "nearest"
+    #: Toward zero, by dropping further digits; hung1984, ch. II, (9). IEEE 754 calls it roundTowardZero.
+    CHOP = "chop"
+    #: To nearest, ties to the neighbour with an even last digit, the default of IEEE 754.
+    EVEN = "even"
+    #: Toward plus infinity.
+    UP = "up"
+    #: Toward minus infinity.
+    DOWN = "down"
+    #: Inexact results go to the neighbour with an odd last digit, so that a second rounding is correct.
+    ODD = "odd"
+    #: Up or down at random, with probabilities that make the expected value exact.
+    STOCHASTIC = "stochastic"
+
+    @staticmethod
+    def documented() -> tuple[Rounding, Rounding]:
+        """The two roundings of the reports: to nearest with ties away from zero, and chopping."""
+        return Rounding.NEAREST, Rounding.CHOP
+
+
+def rounding_named(rounding: Rounding | str) -> Rounding:
+    """Return a rounding, or the rounding with this name; case is ignored.
+
+    Raises
+    ------
+    ValueError : no such rounding.
+
+    Examples
+    --------
+    >>> rounding_named("nearest")
+    <Rounding.NEAREST: 'nearest'>
+    """
+    if isinstance(rounding, Rounding):
+        return rounding
+    if isinstance(rounding, str):
+        wanted = rounding.strip().lower()
+        for each in Rounding:
+            if wanted == each.value:
+                return each
+    names = ", ".join(repr(each.value) for each in Rounding)
+    raise ValueError(f"got rounding {rounding!r}; needed a Rounding or one of {names}")
+
+
+#: Order in which a sum of products is added, from left to right, pairwise, or in blocks.
+Order = Literal["left", "pairwise", "blocked"]
+
+#: Number of random bits that stochastic rounding compares with the dropped digits.
+DRAW_BITS = 24
+
+
+class Limits(NamedTuple):
+    """Range of a format."""
+
+    #: Exponent of the smallest normal number, ``base**emin``.
+    emin: int
+    #: Whether numbers below it keep its spacing (subnormal numbers) or become zero.
+    subnormal: bool
+    #: The largest number and the most negative one.
+    largest: Fraction
+    lowest: Fraction
+    #: What happens to results beyond these: "raise", "saturate" or "wrap".
+    overflow: str = "raise"
+    #: Whether all numbers have the same spacing, as in fixed point.
+    fixed: bool = False
+
+
+class Rules(NamedTuple):
+    """All settings that determine the digits of a result."""
+
+    base: int
+    precision: int
+    rounding: Rounding
+    limits: Limits | None = None
+    seed: int = 0

@@ -1,0 +1,500 @@
+r"""Bound sums over all earlier steps by a certificate that a finite computation can check.
+
+Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` with :math:`L \le k`, which may depend
+on k, and :math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
+
+.. math:: c_0 e_k = \sum_{l<L} c_l w_{k-l} + \sum_{l<L} r_l e_{k-l-1} + c_L e_{k-L}.
+
+So the rows need not be exact. A float64 value of :math:`c_{l+1} = c_l F_{k-l}` is sufficient, since its rounding errors
+are the small residuals :math:`r_l`. The infinite sum needs no estimate of its tail, because the tail is the last term.
+If the error was within b at all earlier steps, then
+
+.. math:: |c_0 e_k| \le \sum_{l<L} |c_l w_{k-l}| + \Big(\sum_{l<L} |r_l| + |c_L|\Big) b,
+
+and if the right side is at most b for each state and each step of the period, then the error stays within b forever, by
+induction.
+
+Disturbances are given as columns: :math:`w_k = \sum_g G_{k,g}\rho_g + s`, :math:`|\rho_g| \le h_{k,g}`, :math:`|s| \le
+\text{slack}_k`, and :math:`|c w| \le \sum_g |c\,G_g| h_g + |c|\,\text{slack}`, which is smaller than :math:`|c||w|`
+if a disturbance affects several states at once.
+
+The limit of a rounding error follows from the largest size of a result *before* it is rounded: that of its linear
+function of the exact filter, plus what earlier errors and roundings of the step add. The last rounding of a state has
+another limit, the largest error h of a result of size X + b, if that is smaller. It uses the claim for the same step,
+but not in a circle: without this rounding, the certificate gives :math:`|s - x| \le b - h` for the sum s before it, so
+:math:`|s| \le X + b`, and the error of rounding such a number is at most h. The roundings of a step are taken in the
+order of its operations.
+
+Everything is float64. Each sum of terms of one sign is enlarged by more than its own rounding errors.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.filters.program import MULTIPLY, effects, functionals
+
+_U = 2.0**-53
+_UP = 1 + 2.0**-40
+"""Factor that exceeds the effect of roundings on a sum of up to 2**12 terms of one sign."""
+
+ROUNDING, LOOP, GAIN, START = range(4)
+"""Parts of a bound (roundings of the step, of the stored closed loop, error of the gain, and earlier errors)."""
+
+
+class Units(NamedTuple):
+    r"""The largest rounding error of a result of at most a given size, :math:`\tfrac12 b^{e-t}` or :math:`b^{e-t}`.
+
+    The size is below :math:`b^e`. The table spans 2**±900, or the range of the format: the error does not fall below
+    that of the least numbers, and none is given beyond the largest.
+    """
+
+    #: powers of the base, rounded down.
+    powers: NDArray[np.float64]
+    #: error of a result up to this power, rounded up.
+    errors: NDArray[np.float64]
+    #: double-double powers of the base, by which a product is exact; with a limited range, only one.
+    exact: NDArray[np.float64]
+    #: whether sums are exact, as in fixed point.
+    sums_exact: bool
+
+
+@lru_cache(maxsize=64)
+def units(fmt: FloatFormat | FixedFormat) -> Units:
+    """Tables of :class:`Units` for a format."""
+    limits, most = fmt.limits, int(850 / np.log2(fmt.base))
+    sizes = [Fraction(fmt.base) ** k for k in range(-most, most + 1)]
+    exact = [(float(power), float(power - Fraction(float(power)))) for power in sizes]
+    share = 2 if fmt.rounding in (Rounding.NEAREST, Rounding.EVEN) else 1
+    errors = [power / fmt.base**fmt.precision / share for power in sizes]
+    if limits is not None and limits.fixed:
+        sizes, errors, exact = (
+            [limits.largest],
+            [Fraction(1, 2) ** (fmt.precision - 1 - limits.emin) / share],
+            [(1.0, 0.0)],
+        )
+    elif limits is not None:
+        normal = Fraction(fmt.base) ** limits.emin
+        least = normal / fmt.base ** (fmt.precision - 1) / share if limits.subnormal else normal
+        errors = [max(each, least) for each in errors]
+        last = next((i for i, power in enumerate(sizes) if power >= limits.largest), None)
+        if last is not None:
+            sizes, errors = [*sizes[:last], limits.largest], errors[: last + 1]
+        exact = [(1.0, 0.0)]
+    powers, above = [], []
+    for power, error in zip(sizes, errors, strict=True):
+        near = float(power)
+        powers.append(near if Fraction(near) <= power else np.nextafter(near, 0))
+        near_error = float(error)
+        above.append(near_error if Fraction(near_error) >= error else np.nextafter(near_error, np.inf))
+    return Units(np.array(powers), np.array(above), np.array(exact), limits is not None and limits.fixed)
+
+
+@compiled
+def largest_error(units: Any, size: float) -> float:
+    """Return the largest error of rounding a number of at most this size."""
+    if size == 0.0:
+        return 0.0
+    at = np.searchsorted(units.powers, size)  # the first power not below
+    return np.inf if at >= len(units.powers) else units.errors[at]
+
+
+@compiled
+def _is_power(units: Any, high: float, low: float) -> bool:
+    if high == 0.0:
+        return True
+    sign = 1.0 if high > 0 else -1.0
+    at = np.searchsorted(units.exact[:, 0], sign * high)
+    if at >= len(units.exact):
+        return False
+    return bool(units.exact[at, 0] == sign * high and units.exact[at, 1] == sign * low)
+
+
+class Limits(NamedTuple):
+    """Limits on the filter without rounding, in float64; none is negative, some may be infinite.
+
+    The state and the innovation, or the measurement, must be finite.
+    """
+
+    #: (n,), largest size of each state.
+    state: NDArray[np.float64]
+    #: (m,), largest size of each innovation.
+    innovation: NDArray[np.float64]
+    #: (m,), largest size of each measurement.
+    measurement: NDArray[np.float64]
+
+
+class Disturbances(NamedTuple):
+    """Closed loops and disturbances of some steps in float64, with bounds of the errors of float64."""
+
+    #: (steps, n, n), closed loop of the program.
+    F: NDArray[np.float64]
+    #: (steps, n, n), the product of a row vector c and F in float64 differs by at most ``abs(c) @ spread``.
+    spread: NDArray[np.float64]
+    #: (steps, n, g), columns.
+    G: NDArray[np.float64]
+    #: (steps, g), their limits.
+    limits: NDArray[np.float64]
+    #: (steps, n), limit of a further disturbance of each state.
+    slack: NDArray[np.float64]
+    #: (steps, n, m), gain of the program, and (steps, n, n) and (steps, n, m), its difference from the exact filter.
+    K: NDArray[np.float64]
+    loop: NDArray[np.float64]
+    gain: NDArray[np.float64]
+
+
+def columns(found: Disturbances) -> NDArray[np.float64]:
+    """Return the largest effect of each column on each state, (steps, n, g), zero for zero times infinity."""
+    return np.abs(found.G) * np.where(found.G == 0, 0.0, found.limits[:, np.newaxis, :])
+
+
+@compiled
+def disturbances(
+    operations: Any,
+    outputs: Any,
+    groups: Any,
+    roots: Any,
+    coefficients: Any,
+    offsets: Any,
+    units: Any,
+    Phi: Any,
+    HPhi: Any,
+    exact: Any,
+    dK: Any,
+    limits: Any,
+    b: Any,
+    caps: Any,
+) -> Any:
+    r"""Compute disturbances of each step, :math:`e_k = \hat F e_{k-1} + q_k + \Delta F x_{k-1} + (\hat K - K)\nu_k`.
+
+    If the coefficients of a step are known only within limits, each value differs by at most its drift from the value
+    that the given coefficients would give for the same operands and rounding errors. The drift of the results is a
+    further disturbance.
+
+    Parameters
+    ----------
+    operations, outputs, groups, roots : fields of a :class:`gpbnb.filters.program.Program`.
+    coefficients : (steps, c, 2), double-double.
+    offsets : (steps, c), largest distance of the true coefficients of a step from these.
+    units : units of the format.
+    Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), double-double.
+    exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain, double-double, and a bound of its error.
+    limits : limits on the filter without rounding.
+    b : (n,), bound of the error before and after each step.
+    caps : (o,), bound of each operation's linear function of the exact filter; infinite if not known.
+    """
+    steps, n, m = coefficients.shape[0], Phi.shape[1], HPhi.shape[1]
+    first, o_count, g_count = n + m, operations.shape[0], roots.shape[0]
+    F, spread = np.zeros((steps, n, n)), np.zeros((steps, n, n))
+    G, lim = np.zeros((steps, n, g_count + n + m)), np.zeros((steps, g_count + n + m))
+    slack, K = np.zeros((steps, n)), np.zeros((steps, n, m))
+    loop, gain = np.zeros((steps, n, n)), np.zeros((steps, n, m))
+    rows, sizes = np.empty((first + o_count, first, 2)), np.empty((first + o_count, first))
+    effect, effect_sizes = np.empty((first + o_count, n)), np.empty((first + o_count, n))
+    off, none = np.empty(first + o_count), np.empty(first + o_count, np.bool_)
+    drift, largest = np.empty(first + o_count), np.empty(first + o_count)
+    X, V, Z = limits.state, limits.innovation, limits.measurement
+    result_of = np.full(first + o_count, -1)
+    for i in range(n):
+        result_of[outputs[i]] = i
+    plain = np.empty(coefficients.shape[1])
+    for k in range(steps):
+        functionals(operations, coefficients[k], first, rows, sizes)
+        for a in range(len(plain)):
+            plain[a] = coefficients[k, a, 0]
+        effects(operations, outputs, plain, first, effect, effect_sizes)
+        off[:first] = 0.0
+        none[:first] = False
+        drift[:first] = 0.0
+        for j in range(n):
+            largest[j] = (X[j] + b[j]) * _UP
+        for i in range(m):
+            largest[n + i] = V[i]
+            for j in range(n):
+                if HPhi[k, i, j, 0] != 0.0:
+                    largest[n + i] += abs(HPhi[k, i, j, 0]) * X[j]
+            largest[n + i] = min(Z[i], largest[n + i] * _UP)
+        for o in range(o_count):
+            v = first + o
+            code, a, c = operations[o, 0], operations[o, 1], operations[o, 2]
+            # The largest possible size of the result, by state and measurement, or by state and innovation.
+            seen, known, carried = 0.0, 0.0, 0.0
+            for j in range(n):
+                r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
+                by_innovation = r
+                for i in range(m):
+                    by_innovation += rows[v, n + i, 0] * HPhi[k, i, j, 0]
+                    tiny += (m + 8) * _U * abs(rows[v, n + i, 0] * HPhi[k, i, j, 0])
+                if r != 0.0:
+                    seen += (abs(r) + 2.0**-90 * sizes[v, j]) * X[j]
+                if by_innovation != 0.0 or tiny != 0.0:
+                    known += (abs(by_innovation) + tiny) * X[j]
+                carried += (abs(r) + 2.0**-90 * sizes[v, j]) * b[j]
+            for i in range(m):
+                size = abs(rows[v, n + i, 0]) + 2.0**-90 * sizes[v, n + i]
+                if size != 0.0:
+                    seen += size * Z[i]
+                    known += size * V[i]
+            size = min(min(seen, known), caps[o]) + carried
+            if code == MULTIPLY:
+                factor = abs(plain[a])
+                before = factor * off[c]
+                drift[v] = factor * drift[c]
+                if offsets[k, a] != 0.0:
+                    drift[v] += offsets[k, a] * largest[c]
+                none[v] = none[c] or (factor == 0.0 and offsets[k, a] == 0.0)
+                is_exact = none[v] or (
+                    offsets[k, a] == 0.0 and _is_power(units, coefficients[k, a, 0], coefficients[k, a, 1])
+                )
+            else:
+                before = off[a] + off[c]
+                drift[v] = drift[a] + drift[c]
+                none[v] = none[a] and none[c]
+                is_exact = none[a] or none[c] or units.sums_exact
+            drift[v] *= _UP
+            size = (size + before + drift[v]) * _UP
+            if result_of[v] >= 0:
+                size = min(size, (X[result_of[v]] + b[result_of[v]]) * _UP)
+            h = largest_error(units, size)
+            if is_exact and h < np.inf:
+                h = 0.0
+            off[v] = (before + h) * _UP
+            largest[v] = (size + h) * _UP
+            lim[k, groups[o]] += h
+        for g in range(g_count):
+            v = first + roots[g]
+            h = lim[k, g] * _UP
+            lim[k, g] = h
+            for i in range(n):
+                G[k, i, g] = effect[v, i]
+                slack[k, i] += (6 * o_count + 2 * n + 16) * _U * effect_sizes[v, i] * h
+        for i in range(n):
+            v = outputs[i]
+            slack[k, i] += drift[v]
+            for j in range(n):
+                F[k, i, j] = rows[v, j, 0]
+                spread[k, i, j] = (n + 4) * _U * abs(F[k, i, j]) + 2.0**-89 * sizes[v, j]
+                s = rows[v, j, 0], rows[v, j, 1]
+                size = sizes[v, j] + abs(Phi[k, i, j, 0])
+                s = _minus(s, (Phi[k, i, j, 0], Phi[k, i, j, 1]))
+                for r in range(m):
+                    s = _plus_product(s, rows[v, n + r], HPhi[k, r, j])
+                    size += 2 * sizes[v, n + r] * abs(HPhi[k, r, j, 0])
+                loop[k, i, j] = s[0]
+                G[k, i, g_count + j] = s[0]
+                if size != 0.0 and X[j] < np.inf:
+                    slack[k, i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size) * X[j]
+            for r in range(m):
+                K[k, i, r] = rows[v, n + r, 0]
+                s = _minus((rows[v, n + r, 0], rows[v, n + r, 1]), (exact[k, i, r, 0], exact[k, i, r, 1]))
+                gain[k, i, r] = s[0]
+                G[k, i, g_count + n + r] = s[0]
+                size = sizes[v, n + r] + abs(exact[k, i, r, 0])
+                if size != 0.0 and V[r] < np.inf:
+                    slack[k, i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size + dK[k, i, r]) * V[r]
+        for j in range(n):
+            lim[k, g_count + j] = X[j]
+        for r in range(m):
+            lim[k, g_count + n + r] = V[r]
+        slack[k] *= _UP
+    return Disturbances(F, spread, G, lim, slack, K, loop, gain)
+
+
+@compiled
+def _minus(a: Any, b: Any) -> Any:
+    s, e = _two_sum(a[0], -b[0])
+    e += a[1] - b[1]
+    high = s + e
+    return high, e - (high - s)
+
+
+@compiled
+def _plus_product(s: Any, a: Any, b: Any) -> Any:
+    p = a[0] * b[0]
+    high, low = _two_product(a[0], b[0], p)
+    low += a[0] * b[1] + a[1] * b[0]
+    t, e = _two_sum(s[0], high)
+    e += s[1] + low
+    total = t + e
+    return total, e - (total - t)
+
+
+@compiled
+def _two_sum(a: float, b: float) -> Any:
+    s = a + b
+    c = s - a
+    return s, (a - (s - c)) + (b - c)
+
+
+@compiled
+def _two_product(a: float, b: float, p: float) -> Any:
+    c = 134217729.0 * a
+    a1 = c - (c - a)
+    a2 = a - a1
+    d = 134217729.0 * b
+    b1 = d - (d - b)
+    b2 = b - b1
+    return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
+
+
+class Certificate(NamedTuple):
+    """Results of :func:`certify` for each start."""
+
+    #: (t, 4), sums of each part of the disturbances, without earlier errors.
+    sums: NDArray[np.float64]
+    #: (t, n), sums of the residuals; they multiply the bound of errors at any earlier step.
+    residual: NDArray[np.float64]
+    #: (t, n), the last rows; they multiply the bound of the error where the rows end.
+    tail: NDArray[np.float64]
+    #: (t, n), the rows that reached the first estimate, zero if none did.
+    start: NDArray[np.float64]
+    #: number of steps that the rows went back.
+    lags: int
+
+
+@compiled
+def certify(
+    F: Any,
+    spread: Any,
+    G: Any,
+    limits: Any,
+    slack: Any,
+    part: Any,
+    starts: Any,
+    k: int,
+    first: int,
+    steady: bool,
+    most: int,
+    scale: Any,
+    small: float,
+) -> Any:
+    """Sum the effects of all earlier disturbances on some linear functions of the error after step k.
+
+    Parameters
+    ----------
+    F, spread, G, limits, slack : fields of :class:`Disturbances`; the rows from `first` on repeat forever.
+    part : (g,), the part of the bound to which each column belongs.
+    starts : (t, n), the functions.
+    k : the step; with `steady`, it counts from `first`, and the past is infinite.
+    most : largest number of steps to go back.
+    scale, small : (n,), stop when every ``abs(c) @ scale`` is below small.
+    """
+    n, t, g_count = F.shape[1], starts.shape[0], G.shape[2]
+    rows = F.shape[0]
+    period = rows - first
+    sums, residual, tail, lags = np.zeros((t, 4)), np.zeros((t, n)), np.zeros((t, n)), 0
+    begun = np.zeros((t, n))
+    following, rate, each = np.empty(n), np.empty(n), np.empty(4)
+    for i in range(t):
+        c = starts[i].copy()
+        for lag in range(most):
+            if not steady and k - lag <= 0:
+                break
+            at = k - lag - 1
+            if steady:
+                at = first + at % period
+            elif at >= rows:
+                at = first + (at - first) % period
+            size = 0.0
+            each[:] = 0.0  # a sum of its own, so that no term takes part in more than n + g + lags additions
+            for j in range(n):
+                size += abs(c[j]) * scale[j]
+                each[ROUNDING] += abs(c[j]) * slack[at, j]
+            if size < small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
+                break
+            for g in range(g_count):
+                if limits[at, g] != 0.0:
+                    s = 0.0
+                    for j in range(n):
+                        s += c[j] * G[at, j, g]
+                    if s != 0.0:
+                        each[part[g]] += abs(s) * limits[at, g]
+            for p in range(4):
+                sums[i, p] += each[p]
+            following[:] = 0.0
+            rate[:] = 0.0
+            for j in range(n):
+                if c[j] != 0.0:
+                    for r in range(n):
+                        following[r] += c[j] * F[at, j, r]
+                        rate[r] += abs(c[j]) * spread[at, j, r]
+            for r in range(n):
+                c[r] = following[r]
+                residual[i, r] += rate[r]
+            lags = max(lags, lag + 1)
+            if not steady and k - lag - 1 <= 0:
+                begun[i] = np.abs(c)
+                c[:] = 0.0
+        for r in range(n):
+            residual[i, r] *= 1 + (lags + n + g_count + 64) * 4 * _U
+            tail[i, r] = abs(c[r])
+        for p in range(4):
+            sums[i, p] *= 1 + (lags + n + g_count + 64) * 4 * _U
+    return Certificate(sums, residual, tail, begun, lags)
+
+
+@compiled
+def peaks(
+    F: Any,
+    spread: Any,
+    G: Any,
+    limits: Any,
+    slack: Any,
+    part: Any,
+    HPhi: Any,
+    X: Any,
+    V: Any,
+    Z: Any,
+    x0: Any,
+    first: int,
+    early: int,
+    steady: bool,
+    most: int,
+    scale: Any,
+    small: float,
+) -> Any:
+    """Return worst-case peaks of state and innovation of the exact filter, driven by the columns.
+
+    Parameters
+    ----------
+    HPhi : (steps, m, n), float64. X, V : peaks so far, for the small terms and the tail. Z : (m,), limits of
+        the measurements. x0 : (n,), size of the first estimate.
+    early : number of first steps to examine. steady : whether to examine each step of the period as well.
+    """
+    n, m, rows = F.shape[1], HPhi.shape[1], F.shape[0]
+    peak_x, peak_v = x0.copy(), np.zeros(m)
+    for r in range(m):
+        s = Z[r]
+        for j in range(n):
+            s += abs(HPhi[0, r, j]) * x0[j]
+        peak_v[r] = s * _UP
+    starts = np.zeros((n + m, n))
+    for i in range(n):
+        starts[i, i] = 1.0
+    for k in range(1, early + (rows - first if steady else 0) + 1):
+        settled = k > early
+        at = k - early if settled else k
+        following = at if not settled else first + at
+        if following >= rows:
+            following = first + (following - first) % (rows - first) if steady else rows - 1
+        starts[n:] = HPhi[following]
+        found = certify(F, spread, G, limits, slack, part, starts, at, first, settled, most, scale, small)
+        for i in range(n + m):
+            total = found.sums[i].sum()
+            for j in range(n):
+                total += (found.residual[i, j] + found.tail[i, j]) * X[j] + found.start[i, j] * x0[j]
+            if i < n:
+                peak_x[i] = max(peak_x[i], total * _UP)
+            else:
+                for j in range(n):
+                    total += 2.0**-50 * abs(starts[i, j]) * X[j]
+                peak_v[i - n] = max(peak_v[i - n], (Z[i - n] + total) * _UP)
+    return peak_x, peak_v

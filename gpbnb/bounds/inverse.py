@@ -1,0 +1,359 @@
+r"""Proved bounds on the error of a computed inverse, from a priori to a posteriori.
+
+Each function bounds :math:`\|X - A^{-1}\|` in the column-sum norm (22), where X is the inverse of the t-digit matrix A
+as :func:`gpbnb.arithmetic.linalg.inv` computes it. It returns a float64 above the value of its formula, and raises
+ValueError if no bound can be proved. :mod:`gpbnb.report.inversion.costs` compares sharpness and cost. The bounds use:
+
+============================  =========================================================================
+bound                         uses
+============================  =========================================================================
+:func:`wilkinson`             the largest numbers that occur
+:func:`higham`                the computed factors
+:func:`higham_probabilistic`  the same; may fail with a stated probability if rounding errors are random
+:func:`rule_of_thumb`         the same, with the square root of the number of roundings; not a bound
+:func:`ball`                  a second inversion of A, in ball arithmetic
+:func:`a_posteriori`          the residual of X, in ball arithmetic of more bits
+============================  =========================================================================
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from numbers import Real
+from typing import Any
+
+import flint
+import numpy as np
+
+from gpbnb.arithmetic import linalg, search
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounds import column_sum, gamma, gamma_probabilistic
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.linalg import LU
+from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+
+# -- a priori: from the count of roundings --------------------------------------------------------
+
+
+def wilkinson(factors: LU, x: FloatArray) -> float:
+    r"""Bound from the growth of the numbers, after Wilkinson.
+
+    .. math:: \|X - A^{-1}\| \le \|X\|\,\frac{g}{1-g}, \qquad
+        g = \gamma_{3n}\,n\,l\,n\,u\,\|X\|
+
+    where l and u are the largest sizes of entries in the factors; l = 1 with partial pivoting. The product
+    :math:`n l\,n u` bounds :math:`\||L||U|\|`.
+
+    Parameters
+    ----------
+    factors : the factors of A from :func:`gpbnb.arithmetic.linalg.lu`.
+    x : (n, n), the computed inverse.
+
+    Raises
+    ------
+    ValueError : g ≥ 1, or 3nβ ≥ 1: more digits are needed.
+
+    References
+    ----------
+    Wilkinson 1961; Higham 2002, Theorem 9.5.
+    """
+    n = len(x)
+    norm = float(column_sum(abs(x.to_float())))
+    largest = float(np.max(abs(factors.lower.to_float()))) * float(np.max(abs(factors.upper.to_float())))
+    g = _count(n, x.format) * n * n * largest * norm
+    return _solved(norm * g, g, n)
+
+
+def higham(factors: LU, x: FloatArray) -> float:
+    r"""Bound from the computed factors, entry by entry.
+
+    Each column of X solves :math:`(A + \Delta A_j)\hat x_j = u_j` with
+    :math:`|\Delta A_j| \le \gamma_{3n} P^T|\hat L||\hat U|`, so that
+
+    .. math:: \|X - A^{-1}\| \le \frac{\||X|G\|}{1 - \|G\|}, \qquad G = \gamma_{3n} P^T|\hat L||\hat U||X|.
+
+    Parameters
+    ----------
+    factors, x : as in :func:`wilkinson`.
+
+    Raises
+    ------
+    ValueError : ‖G‖ ≥ 1, or 3nβ ≥ 1: more digits are needed.
+
+    References
+    ----------
+    Higham 2002, Theorem 9.4.
+    """
+    return _from_factors(factors, x, _count(len(x), x.format))
+
+
+def higham_probabilistic(factors: LU, x: FloatArray, failure: float = 0.01) -> float:
+    r"""Bound as :func:`higham`, with :math:`3\tilde\gamma_n + \tilde\gamma_n^2`, about √n β, for :math:`\gamma_{3n}`.
+
+    If rounding errors are independent with mean zero, the bound fails at most with the probability `failure`. This
+    probability is shared equally by the 3n³ products in the inner products, n² of the factors and 2n² of the solutions.
+
+    Raises
+    ------
+    ValueError : ‖G‖ ≥ 1; or the format chops, so that roundings do not have mean zero.
+
+    References
+    ----------
+    Higham & Mary 2019.
+    """
+    if x.format.rounding is not Rounding.NEAREST:
+        raise ValueError(
+            f"got {x.format}; this bound needs rounding to nearest, whose errors can average out. Use higham."
+        )
+    n = len(x)
+    one = gamma_probabilistic(n, x.format.unit_roundoff, failure / (3 * n**3))
+    return _from_factors(factors, x, 3 * one + one * one)
+
+
+def rule_of_thumb(factors: LU, x: FloatArray) -> float:
+    r"""Estimate as in :func:`higham`, with :math:`\sqrt{3n}\,\beta` in place of :math:`\gamma_{3n}`; not a bound.
+
+    References
+    ----------
+    Wilkinson 1961, who uses the square root in place of the count.
+    """
+    return _from_factors(factors, x, math.sqrt(3 * len(x)) * float(x.format.unit_roundoff))
+
+
+def _count(n: int, fmt: FloatFormat) -> float:
+    return float(gamma(3 * n, fmt.unit_roundoff))
+
+
+def _from_factors(factors: LU, x: FloatArray, weight: float) -> float:
+    sizes = abs(x.to_float())
+    product = abs(factors.lower.to_float()) @ abs(factors.upper.to_float())
+    rows = np.empty_like(product)
+    rows[factors.permutation] = product
+    g = weight * (rows @ sizes)
+    return _solved(float(column_sum(sizes @ g)), float(column_sum(g)), len(x))
+
+
+def _solved(first: float, ratio: float, n: int) -> float:
+    """Return first / (1 - ratio), rounded up; no number here has passed through more than 8n roundings of float64."""
+    slack = 1 + 16 * n * 2.0**-53
+    if not ratio * slack < 1:
+        raise ValueError(f"‖G‖ must be below 1 to prove a bound; got {ratio:.3g}. Use more digits.")
+    return first * slack / (1 - ratio * slack) * slack
+
+
+# -- ball arithmetic ------------------------------------------------------------------------------
+
+
+def ball(a: Any, x: FloatArray, preconditioned: bool = False, bits: int | None = None) -> float:
+    r"""Bound from inverting A in ball arithmetic, :math:`\||X - \mathrm{mid}| + \mathrm{rad}\|`.
+
+    Parameters
+    ----------
+    a : (n, n), a FloatArray, or exact numbers.
+    x : (n, n), its computed inverse, or any other guess of it.
+    preconditioned : whether to multiply A first by an approximate inverse, in sums of products that are rounded once,
+        so that elimination starts near the identity; otherwise A itself is eliminated with partial pivoting.
+    bits : precision of the balls' midpoints; by default that of the format.
+
+    Raises
+    ------
+    ValueError : the balls are too wide to distinguish A from a singular matrix.
+
+    References
+    ----------
+    Johansson 2017; A is inverted by python-flint.
+    """
+    precision = _bits(x.format) if bits is None else bits
+    with _working(precision):
+        try:
+            inverse = _balls(a).solve(_identity(len(x)), algorithm="precond" if preconditioned else "lu")
+        except ZeroDivisionError:
+            raise ValueError(
+                f"got a matrix that {precision} bits cannot distinguish from a singular one; use more bits"
+            ) from None
+    with _working(precision + 64):
+        return _upper(_column_sum(_balls(x) - inverse))
+
+
+def a_posteriori(a: Any, x: FloatArray, bits: int | None = None) -> float:
+    r"""Bound from the residual, computed with more digits than X has.
+
+    .. math:: R = I - AX, \qquad A^{-1} - X = XR\,(I - R)^{-1}, \qquad
+        \|X - A^{-1}\| \le \frac{\|XR\|}{1 - \|R\|}
+
+    Every number is a ball, and the bound includes the radii, so it holds for any X, however X was computed.
+
+    Parameters
+    ----------
+    a : (n, n), a FloatArray, or exact numbers.
+    x : (n, n), its computed inverse, or any other guess of it.
+    bits : precision of the balls' midpoints; by default four times that of the format plus 64, so that A X fits.
+
+    Raises
+    ------
+    ValueError : ‖R‖ < 1 could not be proved, so X may have no correct digit.
+
+    References
+    ----------
+    Higham 2002, chapter 14; Rump 2010.
+    """
+    with _working(4 * _bits(x.format) + 64 if bits is None else bits):
+        guess = _balls(x)
+        residual = _identity(len(x)) - _balls(a) * guess
+        size = _upper(_column_sum(residual))
+        if not size < 1:
+            raise ValueError(
+                f"‖I - AX‖ must be below 1 to prove a bound; it may be as large as {size:.3g}. Use more digits."
+            )
+        return _upper(_column_sum(guess * residual) / (1 - flint.arb(size)))
+
+
+@contextmanager
+def _working(bits: int) -> Iterator[None]:
+    before = flint.ctx.prec
+    flint.ctx.prec = bits
+    try:
+        yield
+    finally:
+        flint.ctx.prec = before
+
+
+def _bits(fmt: FloatFormat) -> int:
+    return max(2, math.ceil(fmt.precision * math.log2(fmt.base)))
+
+
+def _balls(a: Any) -> Any:
+    return flint.arb_mat(rationals(a))
+
+
+def _identity(n: int) -> Any:
+    return flint.arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])
+
+
+def _column_sum(a: Any) -> Any:
+    """Return an upper bound of the column-sum norm of a matrix of balls, as an arb without radius."""
+    sums = [sum((entry.abs_upper() for entry in column), flint.arb(0)).upper() for column in a.transpose().tolist()]
+    largest = sums[0]
+    for one in sums[1:]:
+        largest = one if one > largest else largest
+    return largest
+
+
+def _upper(x: Any) -> float:
+    """Return a float64 that is not below any number in the ball."""
+    m, e = x.upper().man_exp()
+    exactly = Fraction(int(m)) * Fraction(2) ** int(e)
+    nearest = float(exactly)
+    return nearest if Fraction(nearest) >= exactly else math.nextafter(nearest, math.inf)
+
+
+# -- the true error -------------------------------------------------------------------------------
+
+
+def true_error(x: Any, inverse: Any) -> Fraction:
+    """Return the exact column-sum norm of X minus the true inverse."""
+    return column_sum_norm(rationals(x) - inverse)
+
+
+# -- how many digits are enough? ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Guarantee:
+    """A computed inverse whose relative error norm is proved to be at most `bound`."""
+
+    fmt: FloatFormat
+    inverse: FloatArray
+    bound: float
+
+
+def smallest_precision(
+    a: Any,
+    tolerance: float,
+    base: int = 2,
+    rounding: Rounding = Rounding.NEAREST,
+    pivot: bool = True,
+    largest: int | None = None,
+) -> Guarantee:
+    r"""Find the fewest digits in which the computed inverse of a matrix is proved to be within a tolerance.
+
+    In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
+    and :func:`a_posteriori` compares the result X with the matrix as given. The function proves
+    :math:`\|X - A^{-1}\| \le \text{tolerance}\,\|A^{-1}\|`, including the rounding of the entries.
+
+    Parameters
+    ----------
+    a : (n, n), exact: strings, ints, Fractions; a float stands for its exact binary value.
+    tolerance : relative error, above 0.
+    base, rounding : base and rounding of the formats.
+    pivot : whether to use partial pivoting.
+    largest : highest precision to try; by default :func:`gpbnb.arithmetic.search.largest_by_default`, 200 bits or 60
+        decimal digits.
+
+    Returns
+    -------
+    guarantee : the format, the inverse and its bound. The next higher precision meets the tolerance as well, unless it
+        is above `largest`.
+
+    Raises
+    ------
+    ValueError : `tolerance` is not above 0, `a` is not square, or no precision up to `largest` is enough.
+    numpy.linalg.LinAlgError : `a` is singular, so no precision helps.
+    """
+    check_relative(tolerance)
+    if largest is None:
+        largest = search.largest_by_default(base)
+    if largest < 1:
+        raise ValueError(f"largest must be a precision of at least 1; got {largest}")
+    given = exact(a)
+    if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
+        raise ValueError(f"a must be a square matrix (n, n) with n at least 1; got shape {given.shape}")
+    true_inverse(given)
+    tried: dict[FloatFormat, Guarantee] = {}
+    why: dict[int, str] = {}
+
+    def meets(fmt: FloatFormat) -> bool:
+        try:
+            x = linalg.inv(fmt.array(given), pivot)
+            tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
+        except (np.linalg.LinAlgError, ValueError) as error:  # it is singular in so few digits, or no bound was proved
+            why[fmt.precision] = str(error)
+            return False
+        return tried[fmt].bound <= tolerance
+
+    found = search.smallest_precision(meets, base, rounding, largest=largest)
+    if found is not None:
+        return tried[found]
+    best = min((each.bound for each in tried.values()), default=math.inf)
+    reached = f"the best proved bound is {best:.3g}"
+    if best == math.inf:
+        reached = f"no precision gives a bound at all: in {max(why)} digits {why[max(why)]}"
+    raise ValueError(
+        f"got no inverse in at most {largest} base-{base} digits with a proved relative error of at "
+        f"most {float(tolerance):.3g}; {reached}. Increase largest or the tolerance."
+    )
+
+
+def check_relative(tolerance: Any) -> None:
+    """Reject a tolerance that is not a relative error, a finite number above 0.
+
+    Raises
+    ------
+    ValueError : text, a truth value, NaN, infinity, or a number that is not above 0.
+    """
+    number = isinstance(tolerance, Real) and not isinstance(tolerance, bool)
+    if not number or not 0 < tolerance < math.inf:
+        raise ValueError(f"got tolerance {tolerance!r}; needed a relative error above 0, such as 1e-6")
+
+
+def _relative(bound: float, x: FloatArray) -> float:
+    """Turn a bound of ‖X - A⁻¹‖ into a bound relative to ‖A⁻¹‖, which is at least ‖X‖ - bound."""
+    with _working(128):
+        norm = flint.arb(flint.fmpq(*column_sum_norm(rationals(x)).as_integer_ratio())) - flint.arb(bound)
+        if not norm > 0:
+            raise ValueError("the bound exceeds the norm of the inverse: no relative error is proved; use more digits")
+        return _upper(flint.arb(bound) / norm)

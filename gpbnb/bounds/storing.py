@@ -1,0 +1,46 @@
+"""What happens to numbers when a format stores them: by how much they move, and how large they become.
+
+Errors are those of :func:`gpbnb.bounds.envelope.units`, which holds for every rounding, with underflow.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.bounds.envelope import largest_error, units
+
+
+def storing_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest error of storing a number of at most each size in a format; infinite beyond its range."""
+    table = units(fmt)
+    return np.array([largest_error(table, float(size)) for size in np.ravel(sizes)]).reshape(np.shape(sizes))
+
+
+def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the largest size of a number that was within each size before a format stored it.
+
+    Rounding keeps the order of numbers, so it is that of the stored limit, if this is larger; at random, that of the
+    next number of the format. A limit beyond the range stays as it is.
+    """
+    upwards = replace(fmt, rounding=Rounding.UP) if fmt.rounding is Rounding.STOCHASTIC else fmt
+    found = []
+    for size in np.ravel(sizes):
+        largest = float(size)
+        if np.isfinite(size):
+            with contextlib.suppress(OverflowError):
+                largest = max(largest, *(_above(abs(upwards.round(sign * float(size)))) for sign in (1, -1)))
+        found.append(largest)
+    return np.array(found).reshape(np.shape(sizes))
+
+
+def _above(value: Fraction) -> float:
+    """Return the least float64 that is not below a number."""
+    near = float(value)
+    return near if Fraction(near) >= value else float(np.nextafter(near, np.inf))

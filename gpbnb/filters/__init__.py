@@ -1,0 +1,1 @@
+"""Filters as models and as programs of rounded operations, and their runs."""

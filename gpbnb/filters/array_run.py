@@ -1,0 +1,326 @@
+"""A filter run with array operations: every form, known inputs and offsets, with or without its contraction bound.
+
+It supports what the compiled loops of :mod:`gpbnb.filters.run` do not: the forms of
+:class:`~gpbnb.filters.array_forms.ArrayForm`, and models with known inputs. Without inputs, a form that both support
+gives the same digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.exits import stays
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.filters import array_steps
+from gpbnb.filters.array_forms import AnyForm, ArrayForm
+from gpbnb.filters.bounded_steps import advance_bound
+from gpbnb.filters.contraction import Contraction, contraction_start
+from gpbnb.filters.factors import combined_gain, covariance_of_factors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.opening import opening
+from gpbnb.filters.run import Checkpoints, Run
+
+_HUNG = (Form.HUNG, Form.HUNG_SECOND_GAIN)
+_ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
+_FACTORED = (Form.UD, *_ROOTS)
+
+
+class ArrayRun:
+    """A run in array operations; its attributes are those of :class:`~gpbnb.filters.run.Run`.
+
+    Parameters
+    ----------
+    model, fmt, checkpoint_steps : as for :class:`~gpbnb.filters.run.Run`.
+    form : any form; Hung's forms only without known inputs, which the report does not have.
+    bounded : whether to compute the contraction bound of the estimate, too.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops; Hung's forms with known inputs; covariances that lose their
+        definiteness when their factors are computed in this format.
+    """
+
+    @stays
+    def __init__(
+        self,
+        model: LinearModel,
+        fmt: FloatFormat,
+        form: AnyForm,
+        checkpoint_steps: Sequence[int],
+        bounded: bool = False,
+    ) -> None:
+        if model.has_inputs and form in _HUNG:
+            raise ValueError(
+                f"got known inputs in the {form} form, which is not defined with them; needed another "
+                'form, such as "innovation"'
+            )
+        fmt.check_compiled()
+        self.model, self.fmt, self.form = model, fmt, form
+        self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
+        self.steps, self.reason = 0, ""
+        self.indefinite: int | None = None
+        self.stopped: int | None = None
+        sound = model.definite_in(fmt)
+        #: Changes of the covariances, including those of the model.
+        self.repairs = list(sound.repairs)
+        stored = sound.arrays(fmt)
+        self.x, self.P = stored.pop("x0"), stored.pop("P0")
+        self._given: dict[str, list[FloatArray]] = {letter: [] for letter in ("B", "u", "b", "d")}
+        for letter, each in stored.items():
+            self._given[letter] = list(each[np.newaxis] if each.ndim == 1 else each)
+        self._identity = fmt.array(np.eye(model.n, dtype=int))
+        if form is ArrayForm.COMPENSATED:
+            self._given["increment"] = [fmt.array(each - np.eye(model.n, dtype=int)) for each in model.Phi]
+            self._carried = self.x * 0
+        if form in _FACTORED:
+            self._factor()
+        self._saved: list[tuple[int, Any, Any, Any]] = []
+        self._bound = _StateBound(self) if bounded else None
+
+    @property
+    def bounds(self) -> tuple[NDArray[np.float64]]:
+        """Bounds of the errors of the state at the checkpoint steps, (c, n); infinite if there is none."""
+        if self._bound is None:
+            raise ValueError("got a run without its bound; needed bounded=True")
+        return (self._bound.state,)
+
+    def take(self, z: Any) -> None:
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
+        for _ in self._steps_taken(z):
+            pass
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
+        found = [_double_doubles(x) for x in self._steps_taken(z)]
+        return np.array(found, dtype=np.float64).reshape(-1, self.model.n, 2)
+
+    def _steps_taken(self, z: Any) -> Iterator[FloatArray]:
+        """Take one step after the other, and give the estimate after each."""
+        self.model.check_measurements(z, self.steps)
+        for measured in self.fmt.array(z):
+            if self.stopped is not None:
+                return
+            try:
+                K, definite = self._step(self.steps, measured)
+            except (ZeroDivisionError, OverflowError) as error:
+                self.stopped = self.steps + 1
+                kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
+                self.reason = f"{kind} at step {self.stopped}"
+                return
+            self.steps += 1
+            if not definite and self.indefinite is None:
+                self.indefinite = self.steps
+            at = len(self._saved)
+            saved = at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == self.steps
+            if saved:
+                self._saved.append((self.steps, self.x, K, self.P))
+            if self._bound is not None:
+                self._bound.take(measured)
+            yield self.x
+
+    def checkpoints(self) -> Checkpoints:
+        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
+        n, m = self.model.n, self.model.m
+        x, K, P = np.empty((len(self._saved), n), object), np.empty((len(self._saved), n, m), object), []
+        for at, (step, state, gain, covariance) in enumerate(self._saved):
+            x[at], K[at] = state.to_fractions(), self._whole_gain(step - 1, gain)
+            P.append(self.covariance(covariance))
+        steps = tuple(step for step, *_ in self._saved)
+        return Checkpoints(steps, x, K, np.array(P, dtype=object).reshape(-1, n, n))
+
+    def covariance(self, P: FloatArray) -> NDArray[Any]:
+        """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
+        given: NDArray[Any] = P.to_fractions()
+        if self.form in _ROOTS:
+            return np.asarray(given @ given.T)
+        if self.form is Form.UD:
+            return covariance_of_factors(given)
+        return given
+
+    def known_state(self, k: int) -> NDArray[Any] | None:
+        """Return the exact input to the states in step k + 1, as the format stores it; None without inputs."""
+        known = [self._at("B", k).to_fractions() @ self._at("u", k).to_fractions()] if self._given["B"] else []
+        if self._given["b"]:
+            known.append(self._at("b", k).to_fractions())
+        return sum(known[1:], known[0]) if known else None
+
+    # -- one step ---------------------------------------------------------------------------------------
+
+    def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
+        """Take step k + 1; return the gain, or columns for decorrelated measurements, and whether all is definite."""
+        if self._given["d"]:
+            z = z - self._at("d", k)
+        return self._factored_step(k, z) if self.form in _FACTORED else self._covariance_step(k, z)
+
+    def _covariance_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
+        Phi, H, Q, R = (self._at(letter, k) for letter in ("Phi", "H", "Q", "R"))
+        predicted = (Phi @ (Phi @ self.P).T + Q.T).T
+        HP = H @ predicted.T
+        SI, definite = array_steps.inverse(H @ HP.T + R)
+        K = (SI.T @ HP).T
+        W = self._identity - K @ H
+        P = W @ predicted
+        if self.form is Form.JOSEPH:
+            P = P @ W.T + K @ R @ K.T
+        if self.form is ArrayForm.SYMMETRIZED:
+            P = (P + P.T) / 2
+        if self.form is Form.HUNG_SECOND_GAIN:
+            RI, _ = array_steps.inverse(R)
+            K = P @ H.T @ RI
+            W = self._identity - K @ H
+        if self.form in _HUNG:
+            x = W @ Phi @ self.x + K @ z
+        elif self.form is ArrayForm.COMPENSATED:
+            x = self._compensated(k, H, K, z)
+        else:
+            ahead = self._predicted_state(k, Phi)
+            x = ahead + K @ (z - H @ ahead)
+        self.x, self.P = x, P
+        return K, definite and bool(np.all(np.diagonal(P) > 0))
+
+    def _predicted_state(self, k: int, Phi: FloatArray) -> FloatArray:
+        return self._with_inputs(k, Phi @ self.x)
+
+    def _with_inputs(self, k: int, x: FloatArray) -> FloatArray:
+        if self._given["B"]:
+            x = x + self._at("B", k) @ self._at("u", k)
+        return x + self._at("b", k) if self._given["b"] else x
+
+    def _compensated(self, k: int, H: FloatArray, K: FloatArray, z: FloatArray) -> FloatArray:
+        change = self._with_inputs(k, self._at("increment", k) @ self.x)
+        change = change + K @ (z - H @ (self.x + change))
+        change = change - self._carried
+        x = self.x + change
+        self._carried = (x - self.x) - change
+        return x
+
+    def _factored_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
+        Phi, H, UR = self._at("Phi", k), self._at("H", k), self._at("UR", k)
+        predict = array_steps.predict_ud if self.form is Form.UD else array_steps.predict_root
+        observe = {
+            Form.UD: array_steps.observe_ud,
+            ArrayForm.POTTER: array_steps.observe_potter,
+            ArrayForm.CARLSON: array_steps.observe_carlson,
+        }[self.form]
+        P, definite = predict(Phi, self.P, self._at("UQ", k))
+        x = self._predicted_state(k, Phi)
+        rows, values, gains = array_steps.decorrelated(UR, H), array_steps.decorrelated(UR, z), []
+        for i in range(self.model.m):
+            x, P, K, positive = observe(rows[i], values[i], UR[i, i], x, P)
+            gains.append(K)
+            definite = definite and positive
+        self.x, self.P = x, P
+        return gains, definite
+
+    # -- what it needs ----------------------------------------------------------------------------------
+
+    def _at(self, letter: str, k: int) -> FloatArray:
+        members = self._given[letter]
+        return members[k % len(members)]
+
+    def _factor(self) -> None:
+        """Compute factors of P0, Q and R as the compiled UD form does."""
+        start = opening(self.model.without_inputs(), self.fmt, Form.UD, self.fmt.run_tag())
+        self.repairs += start.raised
+        first, Q, R = (self._unpacked(each) for each in (start.U0, start.UQ, start.UR))
+        self._given["UR"] = list(R)
+        if self.form in _ROOTS:
+            self.P = array_steps.root_of_factors(first)
+            self._given["UQ"] = [array_steps.root_of_factors(each) for each in Q]
+        else:
+            self.P, self._given["UQ"] = first, list(Q)
+
+    def _unpacked(self, packed: NDArray[Any]) -> FloatArray:
+        backend = cast(Compiled, self.fmt.backend)
+        return FloatArray.from_components(backend, backend.unpack(packed), self.fmt)
+
+    def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
+        """Return the gain for all measurements together, from those of the decorrelated measurements one by one."""
+        if not isinstance(gain, list):
+            return np.asarray(gain.to_fractions(), dtype=object)
+        UR, H = (self._at(letter, k).to_fractions() for letter in ("UR", "H"))
+        return combined_gain([each.to_fractions() for each in gain], UR, H)
+
+
+class _StateBound:
+    """The contraction bound of an array run, step by step; see :mod:`gpbnb.filters.contraction`.
+
+    A known input c can be moved out of a step: the exact filter goes from x to :math:`E(x, z - Hc) + c`,
+    with the step E of the filter without inputs. So the residual of a step is that of a filter without inputs, whose
+    estimate is less by c and which measures z - d - Hc. Both differences are exact, then rounded to double-double,
+    2**-106 of them: less than the errors of the evaluation that the bound includes.
+    """
+
+    def __init__(self, run: ArrayRun) -> None:
+        self.run = run
+        self.stored = run.model.rounded(run.fmt).without_inputs()
+        self.offset = [each.to_fractions() for each in run._given["d"]]
+        given = self.stored.to_float()
+        self.plain = given["Phi"], given["H"], given["Q"], given["R"]
+        self.exact = Run(self.stored, None, Form.INNOVATION, ()).matrices
+        n, m, count = run.model.n, run.model.m, len(run.checkpoint_steps)
+        self.state = np.full((count, n), np.inf)
+        self._rest = np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
+        self._UR = np.zeros((1, m, m, 2))
+        self._gain = np.zeros((1, n, m, 2))
+        self.steps = np.array(run.checkpoint_steps, dtype=np.int64)
+        off = np.zeros((n, n))
+        if run.form in _FACTORED:
+            off = np.abs((run.covariance(run.P) - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
+        self.bound: Contraction = contraction_start(given["P0"], np.zeros(n), off)
+        self.x, self.P = self._wide_state(None), self._wide_covariance()
+
+    def take(self, measured: FloatArray) -> None:
+        """Take the bound over the step that the run has just done."""
+        k, run = self.run.steps - 1, self.run
+        known = run.known_state(k)
+        z = measured.to_fractions()
+        if self.offset:
+            z = z - self.offset[k % len(self.offset)]
+        if known is not None:
+            z = z - self.stored.H[k % len(self.stored.H)] @ known
+        try:
+            x, P = self._wide_state(known), self._wide_covariance()
+            self.bound = advance_bound(
+                Form.INNOVATION,
+                self.exact,
+                self.plain,
+                double_doubles(z.reshape(1, -1, 1)),
+                k,
+                np.stack([self.x, x]),
+                np.stack([self.P, P]),
+                self._gain,
+                self._UR,
+                self.bound,
+                self.steps,
+                int(np.searchsorted(self.steps, k, side="right")),
+                (self.state, *self._rest),
+            )
+            self.x, self.P = x if known is None else self._wide_state(None), P
+        except (OverflowError, ZeroDivisionError):  # beyond double-double, so there is no bound from here on
+            self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
+
+    def _wide_state(self, known: NDArray[Any] | None) -> NDArray[np.float64]:
+        """Return the estimate minus a known input as double-double, (n, 1, 2)."""
+        if known is None:
+            return _double_doubles(self.run.x.reshape(-1, 1))
+        return double_doubles((self.run.x.to_fractions() - known).reshape(-1, 1))
+
+    def _wide_covariance(self) -> NDArray[np.float64]:
+        if self.run.form in _FACTORED:
+            return double_doubles(self.run.covariance(self.run.P))
+        return _double_doubles(self.run.P)
+
+
+def _double_doubles(a: FloatArray) -> NDArray[np.float64]:
+    if a.format.base == 2 and isinstance(a.backend, Compiled):
+        high = np.asarray(a.to_float(), dtype=np.float64)  # exact: at most 53 bits
+        return np.stack([high, np.zeros_like(high)], axis=-1)
+    return double_doubles(a.to_fractions())

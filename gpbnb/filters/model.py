@@ -1,0 +1,421 @@
+"""The linear model of a Kalman filter, checked once."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.covariance import (
+    REPAIR_TOLERANCE,
+    Repair,
+    check_covariance,
+    in_floats,
+    repair_tolerance,
+    repaired,
+    stored_in,
+)
+from gpbnb.filters.named import checked_name
+
+LARGEST_EXPONENT = 450
+"""Largest size of an exponent of two in a model for compiled loops of a format with any exponent."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    r"""A linear process and its measurements; hung1984, ch. II, before (98).
+
+    .. math:: x_k = \Phi_{k-1} x_{k-1} + B_{k-1} u_{k-1} + b_{k-1} + w_{k-1}, \qquad z_k = H_k x_k + d_k + v_k, \qquad
+        w_k \sim N(0, Q_k),\ v_k \sim N(0, R_k)
+
+    Each matrix and offset may be the same for all steps, or a cycle with a leading axis. Step k = 1, 2, … then uses
+    member (k - 1) mod p; each cycle has its own p. It may also be a function of k, which is called for
+    k = 1 … `steps`. Entries are stored exactly, as Fractions; numbers, strings and Decimals are read exactly.
+
+    Without u, b and d this is the model of the report. With them, a filter predicts
+    :math:`((\Phi\hat x) + (Bu)) + b` and takes the innovation :math:`(z - d) - H\hat x`, in this order.
+
+    Parameters
+    ----------
+    Phi : (n, n) or (p, n, n), transition.
+    H : (m, n) or (p, m, n), measurement.
+    Q : (n, n) or (p, n, n), covariance of the process noise, positive semidefinite.
+    R : (m, m) or (p, m, m), covariance of the measurement noise, positive definite.
+    x0 : (n,), the first estimate.
+    P0 : (n, n), its covariance, positive semidefinite.
+    name : name in tables and figures.
+    repair : whether to repair rounding errors in Q, R and P0, as described in :mod:`gpbnb.filters.covariance`. By
+        default, only covariances given in floats are repaired, not those of strings, whole numbers or Fractions; but
+        one that becomes indefinite when a format stores it is repaired unless `repair` is False.
+    B : (n, p) or (c, n, p), input matrix.
+    u : (steps, p), known inputs, row k - 1 for step k; or (p,), the same in every step.
+    b : (n,) or (c, n), known offset of the states.
+    d : (m,) or (c, m), known offset of the measurements.
+    steps : number of steps that the model describes; required if an argument is a function. By default the number of
+        rows of `u`, or any number. A longer run is rejected.
+
+    Attributes
+    ----------
+    repairs : the changes made; empty if there are none.
+
+    Raises
+    ------
+    ValueError : shapes that do not fit; NaN or infinity; a covariance that is not symmetric or not definite; a function
+        without `steps`, or inputs for fewer steps.
+
+    Examples
+    --------
+    A cart whose acceleration is known, and whose sensor reads 0.5 m too much:
+
+    >>> cart = LinearModel(
+    ...     Phi=[[1, "0.1"], [0, 1]], H=[[1, 0]], Q=[["1e-6", 0], [0, "1e-4"]], R=[["0.04"]], x0=[0, 0],
+    ...     P0=[[1, 0], [0, 1]], B=[["0.005"], ["0.1"]], u=[[1], [1], [0]], d=["0.5"],
+    ... )
+    >>> cart.n, cart.m, cart.steps
+    (2, 1, 3)
+    """
+
+    Phi: NDArray[Any]
+    H: NDArray[Any]
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    x0: NDArray[Any]
+    P0: NDArray[Any]
+    name: str = "a linear model"
+    repair: bool | None = None
+    B: Any = None
+    u: Any = None
+    b: Any = None
+    d: Any = None
+    steps: int | None = None
+    repairs: tuple[Repair, ...] = field(default=(), init=False)
+
+    def __post_init__(self) -> None:
+        if self.repair is not None and not isinstance(self.repair, bool):
+            raise ValueError(f"got repair {self.repair!r}; needed True, False or None")
+        checked_name(self.name)
+        self._evaluate_functions()
+        tolerances: dict[str, float | None] = dict.fromkeys(_COVARIANCES)
+        if self.repair is not False:
+            tolerances = {letter: repair_tolerance(getattr(self, letter)) for letter in _COVARIANCES}
+        for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
+            try:
+                entries = exact(getattr(self, letter))
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{letter}: {error}") from None
+            if letter in ("Phi", "H", "Q", "R") and entries.ndim == 2:
+                entries = entries[np.newaxis]
+            entries.flags.writeable = False
+            object.__setattr__(self, letter, entries)
+        if self.x0.ndim != 1 or not self.x0.size:
+            raise ValueError(f"got x0 of shape {self.x0.shape}; needed (n,) with n >= 1, one number per state")
+        n = self.x0.size
+        if self.H.ndim != 3 or 0 in self.H.shape or self.H.shape[2] != n:
+            raise ValueError(
+                f"got H of shape {_of_one(self.H)}; needed (m, {n}), one row per measurement and "
+                "one column per state of x0"
+            )
+        m = self.H.shape[1]
+        for letter, size in (("Phi", n), ("Q", n), ("R", m)):
+            given = getattr(self, letter)
+            shape = given.shape
+            if len(shape) != 3 or shape[1:] != (size, size) or not shape[0]:
+                raise ValueError(
+                    f"got {letter} of shape {_of_one(given)}; needed ({size}, {size}), or a cycle (p, {size}, {size}): "
+                    f"x0 has {n} states and H {m} measurements"
+                )
+        if self.P0.shape != (n, n):
+            raise ValueError(f"got P0 of shape {self.P0.shape}; needed ({n}, {n}), as x0 has {n} states")
+        self._read_inputs()
+        repairs: list[Repair] = []
+        for letter, strictly in _COVARIANCES.items():
+            matrices, tolerance = getattr(self, letter), tolerances[letter]
+            if tolerance is not None or self.repair:
+                least = REPAIR_TOLERANCE if tolerance is None else tolerance
+                object.__setattr__(self, letter, _repaired_cycle(letter, matrices, strictly, least, repairs))
+                continue
+            different = {tuple(matrix.flat): matrix for matrix in matrices.reshape(-1, *matrices.shape[-2:])}
+            for matrix in different.values():
+                check_covariance(letter, matrix, strictly)
+        object.__setattr__(self, "repairs", tuple(repairs))
+
+    def _evaluate_functions(self) -> None:
+        """Replace functions of the step by their values for each step."""
+        if self.steps is not None and (
+            isinstance(self.steps, bool) or not isinstance(self.steps, (int, np.integer)) or self.steps < 1
+        ):
+            raise ValueError(f"got steps {self.steps!r}; needed a whole number, at least 1")
+        for letter in ("Phi", "H", "Q", "R", *_INPUTS):
+            given = getattr(self, letter)
+            if callable(given):
+                if self.steps is None:
+                    raise ValueError(f"got a function for {letter} without steps; needed steps=, how often to call it")
+                members = [given(k) for k in range(1, int(self.steps) + 1)]
+                shapes = {np.shape(each) for each in members}
+                if len(shapes) != 1:
+                    raise ValueError(f"{letter}: the function gave shapes {sorted(shapes)}; needed one shape")
+                try:
+                    values = np.array(members) if in_floats(members) else exact(members)
+                except (TypeError, ValueError) as error:
+                    raise type(error)(f"{letter}: {error}") from None
+                object.__setattr__(self, letter, values)
+
+    def _read_inputs(self) -> None:
+        """Read known inputs and offsets as exact cycles."""
+        n, m = self.n, self.m
+        if (self.B is None) != (self.u is None):
+            raise ValueError(
+                f"got {'u without B' if self.B is None else 'B without u'}; needed both: B of shape ({n}, p) and u of "
+                "shape (steps, p)"
+            )
+        for letter in _INPUTS:
+            given = getattr(self, letter)
+            if given is None:
+                continue
+            try:
+                entries = exact(given)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{letter}: {error}") from None
+            single = 2 if letter == "B" else 1
+            if letter == "u" and entries.ndim == 2 and (self.steps is None or self.steps > len(entries)):
+                if self.steps is not None:
+                    raise ValueError(f"got u for {len(entries)} steps; needed one row for each of the {self.steps}")
+                object.__setattr__(self, "steps", len(entries))
+            if letter != "u" and entries.ndim == single:
+                entries = entries[np.newaxis]
+            width = entries.shape[-1] if entries.ndim else 0
+            needed = {"B": (n, width), "u": (width,), "b": (n,), "d": (m,)}[letter]
+            axes = (1, 2) if letter == "u" else (single + 1,)
+            if entries.ndim not in axes or entries.shape[-single:] != needed or not entries.size:
+                texts = {"B": f"({n}, p)", "u": "(p,) or (steps, p)", "b": f"({n},)", "d": f"({m},)"}
+                raise ValueError(f"got {letter} of shape {np.shape(given)}; needed {texts[letter]}")
+            entries.flags.writeable = False
+            object.__setattr__(self, letter, entries)
+        if self.B is not None and self.B.shape[2] != self.u.shape[-1]:
+            raise ValueError(
+                f"got B with {self.B.shape[2]} columns and u with {self.u.shape[-1]} numbers per "
+                "step; needed equal numbers"
+            )
+
+    @property
+    def has_inputs(self) -> bool:
+        """Whether there are known inputs or offsets."""
+        return any(getattr(self, letter) is not None for letter in _INPUTS)
+
+    def without_inputs(self) -> LinearModel:
+        """Return the same model without known inputs and offsets."""
+        return replace(self, B=None, u=None, b=None, d=None) if self.has_inputs else self
+
+    def known(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the exact input of step k + 1, :math:`Bu + b`, (n,), and the measurement offset d, (m,)."""
+        state, measurement = (np.array([Fraction(0)] * size, dtype=object) for size in (self.n, self.m))
+        if self.B is not None:
+            state = state + self.B[k % len(self.B)] @ (self.u if self.u.ndim == 1 else self.u[k])
+        if self.b is not None:
+            state = state + self.b[k % len(self.b)]
+        return state, measurement if self.d is None else self.d[k % len(self.d)]
+
+    def refuse_inputs(self, what: str) -> None:
+        """Reject a model with known inputs or offsets where they would be ignored.
+
+        Raises
+        ------
+        ValueError : the model has inputs or offsets.
+        """
+        if self.has_inputs:
+            raise ValueError(
+                f"got {self.name} with known inputs or offsets; needed none for {what}, which does not cover them; use "
+                'required_precision with basis "emulation" or "bound"'
+            )
+
+    def check_measurements(self, z: Any, first: int) -> None:
+        """Reject measurements of another shape than (steps, m), or of more steps than the model describes.
+
+        Parameters
+        ----------
+        first : how many steps come before them.
+
+        Raises
+        ------
+        ValueError : another shape; more than `steps` steps altogether.
+        """
+        if np.ndim(z) != 2 or np.shape(z)[1] != self.m:
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.m})")
+        self.check_steps(first + len(z))
+
+    def check_steps(self, count: int) -> None:
+        """Reject a run that is longer than the model describes.
+
+        Raises
+        ------
+        ValueError : more than `steps` steps.
+        """
+        if self.steps is not None and count > self.steps:
+            raise ValueError(f"got {count} steps; needed at most {self.steps}: {self.name} describes no more")
+
+    def check_sizes(self) -> None:
+        """Reject entries whose products leave the exponents of float64, which compiled loops compute with.
+
+        Raises
+        ------
+        OverflowError : an entry is not between 2**-:data:`LARGEST_EXPONENT` and 2**:data:`LARGEST_EXPONENT` in size.
+        """
+        for letter in (*_LETTERS, *_INPUTS):
+            given = getattr(self, letter)
+            for entry in () if given is None else {abs(each) for each in given.flat if each}:
+                exponent = entry.numerator.bit_length() - entry.denominator.bit_length()
+                if abs(exponent) > LARGEST_EXPONENT:
+                    raise OverflowError(
+                        f"got {letter} with an entry near 2**{exponent}; needed 2**-{LARGEST_EXPONENT} to "
+                        f"2**{LARGEST_EXPONENT}, or products leave the exponents of float64; scale the model by powers "
+                        "of two"
+                    )
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return int(self.x0.size)
+
+    @property
+    def m(self) -> int:
+        """Number of measurements in each step."""
+        return int(self.H.shape[1])
+
+    @property
+    def cycle(self) -> int:
+        """Number of steps after which all four matrices repeat."""
+        return math.lcm(*(len(each) for each in (self.Phi, self.H, self.Q, self.R)))
+
+    def definite_in(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
+        """Return this model, or a copy with other covariances where those stored in a format would be indefinite.
+
+        The variances of such a covariance are raised as described in :mod:`gpbnb.filters.covariance`; `repairs` lists
+        the changes. Nothing is changed where that does not help, if `repair` is False, or for stochastic rounding.
+        """
+        if self.repair is False or fmt.rounding is Rounding.STOCHASTIC:
+            return self
+        return _definite_in(self, fmt)
+
+    def rounded(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
+        """Return the model as a computer with this format stores it, with each entry rounded.
+
+        It is the model of the exact filter with which runs in this format are compared. A run itself opens with the
+        model as given, see :mod:`gpbnb.filters.opening`.
+
+        Raises
+        ------
+        ValueError : a stored covariance is indefinite in spite of :meth:`definite_in`.
+        """
+        sound = self.definite_in(fmt)
+        stored = {letter: array.to_fractions() for letter, array in sound.arrays(fmt).items()}
+        made = LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
+        object.__setattr__(made, "repairs", sound.repairs)
+        return made
+
+    def arrays(self, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
+        """Return Phi, H, Q, R, x0, P0 and the inputs there are, with each entry rounded into the format, by letter.
+
+        Stochastic rounding starts with its first random number; entries of a covariance below the diagonal are those
+        above it, so that it stays symmetric.
+
+        Raises
+        ------
+        OverflowError : an entry is beyond the range of the format.
+        """
+        fmt.restart()
+        made: dict[str, FloatArray] = {}
+        for letter in (*_LETTERS, *_INPUTS):
+            if (given := getattr(self, letter)) is None:
+                continue
+            try:
+                made[letter] = fmt.array(given)
+            except OverflowError as error:
+                raise OverflowError(f"{letter}: {error}") from None
+            if letter in _COVARIANCES and fmt.rounding is Rounding.STOCHASTIC:
+                made[letter] = made[letter].moved(_mirrored)
+        return made
+
+    def to_float(self) -> dict[str, NDArray[np.float64]]:
+        """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter.
+
+        Raises
+        ------
+        OverflowError : an entry is beyond the range of float64.
+        """
+        return {letter: entries.copy() for letter, entries in _floats(self).items()}
+
+
+_LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
+_INPUTS = ("B", "u", "b", "d")
+_COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
+
+
+def _of_one(matrices: NDArray[Any]) -> tuple[int, ...]:
+    """Return the shape of each matrix of a cycle, or of an array that is no cycle."""
+    return matrices.shape[1:] if matrices.ndim == 3 else matrices.shape
+
+
+def _mirrored(matrices: NDArray[Any]) -> NDArray[Any]:
+    """Copy the entries above the diagonals of (..., n, n) below them."""
+    above = np.triu(np.ones(matrices.shape[-2:], dtype=bool))
+    return np.where(above, matrices, np.swapaxes(matrices, -1, -2))
+
+
+@lru_cache(maxsize=16)
+def _floats(model: LinearModel) -> dict[str, NDArray[np.float64]]:
+    found = {}
+    for letter in _LETTERS:
+        try:
+            found[letter] = getattr(model, letter).astype(np.float64)
+        except OverflowError:
+            raise OverflowError(
+                f"got {letter} with an entry beyond the range of float64; needed entries below 1.8e308; scale the model"
+            ) from None
+    return found
+
+
+@lru_cache(maxsize=16)
+def _definite_in(model: LinearModel, fmt: FloatFormat | FixedFormat) -> LinearModel:
+    changed: dict[str, NDArray[Any]] = {}
+    repairs: list[Repair] = []
+    for letter, strictly in _COVARIANCES.items():
+        matrices = getattr(model, letter)
+        stored = matrices.reshape(-1, *matrices.shape[-2:]).copy()
+        found: dict[tuple[Fraction, ...], tuple[NDArray[Any], Repair] | None] = {}
+        for member, matrix in enumerate(stored):
+            key = tuple(matrix.flat)
+            if key not in found:
+                found[key] = stored_in(fmt, letter, member, matrix, strictly)
+            if (better := found[key]) is not None:
+                stored[member], repair = better
+                repairs.append(repair._replace(member=member))
+                changed[letter] = stored.reshape(matrices.shape)
+    if not changed:
+        return model
+    made = replace(model, **changed)  # type: ignore[arg-type]
+    object.__setattr__(made, "repairs", (*model.repairs, *repairs))
+    return made
+
+
+def _repaired_cycle(
+    letter: str, matrices: NDArray[Any], strictly: bool, tolerance: float, repairs: list[Repair]
+) -> NDArray[Any]:
+    """Repair the covariances of a cycle, or the only one, where necessary; append the changes to `repairs`."""
+    result = []
+    for member, matrix in enumerate(matrices.reshape(-1, *matrices.shape[-2:])):
+        sound, changed = repaired(letter, member, matrix, strictly, tolerance)
+        result.append(sound)
+        if changed is not None:
+            repairs.append(changed)
+    whole = np.array(result, dtype=object).reshape(matrices.shape)
+    whole.flags.writeable = False
+    return whole

@@ -1,0 +1,168 @@
+r"""What a filter starts with in a format: its model as stored and, for the UD form, factors of the covariances.
+
+Every run, bound and guarantee opens a filter here, from the model as given. In t digits, factoring a covariance that is
+close to singular can give a negative pivot although the stored covariance is definite. Its variances *as given* are
+then raised by a share δ of themselves, doubled until the factors are definite, and stored and factored again. So
+factors have an error of their own,
+
+.. math:: \hat U\hat D\hat U^T = M + \delta M ,
+
+which holds the roundings of the factoring and what the raised variances add. The exact filter with which a run is
+compared, or for which a bound holds, has the stored M without δM, in every form: it is given by the model, the format
+and the measurements, and the error of a UD form includes that of its factors. Where a covariance is already indefinite
+as stored, no exact filter exists; there, the raised covariance *is* the stored one, for the exact filter as for all
+forms, see :mod:`gpbnb.filters.covariance`.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.tags import Tag
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.step import factor_each, invert_each
+from gpbnb.filters.model import LinearModel
+
+
+class Opening(NamedTuple):
+    """What a run starts with, as the compiled loops expect it.
+
+    Parameters
+    ----------
+    Phi, H, Q, R : (p, n, n), (p, m, n), (p, n, n) and (p, m, m), each with its own cycle of p members.
+    x0, P0 : (n,) and (n, n).
+    UQ, UR, U0 : factors of Q, R and P0 in the UD form, with D on the diagonal; otherwise zeros.
+    RI : inverses of R in Hung's form with the second gain; otherwise zeros.
+    raised : covariances whose variances were raised until their factors were definite.
+    repairs : all changes of covariances, including those of the model.
+    """
+
+    Phi: NDArray[Any]
+    H: NDArray[Any]
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    x0: NDArray[Any]
+    P0: NDArray[Any]
+    UQ: NDArray[Any]
+    UR: NDArray[Any]
+    U0: NDArray[Any]
+    RI: NDArray[Any]
+    raised: tuple[Repair, ...]
+    repairs: tuple[Repair, ...]
+
+
+def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -> Opening:
+    """Return what a filter starts with; its arrays are new.
+
+    Parameters
+    ----------
+    model : the model as given, not as stored: factors are those of variances as given.
+    fmt : None for double-double.
+    tag : arithmetic of the compiled loops, which computes factors and inverses.
+
+    Raises
+    ------
+    ValueError : the form needs factors or inverses of covariances, which are not definite in this arithmetic.
+    OverflowError : the model has entries beyond the range of the format's backend.
+    """
+    stored = model if fmt is None else model.definite_in(fmt)
+    # A result that was stored would draw no random numbers, and the measurements would be rounded with others.
+    random = fmt is not None and fmt.rounding is Rounding.STOCHASTIC
+    Phi, H, Q, R, x0, P0 = (each.copy() for each in (_packed if random else _packed_once)(stored, fmt))
+    UQ, UR, U0, RI = (np.zeros_like(each) for each in (Q, R, P0, R))
+    raised: list[Repair] = []
+
+    def factored(letter: str, packed: NDArray[Any], factors: NDArray[Any]) -> bool:
+        """Compute factors, of raised variances if those stored are indefinite; whether any are definite."""
+        if factor_each(tag, packed, factors):
+            return True
+        if model.repair is False:
+            return False
+        matrices = getattr(stored, letter)
+        found = raised_until(
+            matrices.reshape(-1, *matrices.shape[-2:]),
+            lambda higher: bool(factor_each(tag, as_packed(fmt, higher), factors)),
+            least_shift(fmt),
+            LARGEST_STORED_SHIFT,
+        )
+        if found is not None:
+            raised.append(Repair(letter, 0, 0.0, found[1], fmt))
+        return found is not None
+
+    try:
+        definite = True
+        if form is Form.HUNG_SECOND_GAIN:
+            definite = bool(invert_each(tag, R, RI))
+        elif form is Form.UD:
+            given = ("Q", Q, UQ), ("R", R, UR), ("P0", P0[np.newaxis], U0[np.newaxis])
+            definite = all(factored(*each) for each in given)
+    except ZeroDivisionError:
+        definite = False
+    if not definite:
+        raise ValueError(
+            f"got {model.name} in {fmt}; needed covariances that stay definite when their factors are computed in "
+            "this format; use more digits, or add a little to the diagonals of Q and P0"
+        )
+    return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, tuple(raised), (*stored.repairs, *raised))
+
+
+def as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
+    """Round numbers into a format, None for double-double, and return them as the compiled loops expect them.
+
+    Raises
+    ------
+    ValueError : NaN or infinity.
+    OverflowError : numbers beyond the range of the format or its compiled loops.
+    """
+    if fmt is None:
+        entries = np.asarray(values)
+        if entries.dtype == np.float64:
+            if not np.isfinite(entries).all():
+                raise ValueError("got measurements with NaN or infinity; needed finite numbers")
+            return np.stack([entries, np.zeros_like(entries)], axis=-1)
+        return double_doubles(exact(entries))
+    return packed_array(fmt.array(values))
+
+
+def packed_array(array: FloatArray) -> NDArray[Any]:
+    """Convert an array to the form that the compiled loops of its format expect.
+
+    Raises
+    ------
+    ValueError : the format has no compiled loops.
+    OverflowError : an entry is beyond their range.
+    """
+    if not isinstance(array.backend, Compiled):
+        array.format.check_compiled()
+        cure = "" if array.format.base == 10 else ", or use base 10"
+        raise OverflowError(
+            f"got numbers beyond the range of the compiled loops of {array.format}; scale the states{cure}"
+        )
+    return array.backend.pack(array.components)
+
+
+def _packed(model: LinearModel, fmt: FloatFormat | None) -> list[NDArray[Any]]:
+    """Phi, H, Q, R, x0 and P0 as the compiled loops expect them."""
+    letters = "Phi", "H", "Q", "R", "x0", "P0"
+    if fmt is None:
+        return [double_doubles(getattr(model, letter)) for letter in letters]
+    arrays, packed = model.arrays(fmt), []
+    for letter in letters:
+        try:
+            packed.append(packed_array(arrays[letter]))
+        except OverflowError as error:
+            raise OverflowError(f"{letter}: {error}") from None
+    return packed
+
+
+_packed_once = lru_cache(maxsize=8)(_packed)

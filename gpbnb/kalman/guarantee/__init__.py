@@ -1,1 +1,0 @@
-"""Bound the effect of rounding on an estimate, for every admissible measurement sequence and for all time."""

@@ -1,0 +1,264 @@
+"""Simulate the readings of telescope and gyro over a year, with exact rotations, and derive the drift from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.report.geometry.theory import Case, Effect
+from gpbnb.report.measurement import YEAR, apply, deroll, into_spacecraft, rotation
+
+Floats = NDArray[np.float64]
+CHUNK = 2**16
+
+
+@dataclass(frozen=True)
+class Year:
+    """A simulated year of one case.
+
+    Parameters
+    ----------
+    case : its angles; radians.
+    roll_period : seconds; None if the spacecraft does not roll.
+    step : seconds between samples.
+    block : number of samples in one mean, the smallest number that fills whole rolls.
+    time : (k,), time of the middle of each mean; years.
+    phi : (k, 2), means of the derolled difference, as φ2 and φ3; radians.
+    first : (j, 2), derolled samples of the first rolls before averaging.
+    offset, drift : (2,), of the straight line fitted to the means; radians, and radians per year.
+    sample_drift : (2,), of the straight line fitted to all samples.
+    line : amplitude at the roll frequency, averaged over the year; radians.
+    """
+
+    case: Case
+    roll_period: float | None
+    step: float
+    block: int
+    time: Floats
+    phi: Floats
+    first: Floats
+    offset: Floats
+    drift: Floats
+    sample_drift: Floats
+    line: float
+
+    @property
+    def error(self) -> Effect:
+        """Errors of angle and drift in the fitted line, as in :func:`gpbnb.report.geometry.theory.effect`."""
+        angle, drift = self.offset, self.drift - np.asarray(self.case.drift)
+        return Effect((float(angle[0]), float(angle[1])), (float(drift[0]), float(drift[1])), self.line)
+
+
+def difference(case: Case, years: ArrayLike, phase: ArrayLike) -> Floats:
+    """Return the derolled difference of gyro and telescope as φ2 and φ3 (..., 2) in radians, with exact rotations.
+
+    Parameters
+    ----------
+    case : the angles.
+    years, phase : (...), time since the start, and roll phase in radians; broadcast.
+    """
+    since = np.asarray(years, dtype=float)
+    alpha, beta, gamma = (case.at(name, since) for name in ("alpha", "beta", "gamma"))
+    pointing = rotation(alpha)
+    telescope = into_spacecraft(pointing[..., 0], phase, beta)
+    gyro = into_spacecraft(apply(pointing, spin_axis(case, since)), phase, beta, gamma)
+    y, z = np.moveaxis(deroll((gyro - telescope)[..., 1:], phase), -1, 0)
+    return np.stack([z, -y], axis=-1)
+
+
+def spin_axis(case: Case, years: ArrayLike) -> Floats:
+    """Return the direction (..., 3) of the spin axis in the absolute frame: the first column of the rotation by φ."""
+    since = np.asarray(years, dtype=float)
+    phi2, phi3 = case.drift[0] * since, case.drift[1] * since
+    return np.stack([np.cos(phi2) * np.cos(phi3), -np.sin(phi3), np.sin(phi2) * np.cos(phi3)], axis=-1)
+
+
+def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, progress: bool = False) -> Year:
+    """Simulate a year of samples and measure the drift.
+
+    Parameters
+    ----------
+    case : the angles.
+    roll_period : seconds, a multiple of 0.1; None for a spacecraft that stays at phase 0.
+    step : seconds between samples, a multiple of 0.1; at least three samples per roll.
+    progress : show a progress bar.
+
+    Raises
+    ------
+    ValueError : a period or step is not positive, or fewer than three samples fill whole rolls.
+    """
+    return _year(case, roll_period, step, progress)
+
+
+@lru_cache(maxsize=64)  # a chapter shows some years several times
+def _year(case: Case, roll_period: float | None, step: float, progress: bool) -> Year:
+    block = _block(roll_period, step)
+    count = int(YEAR / step) // block * block
+    rate = 0.0 if roll_period is None else 2 * math.pi / roll_period
+    first = min(count, 6 * block, CHUNK)
+    means, opening = [], np.empty((0, 2))
+    sums: NDArray[Any] = np.zeros((2, 2))
+    standing: Floats = np.zeros(2)
+    centre = (count - 1) / 2
+    # Each block begins at phase zero. In a phase that grows for a year, by 3e5 rolls, float64 loses seven digits.
+    phase = rate * step * np.arange(block)
+    for start, stop in tqdm(_chunks(count, block), desc="a year", disable=not progress, ncols=80):
+        index = np.arange(start, stop)
+        blocks = difference(case, index.reshape(-1, block) * (step / YEAR), phase)
+        mean, samples = blocks.mean(axis=1, keepdims=True), blocks.reshape(-1, 2)
+        means.append(mean[:, 0])
+        sums += np.stack([samples.sum(axis=0), ((index - centre)[:, None] * samples).sum(axis=0)])
+        line = blocks - mean
+        yz = np.stack([-line[..., 1], line[..., 0]], axis=-1)
+        standing += deroll(yz, -phase).reshape(-1, 2).sum(axis=0)
+        if not start:
+            opening = samples[:first]
+    phi: NDArray[Any] = np.concatenate(means)
+    time: NDArray[Any] = (np.arange(len(phi)) * block + (block - 1) / 2) * (step / YEAR)
+    slope = _slope(time, phi)
+    offset: Floats = phi.mean(axis=0) - slope * time.mean()
+    spread = count * (count**2 - 1) / 12
+    return Year(
+        case,
+        roll_period,
+        step,
+        block,
+        time,
+        phi,
+        opening,
+        offset,
+        slope,
+        sums[1] / spread / (step / YEAR),
+        float(np.hypot(*standing)) / count if roll_period is not None else 0.0,
+    )
+
+
+def years(
+    cases: Mapping[str, Case], step: float = 60.0, roll_period: float = 600.0, *, progress: bool = False
+) -> dict[str, tuple[Year, Year]]:
+    """Simulate each case without and with roll; see :func:`year`."""
+    return {
+        name: (year(case, None, step), year(case, roll_period, step))
+        for name, case in tqdm(cases.items(), desc="years", ncols=80, disable=not progress)
+    }
+
+
+@dataclass(frozen=True)
+class Part:
+    """Error of one reading over a roll, in radians: the size of its mean and its amplitude at the roll frequency."""
+
+    mean: float
+    turning: float
+
+
+def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
+    """Return the errors of the derolled readings over one roll: ``telescope``, ``gyro`` and their ``difference``.
+
+    The telescope is compared with the star, and the gyro with the spin axis, both in the intermediate frame. The
+    difference is compared with the drift in the absolute frame. Rotations are exact.
+
+    Parameters
+    ----------
+    case : the angles.
+    years : time since the start at which angles and drift are evaluated.
+    samples : number per roll, at least 3.
+
+    Raises
+    ------
+    ValueError : `samples` is below 3.
+    """
+    if samples < 3:
+        raise ValueError(f"got {samples} samples in a roll; needed 3 or more")
+    phase = 2 * math.pi * np.arange(samples) / samples
+    alpha, beta, gamma = (case.at(name, years) for name in ("alpha", "beta", "gamma"))
+    pointing, drifted = rotation(alpha), spin_axis(case, years)
+    star, spin = pointing[:, 0], apply(pointing, drifted)
+    telescope = into_spacecraft(star, phase, beta)[:, 1:]
+    gyro = into_spacecraft(spin, phase, beta, gamma)[:, 1:]
+    found = {}
+    for name, readings, true in (
+        ("telescope", telescope, star),
+        ("gyro", gyro, spin),
+        ("difference", gyro - telescope, drifted),
+    ):
+        error = deroll(readings, phase) - true[1:]
+        mean = error.mean(axis=0)
+        turning = deroll(error - mean, -phase).mean(axis=0)
+        found[name] = Part(float(np.hypot(*mean)), float(np.hypot(*turning)))
+    return found
+
+
+def misalignment_cases(size: float) -> dict[str, Case]:
+    """Return cases with one angle of `size` radians, pairs of angles, and angles that grow by `size` per year."""
+    none = Case()
+    single = {name: none.with_angle(name, size) for which in ("alpha", "beta", "gamma") for name in _three(which)}
+    pairs = {
+        f"{a} and {b}": none.with_angle(a, size).with_angle(b, size)
+        for a, b in (("beta1", "alpha2"), ("gamma1", "alpha2"), ("gamma1", "alpha3"), ("beta2", "gamma3"))
+    }
+    changing = {
+        name: none.with_angle(name, size)
+        for name in ("alpha_rate2", "beta_rate2", "beta_rate3", "gamma_rate2", "gamma_rate3")
+    }
+    both = {"gamma1 and alpha_rate2": none.with_angle("gamma1", size).with_angle("alpha_rate2", size)}
+    return {"no angle": none} | single | pairs | changing | both
+
+
+def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float], phases: int = 32) -> Floats:
+    """Simulate the error of φ in a mean over one roll, the length of (Δφ2, Δφ3), for one angle of several `sizes`.
+
+    All angles are in radians; `drift` holds the true φ2 and φ3.
+    """
+    turns = 2 * math.pi * np.arange(phases) / phases
+    errors = []
+    for size in np.atleast_1d(np.asarray(sizes, dtype=float)):
+        worst = 0.0
+        for signed in (size, -size):
+            case = Case(drift=drift).with_angle(name, float(signed))
+            truth = rotation((0.0, *drift))[1:, 0]
+            mean = difference(case, np.ones(phases), turns).mean(axis=0)
+            angles = np.array([math.asin(truth[1] / math.cos(drift[1])), -math.asin(truth[0])])
+            worst = max(worst, float(np.hypot(*(mean - angles))))
+        errors.append(worst)
+    return np.array(errors)
+
+
+def _three(which: str) -> list[str]:
+    return [f"{which}{axis}" for axis in (1, 2, 3)]
+
+
+def _slope(time: Floats, values: Floats) -> Floats:
+    centred = time - time.mean()
+    return np.asarray(centred @ values / (centred @ centred))
+
+
+def _block(roll_period: float | None, step: float) -> int:
+    if not step > 0 or (roll_period is not None and not roll_period > 0):
+        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed both above 0")
+    if step > YEAR / 100:
+        raise ValueError(f"got a step of {step} s; needed at least a hundred samples per year")
+    if roll_period is None:
+        return 10
+    period, between = round(10 * roll_period), round(10 * step)
+    if period != 10 * roll_period or between != 10 * step:
+        raise ValueError(f"got a roll period of {roll_period} s and a step of {step} s; needed multiples of 0.1 s")
+    block = math.lcm(period, between) // between
+    if block < 3:
+        raise ValueError(
+            f"got {block} samples in whole rolls of {roll_period} s; needed 3 or more; use a step "
+            "that is not a multiple of half the roll period"
+        )
+    return block
+
+
+def _chunks(count: int, block: int) -> Iterator[tuple[int, int]]:
+    size = max(CHUNK // block, 1) * block
+    for start in range(0, count, size):
+        yield start, min(start + size, count)

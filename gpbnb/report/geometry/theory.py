@@ -1,0 +1,299 @@
+"""Closed forms for the effect of misalignments and small angles on the measured drift; radians and years."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gpbnb.report.measurement import ARCSEC, YEAR, apply, deroll, rotation
+
+Floats = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+GEODETIC = 6.6 * ARCSEC
+"""Drift in the plane of the orbit, close to the prediction for Gravity Probe B; radians per year."""
+MOTIONAL = 0.04 * ARCSEC
+"""Drift out of the plane of the orbit; radians per year."""
+ZERO: Triple = (0.0, 0.0, 0.0)
+
+GM = 3.986004e14
+"""Gravitational parameter of the Earth, m³/s²."""
+LIGHT = 299792458.0
+"""Speed of light, m/s."""
+SUN_GM = 1.32712440e20
+"""Gravitational parameter of the Sun, m³/s²."""
+SUN_DISTANCE = 1.495978707e11
+"""Mean distance of the Earth from the Sun, m."""
+RADIUS = 6.378137e6
+"""Equatorial radius of the Earth, m."""
+INERTIA = 0.3307
+"""Moment of inertia of the Earth about its axis, divided by its mass and the square of `RADIUS`."""
+SPIN = 7.292115e-5
+"""Rotation rate of the Earth, rad/s."""
+
+
+def precession_rates(altitude: float, spin: float = SPIN) -> tuple[float, float]:
+    r"""Return the geodetic and frame-dragging drift in a circular polar orbit, for a star on the equator; rad/yr.
+
+    .. math:: \Omega_G = \frac32\,\frac{(GM)^{3/2}}{c^2 r^{5/2}}, \qquad \Omega_M = \frac{G I \omega}{2 c^2 r^3}
+
+    Parameters
+    ----------
+    altitude : height above the equatorial radius, m; 0 or above.
+    spin : rotation rate of the Earth, rad/s.
+
+    References
+    ----------
+    Schiff 1960.
+    """
+    if not altitude >= 0:
+        raise ValueError(f"got an altitude of {altitude} m; needed 0 or above")
+    r = RADIUS + altitude
+    geodetic = 1.5 * GM**1.5 / (LIGHT**2 * r**2.5)
+    motional = GM * INERTIA * RADIUS**2 * spin / (2 * LIGHT**2 * r**3)
+    return geodetic * YEAR, motional * YEAR
+
+
+def aberration(altitude: float) -> tuple[float, float]:
+    r"""Return the largest aberration due to the speed of the Earth and of a spacecraft on a circular orbit; radians.
+
+    .. math:: v/c, \qquad v = \sqrt{GM/r}
+
+    The orbit of the Earth around the Sun is taken as a circle.
+
+    Parameters
+    ----------
+    altitude : height above the equatorial radius, m; 0 or above.
+    """
+    if not altitude >= 0:
+        raise ValueError(f"got an altitude of {altitude} m; needed 0 or above")
+    return math.sqrt(SUN_GM / SUN_DISTANCE) / LIGHT, math.sqrt(GM / (RADIUS + altitude)) / LIGHT
+
+
+@dataclass(frozen=True)
+class Case:
+    """Angles of an experiment that lasts one year.
+
+    Parameters
+    ----------
+    alpha, beta, gamma : pointing, and misalignments of telescope and readout, at the start; radians.
+    alpha_rate, beta_rate, gamma_rate : rates of change of these angles; radians per year.
+    drift : rates of φ2 and φ3; radians per year. The z axis lies in the plane of the orbit, so φ2 is geodetic.
+
+    Raises
+    ------
+    ValueError : a number is missing or not finite.
+    """
+
+    alpha: Triple = ZERO
+    beta: Triple = ZERO
+    gamma: Triple = ZERO
+    alpha_rate: Triple = ZERO
+    beta_rate: Triple = ZERO
+    gamma_rate: Triple = ZERO
+    drift: tuple[float, float] = (GEODETIC, MOTIONAL)
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            needed = 2 if name == "drift" else 3
+            if len(value) != needed or not all(math.isfinite(v) for v in value):
+                raise ValueError(f"got {name} = {value}; needed {needed} finite numbers, in radians")
+
+    def with_angle(self, name: str, size: float) -> Case:
+        """Return a copy with one angle changed, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
+        which, axis = str(name)[:-1], str(name)[-1:]
+        if which == "drift" or which not in vars(self) or axis not in ("1", "2", "3"):
+            raise ValueError(f"got angle {name!r}; needed alpha, beta, gamma or their _rate and 1, 2 or 3: 'gamma1'")
+        values = list(getattr(self, which))
+        values[int(axis) - 1] = size
+        return replace(self, **{which: tuple(values)})
+
+    def at(self, name: str, years: ArrayLike) -> Floats:
+        """Return the angles `name` after `years` (...): (..., 3), or (3,) if they do not change."""
+        start, rate = np.asarray(getattr(self, name)), np.asarray(getattr(self, f"{name}_rate"))
+        return start + np.asarray(years, dtype=float)[..., None] * rate if rate.any() else start
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Errors of φ2 and φ3 in radians: in the angle at the start, and in the drift over a year.
+
+    `line` is the amplitude at the roll frequency in the derolled difference, in the middle of the year.
+    """
+
+    angle: tuple[float, float]
+    drift: tuple[float, float]
+    line: float
+
+
+def printed_deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
+    r"""Evaluate (8) and (9) as printed; returns (-α3, α2) or (-θ3, θ2), like :func:`gpbnb.report.measurement.deroll`.
+
+    .. math:: \begin{bmatrix} \hat\alpha_3 \\ -\hat\alpha_2 \end{bmatrix} = \begin{bmatrix} C & S \\ -S & C
+        \end{bmatrix} \begin{bmatrix} y_t \\ z_t \end{bmatrix}
+    """
+    return -deroll(readings, -np.asarray(phase, dtype=float))
+
+
+def measured(case: Case, rolling: bool, years: ArrayLike = 0.0, phase: float = 0.0) -> Floats:
+    r"""Return the errors of the measured φ2, φ3 to second order; if rolling, those of the mean over a roll.
+
+    .. math:: \Delta\varphi_2 &= (\alpha_1 + \beta_1 + \gamma_1)\varphi_3 + \gamma_1\alpha_3 + m_2 \\
+        \Delta\varphi_3 &= -(\alpha_1 + \beta_1 + \gamma_1)\varphi_2 - \gamma_1\alpha_2 + m_3
+
+    Without rolling, m is the effect of the transverse misalignments, to first order γ2 and γ3, rotated by the constant
+    roll `phase`. With rolling, its mean is zero.
+
+    Parameters
+    ----------
+    case : the angles.
+    rolling : whether the spacecraft rolls.
+    years : (...), time since the start.
+    phase : roll phase of a spacecraft that does not roll; radians.
+
+    Returns
+    -------
+    errors : (..., 2), radians.
+    """
+    since = np.asarray(years, dtype=float)
+    alpha, beta, gamma = (case.at(name, since) for name in ("alpha", "beta", "gamma"))
+    phi2, phi3 = case.drift[0] * since, case.drift[1] * since
+    twist = alpha[..., 0] + beta[..., 0] + gamma[..., 0]
+    second = twist * phi3 + gamma[..., 0] * alpha[..., 2]
+    third = -twist * phi2 - gamma[..., 0] * alpha[..., 1]
+    if not rolling:
+        y, z = np.moveaxis(deroll(standing(beta, gamma), phase), -1, 0)
+        second, third = second + z, third - y
+    return np.stack([second, third], axis=-1)
+
+
+def standing(beta: ArrayLike, gamma: ArrayLike) -> Floats:
+    """Return the exact readings y, z of gyro minus telescope for the roll axis, which are fixed in the spacecraft."""
+    boresight = rotation(beta)[..., 0]
+    return np.asarray((apply(rotation(gamma), boresight) - boresight)[..., 1:])
+
+
+def effect(case: Case, rolling: bool, phase: float = 0.0) -> Effect:
+    """Return the errors of angle and drift to second order, from the values at the start and after a year.
+
+    The drift is the slope of a straight line through both ends. In between, the error of a product of two changing
+    angles is not linear.
+    """
+    start, end = measured(case, rolling, np.array([0.0, 1.0]), phase)
+    line = float(np.hypot(*standing(case.at("beta", 0.5), case.at("gamma", 0.5)))) if rolling else 0.0
+    drift = end - start
+    return Effect((float(start[0]), float(start[1])), (float(drift[0]), float(drift[1])), line)
+
+
+def line_fit_leak(amplitude: float, rolls: float, samples: float | None = None) -> float:
+    r"""Return the drift error of a line fitted to all samples, due to an offset fixed in the spacecraft.
+
+    .. math:: |\Delta\text{drift}| = \frac{6}{\pi N}\,\text{amplitude}, \qquad
+        \text{or } \frac{6}{nN\sin(\pi/n)}\,\text{amplitude for n samples a roll}
+
+    for N whole rolls, to first order in 1/N. It vanishes if the line is fitted to means of whole rolls.
+
+    Parameters
+    ----------
+    amplitude : amplitude at the roll frequency, in any unit.
+    rolls : N, above 0.
+    samples : n, samples per roll, at least 2; infinitely many by default.
+
+    Returns
+    -------
+    leak : length of the vector of both drift errors, in the unit of `amplitude` per length of the record.
+    """
+    if not rolls > 0 or (samples is not None and samples < 2):
+        raise ValueError(
+            f"got {rolls} rolls with {samples} samples each; needed more than 0 rolls, and 2 or more samples"
+        )
+    spread = math.pi if samples is None else samples * math.sin(math.pi / samples)
+    return 6 / (rolls * spread) * abs(amplitude)
+
+
+def ramp_leak(rate: float, roll_period: float, samples: int | None = None) -> float:
+    r"""Return the constant error of the mean over a roll due to an offset in the spacecraft that grows at `rate`.
+
+    .. math:: |\Delta\varphi| = \frac{\text{rate}\;T}{2\pi}, \qquad
+        \text{or } \frac{\text{rate}\;T}{2n\sin(\pi/n)} \text{ for the mean of n samples}
+
+    Parameters
+    ----------
+    rate : in any unit per second.
+    roll_period : T, seconds.
+    samples : n, samples per roll, at least 2; infinitely many by default.
+    """
+    if not roll_period > 0 or (samples is not None and samples < 2):
+        raise ValueError(
+            f"got a roll period of {roll_period} s with {samples} samples; needed a period above 0 s, and "
+            "2 or more samples"
+        )
+    whole = abs(rate) * roll_period
+    return whole / (2 * math.pi) if samples is None else whole / (2 * samples * math.sin(math.pi / samples))
+
+
+SINGLE = ("alpha1", "alpha2", "alpha3", "beta1", "beta2", "beta3", "gamma1", "gamma2", "gamma3")
+"""Angles whose small-angle form is examined."""
+
+
+def small_angle_loss(name: str, size: ArrayLike, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> Floats:
+    r"""Return the error of φ in a mean over whole rolls if products of small angles with one angle x are dropped.
+
+    To third order and for the worse sign of x, the errors are as follows: for rotations about the roll axis, for the
+    other angles β and γ, and for α2,
+
+    .. math:: |x|\,|\varphi| + \dots, \qquad \tfrac14 x^2|\varphi|, \qquad
+        \tfrac12 x^2|\varphi_2| + \tfrac12|x|\,|\varphi|^2
+
+    To each is added the error due to the drift alone, :math:`\varphi^3/6`.
+
+    Parameters
+    ----------
+    name : one of `SINGLE`.
+    size : (...), size of this angle; radians.
+    drift : true φ2, φ3; radians.
+
+    Returns
+    -------
+    loss : (...), length of the vector (Δφ2, Δφ3); radians.
+    """
+    if name not in SINGLE:
+        raise ValueError(f"got angle {name!r}; needed one of {', '.join(SINGLE)}")
+    phi2, phi3 = drift
+    square = phi2**2 + phi3**2
+    worst = []
+    for x in (np.asarray(size, dtype=float), -np.asarray(size, dtype=float)):
+        y, z = phi3**3 / 6 + 0 * x, -(phi2**3) / 6 - phi2 * phi3**2 / 2 + 0 * x
+        if name.endswith("1"):
+            y, z = y + x * phi2 + x**2 * phi3 / 2, z + x * phi3 - x**2 * phi2 / 2
+        elif name == "alpha2":
+            z = z - x**2 * phi2 / 2 - x * square / 2
+        elif name == "alpha3":
+            y = y + x**2 * phi3 / 2 + x * square / 2
+        else:
+            y, z = y + x**2 * phi3 / 4, z - x**2 * phi2 / 4
+        worst.append(np.hypot(y, z))
+    return np.asarray(np.maximum(*worst))
+
+
+def reach(name: str, allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
+    """Return the size of an angle whose :func:`small_angle_loss` equals `allowed`, in radians, at most half a turn."""
+    if not 0 < allowed < small_angle_loss(name, math.pi, drift):
+        raise ValueError(
+            f"got allowed = {allowed}; needed an angle above 0 and below the error that half a turn of {name} causes"
+        )
+    low, high = 0.0, math.pi
+    for _ in range(80):
+        middle = (low + high) / 2
+        low, high = (middle, high) if small_angle_loss(name, middle, drift) < allowed else (low, middle)
+    return high
+
+
+def twist_limit(allowed: float, drift: tuple[float, float] = (GEODETIC, MOTIONAL)) -> float:
+    """Return the rotation about the roll axis that moves `allowed` from one drift to the other; both in radians."""
+    if not allowed > 0:
+        raise ValueError(f"got allowed = {allowed}; needed an angle above 0, in radians")
+    return allowed / max(map(abs, drift))

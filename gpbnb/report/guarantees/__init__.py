@@ -1,0 +1,1 @@
+"""Guarantees for every measurement and for all time: studies, tables and figures."""

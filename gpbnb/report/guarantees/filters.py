@@ -1,0 +1,429 @@
+"""Random Kalman filters against their guarantees, in the run that a user gets from the model as given.
+
+A seed determines a model, a format, a form, limits and inputs. The guarantee of the filter is compared with runs of the
+same model; errors are differences from the exact filter of the stored model. Inputs are random, constant, or chosen by
+an adversary. A run counts until the exact filter leaves the limits.
+
+``python -m gpbnb.report.guarantees.filters`` recomputes ``filters.csv`` and resumes after an interruption.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.bounds.adversary import attack, responses, shares_of
+from gpbnb.bounds.guarantee import Guarantee, closed_loops, guarantee
+from gpbnb.filters.forms import Form
+from gpbnb.filters.run import Run, reference_states, widened
+from gpbnb.report.display.tables import Table
+from gpbnb.report.guarantees.random_filters import (
+    DETERMINISTIC,
+    KINDS,
+    LIMITED,
+    RANGES,
+    STEPS,
+    Drawn,
+    draw,
+    innovations,
+)
+from gpbnb.sweeps import Column, Sweep
+
+FILE = Path(__file__).with_name("filters.csv")
+COMMAND = "python -m gpbnb.report.guarantees.filters"
+FILTERS = 3_000
+MOST, CANDIDATES = 1_000, 8
+"""Steps until a gain must have settled; measurements that the adversary tries at each step."""
+INPUTS = ("random", "constant", "chosen")
+RESULTS = ("for ever", "some steps", "no bound", "refused", "failed")
+"""The last one is an error that does not say what is wrong with the filter."""
+REASONS = (
+    "",
+    "no compiled loops",
+    "beyond the range",
+    "indefinite covariance",
+    "gain not settled",
+    "unstable loop",
+    "too few digits",
+    "another",
+)
+
+
+class Row(NamedTuple):
+    """A filter in a format, what its guarantee says, and the largest error / bound for each kind of input.
+
+    `steps` counts the steps of all runs in which the exact filter was within its limits, `stopped` the runs that ended
+    there although the filter was within them, and `gains` the steps in which the gain of a run is not the one for which
+    the guarantee holds.
+    """
+
+    seed: int
+    kind: str
+    n: int
+    m: int
+    base: int
+    precision: int
+    rounding: str
+    range: str
+    form: str
+    limited: str
+    result: str
+    reason: str
+    runs: int
+    steps: int
+    stopped: int
+    gains: int
+    random: str
+    constant: str
+    chosen: str
+
+    @property
+    def largest(self) -> float:
+        """Largest error / bound of all runs."""
+        return max(float(self.random), float(self.constant), float(self.chosen))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a run exceeds its bound or has other gains, or the answer fails without a reason."""
+        return self.largest > 1 or self.gains > 0 or self.result == "failed"
+
+
+COLUMNS = (
+    Column("seed", "integer", 0),
+    Column("kind", "text", choices=KINDS),
+    Column("n", "integer", 1, 4),
+    Column("m", "integer", 1, 2),
+    Column("base", "integer", 2, 16),
+    Column("precision", "integer", 3, 30),
+    Column("rounding", "text", choices=tuple(each.value for each in DETERMINISTIC)),
+    Column("range", "text", choices=RANGES),
+    Column("form", "text", choices=tuple(each.name.lower() for each in Form)),
+    Column("limited", "text", choices=LIMITED),
+    Column("result", "text", choices=RESULTS),
+    Column("reason", "text", choices=REASONS),
+    Column("runs", "integer", 0),
+    Column("steps", "integer", 0),
+    Column("stopped", "integer", 0),
+    Column("gains", "integer", 0),
+    *(Column(kind, "number", 0) for kind in INPUTS),
+)
+"""Columns of the stored table."""
+
+
+def errors(drawn: Drawn, z: NDArray[np.float64]) -> tuple[NDArray[np.float64], bool]:
+    """Return errors of a user's run, (steps, n), while the exact filter is within its limits, and whether it stopped.
+
+    Raises
+    ------
+    ArithmeticError : a measurement is beyond the range of the format, or the exact filter needs too many digits.
+    """
+    run = Run(drawn.model, drawn.fmt, drawn.form, ())
+    stored = run.exactly(run.pack_measurements(z))[:, :, 0]
+    true = reference_states(drawn.stored, stored)
+    at = first_outside(drawn, true[:, :, 0], stored.astype(np.float64), z)
+    x = run.states(z[:at])
+    off = x - true[: len(x)]
+    return np.asarray(off[..., 0] + off[..., 1]), bool(run.stopped)
+
+
+def first_outside(drawn: Drawn, true: NDArray[np.float64], stored: NDArray[np.float64], z: NDArray[np.float64]) -> int:
+    """Return the number of steps after which the exact filter first leaves its limits, or all steps.
+
+    Parameters
+    ----------
+    true : (steps, n), its estimates.
+    stored, z : (steps, m), measurements as stored, and as given, for which their limits hold.
+    """
+    X = drawn.within
+    innovation = innovations(drawn.stored, true, stored)
+    inside = np.ones(len(z), dtype=bool)
+    for values, limit in ((true, X.state), (innovation, X.innovation), (z, X.measurement)):
+        inside &= (np.abs(values) <= limit).all(axis=1)
+    return len(z) if inside.all() else int(inside.argmin())
+
+
+def other_gains(drawn: Drawn, found: Guarantee) -> int:
+    """Return the number of steps in which a user's run has another gain than those for which the guarantee holds."""
+    given = found.schedule
+    steps = STEPS if found.steps is None else min(STEPS, found.steps)
+    run = Run(drawn.model, drawn.fmt, drawn.form, range(1, steps + 1))
+    run.take(np.zeros((steps, drawn.model.m)))
+    at, count = _rows(found, run.steps), drawn.model.n * drawn.model.m
+    gains = run.G[: run.steps].reshape(run.steps, count, *run.G.shape[3:])
+    same = gains == given.packed[at, -count:]
+    if same.ndim == 3:
+        same = same.all(axis=2)
+    off = np.abs(widened(gains[:, :, None])[:, :, 0, 0] - given.coefficients[at, -count:, 0])
+    same |= off < given.offsets[at, -count:]  # a gain that never repeats is enclosed
+    return int((~same.all(axis=1)).sum())
+
+
+def inputs(drawn: Drawn, found: Guarantee, rng: np.random.Generator) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Give the inputs of each run, (steps, m), and their kind."""
+    n, m = drawn.model.n, drawn.model.m
+    steps = STEPS if found.steps is None else min(STEPS, found.steps)
+    F = closed_loops(found.schedule)
+    for part in range(3):
+        course = rng.uniform(-1, 1, (steps, m)) if part else rng.choice((-1.0, 1.0), (steps, m))
+        yield "random", _admissible(drawn, found, course)
+    if drawn.limited == "reached":
+        yield "constant", np.broadcast_to(drawn.level, (steps, m))
+    for _ in range(2 - (drawn.limited == "reached")):
+        level = rng.choice((-1.0, 1.0), m) * rng.choice((1.0, rng.uniform()))
+        yield "constant", _admissible(drawn, found, np.broadcast_to(level, (steps, m)))
+    state = int(rng.integers(n))
+    back = responses(found.schedule, F, state, steps)
+    at = _rows(found, steps)
+    course = np.sign(np.einsum("ki,kim->km", back, found.schedule.exact[at][..., 0]))
+    yield "chosen", _admissible(drawn, found, course)
+    for part in range(2):
+        seed, center = int(rng.integers(2**31)), None
+        if drawn.limited != "measurement":
+            center = rng.choice((-1.0, 0.0, 1.0), n) * drawn.within.state
+        try:
+            outcome = attack(found, steps, CANDIDATES, seed, [(state + part) % n], center, 3 + 3 * part, steps / 4)
+        except OverflowError:  # in base 10, compiled loops stop at a subnormal number
+            continue
+        yield "chosen", outcome.z
+
+
+def _rows(found: Guarantee, steps: int) -> NDArray[np.int64]:
+    """Return the row of the schedule for each step."""
+    given, k = found.schedule, np.arange(steps)
+    return np.where(k < given.steps, k, given.first + (k - given.first) % max(given.steps - given.first, 1))
+
+
+_FACTORS = np.array([[0.999], [0.5], [0.0], [-0.5], [-0.999]])
+
+
+def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return measurements with a course of shares of their limits, or of the innovations' limits.
+
+    An innovation that takes the state out of its limits is reduced or reversed.
+    """
+    if drawn.limited == "measurement":
+        return course * drawn.within.measurement
+    given, at = found.schedule, _rows(found, len(course))
+    X, V, Z = drawn.within
+    of_state, of_innovation = (np.where(limit > 0, 1 / np.maximum(limit, 1e-300), 1e300) for limit in (X, V))
+    x, z = given.x0.astype(np.float64), np.zeros(course.shape)
+    for k, share in enumerate(course):
+        seen, predicted, K = given.HPhi[at[k], :, :, 0] @ x, given.Phi[at[k], :, :, 0] @ x, given.exact[at[k], :, :, 0]
+        tried = np.clip(seen + _FACTORS * share * V, -Z, Z)
+        following = predicted + (tried - seen) @ K.T
+        excess = np.maximum(
+            (np.abs(following) * of_state).max(axis=1), (np.abs(tried - seen) * of_innovation).max(axis=1)
+        )
+        best = int(np.maximum(excess, 1 - 1e-6).argmin())  # the first of those that are admissible
+        x, z[k] = following[best], tried[best]
+    return z
+
+
+def examine(
+    seed: int, drawn: Drawn | None = None, bounded: Callable[..., Guarantee] = guarantee, smaller: float = 1.0
+) -> Row:
+    """Compute one row; its seed determines all random numbers.
+
+    Parameters
+    ----------
+    drawn : the filter; by default the one of the seed.
+    bounded : function that computes the guarantee.
+    smaller : factor of the bound, below 1 for a guarantee that promises too much.
+    """
+    given = draw(seed) if drawn is None else drawn
+    row = _unexamined(seed, given)
+    try:
+        found = bounded(given.model, given.fmt, given.within, given.form, most=MOST, horizon=STEPS)
+    except (ValueError, ArithmeticError) as error:
+        reason = reason_of(str(error))
+        return row._replace(result="failed" if reason == "another" else "refused", reason=reason)
+    row = row._replace(
+        result="for ever" if found.for_ever else "some steps" if found.steps else "no bound",
+        reason="" if found.for_ever else reason_of(found.why),
+    )
+    if row.result == "no bound":
+        return row
+    row = row._replace(gains=other_gains(given, found))
+    rng, worst = np.random.default_rng([36, seed]), dict.fromkeys(INPUTS, 0.0)
+    for kind, z in inputs(given, found, rng):
+        try:
+            off, ended = errors(given, z)
+        except ArithmeticError:
+            continue  # the format cannot store a measurement, or the exact filter needs too many digits
+        off = off[: found.steps]
+        row = row._replace(runs=row.runs + (len(off) > 0), steps=row.steps + len(off), stopped=row.stopped + ended)
+        reached = shares_of(np.abs(off).max(axis=0, initial=0.0), smaller * found.bound)
+        worst[kind] = max(worst[kind], float(reached.max()))
+    # No rounding may hide that a bound is exceeded.
+    ratios = (f"{worst[kind]:.4g}" if worst[kind] <= 1 else f"{worst[kind]:.17g}" for kind in INPUTS)
+    return Row(*row[: -len(INPUTS)], *ratios)  # type: ignore[arg-type]
+
+
+def _unexamined(seed: int, drawn: Drawn) -> Row:
+    """Return the row of a filter whose guarantee refuses an answer."""
+    fmt, model = drawn.fmt, drawn.model
+    return Row(
+        seed=seed,
+        kind=drawn.kind,
+        n=model.n,
+        m=model.m,
+        base=fmt.base,
+        precision=fmt.precision,
+        rounding=fmt.rounding.value,
+        range="unlimited" if fmt.emin is None else "subnormal" if fmt.subnormal else "flushed",
+        form=drawn.form.name.lower(),
+        limited=drawn.limited,
+        result="refused",
+        reason="another",
+        runs=0,
+        steps=0,
+        stopped=0,
+        gains=0,
+        random="0",
+        constant="0",
+        chosen="0",
+    )
+
+
+def reason_of(text: str) -> str:
+    """Return the short name of the reason why there is no bound for all time."""
+    known = {
+        "with compiled loops": "no compiled loops",
+        "range": "beyond the range",
+        "normal numbers": "beyond the range",
+        "largest": "beyond the range",
+        "at most": "beyond the range",
+        "definite": "indefinite covariance",
+        "singular": "indefinite covariance",
+        "settle": "gain not settled",
+        "not stable": "unstable loop",
+        "as large as itself": "too few digits",
+    }
+    return next((name for part, name in known.items() if part in text), "another")
+
+
+# -- the stored survey ------------------------------------------------------------------------------------------------
+
+
+def texts(row: Row) -> tuple[str, ...]:
+    """Return a row as it is stored."""
+    return tuple(map(str, row))
+
+
+def _computed(seed: int, directory: Path | None = None) -> list[list[str]]:
+    return [list(texts(examine(seed)))]
+
+
+def _stored_rows(seed: int, result: Sequence[Any]) -> list[tuple[str, ...]]:
+    return [tuple(row) for row in result]
+
+
+SWEEP: Sweep[int] = Sweep(
+    name="kalman/filters",
+    file=FILE,
+    columns=COLUMNS,
+    key=1,
+    cells=lambda: range(FILTERS),
+    compute=_computed,
+    rows=_stored_rows,
+    command=COMMAND,
+    seed=0,
+)
+
+
+def load(file: Path = FILE) -> tuple[Row, ...]:
+    """Return the stored rows."""
+    whole = {column.name for column in COLUMNS if column.kind == "integer"}
+    return tuple(
+        Row(**{name: int(value) if name in whole else value for name, value in line.items()})  # type: ignore[arg-type]
+        for line in SWEEP.load(file).records()
+    )
+
+
+class Count(NamedTuple):
+    """Filters that share a property, how many of them have which result, their runs, and the largest error / bound."""
+
+    value: str
+    filters: int
+    for_ever: int
+    some_steps: int
+    without: int
+    runs: int
+    random: float
+    constant: float
+    chosen: float
+
+    @property
+    def largest(self) -> float:
+        """Largest error / bound of all runs."""
+        return max(self.random, self.constant, self.chosen)
+
+
+def counts(rows: Sequence[Row], name: str) -> tuple[Count, ...]:
+    """Count filters by one of the columns, in the order in which its values are listed there, or of their size."""
+    values = {column.name: column.choices for column in COLUMNS}[name] or sorted({getattr(row, name) for row in rows})
+    found = []
+    for value in values:
+        chosen = [row for row in rows if getattr(row, name) == value]
+        results = [row.result for row in chosen]
+        known = results.count("for ever"), results.count("some steps")
+        worst = (max((float(getattr(row, kind)) for row in chosen), default=0.0) for kind in INPUTS)
+        runs = sum(row.runs for row in chosen)
+        found.append(Count(str(value), len(chosen), *known, len(chosen) - sum(known), runs, *worst))
+    return tuple(each for each in found if each.filters)
+
+
+def table(rows: Sequence[Row]) -> Table:
+    """Tabulate the counts by form, base, rounding, kind of model, range and limits."""
+    header = ("", "filters", "for ever", "some steps", "no answer", "runs", *(f"{kind} inputs" for kind in INPUTS))
+    body = []
+    for name in ("form", "base", "rounding", "kind", "range", "limited"):
+        for each in counts(rows, name):
+            label = each.value.replace("_", " ")
+            numbers = (each.filters, each.for_ever, each.some_steps, each.without, each.runs)
+            worst = (each.random, each.constant, each.chosen)
+            cells = *map(str, numbers), *(f"{ratio:.3f}" if each.runs else "–" for ratio in worst)
+            body.append((f"{name} {label}" if name in ("base", "rounding") else label, *cells))
+    return Table("random filters against their guarantees", header, tuple(body))
+
+
+def reasons(rows: Sequence[Row]) -> Table:
+    """Tabulate why filters have no guarantee for all time."""
+    found = Counter((row.result, row.reason) for row in rows if row.result != "for ever")
+    body = tuple((*pair, str(found[pair])) for pair in sorted(found, key=lambda pair: -found[pair]))
+    return Table("reasons why there is no guarantee for all time", ("answer", "reason", "filters"), body)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute the survey; return a nonzero status if an answer is wrong or fails."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Compare random Kalman filters with their guarantees.")
+    parser.add_argument("--rows", type=int, default=FILTERS, help="number of filters to compute")
+    parser.add_argument("--processes", type=int, default=1, help="number of processes")
+    parser.add_argument(
+        "--output", type=Path, default=Path(".cache/filters"), help="folder for filters.csv and saved progress"
+    )
+    given = parser.parse_args(arguments)
+    cells = range(min(given.rows, FILTERS))
+    if given.processes > 1:
+        with ProcessPoolExecutor(given.processes, get_context("spawn")) as executor:
+            results = SWEEP.run(given.output, executor, chunk=8, cells=cells)
+    else:
+        results = SWEEP.run(given.output, cells=cells)
+    file = given.output / FILE.name
+    SWEEP.store(results, file=file)
+    bad = [row for row in load(file) if row.wrong]
+    for row in bad:
+        print(*row)
+    return int(bool(bad))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,126 @@
+"""Filters with published numbers, taken from the programs and tests of other projects."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.model import LinearModel
+
+_HERE = Path(__file__).parent
+
+
+def nile_local_level() -> LinearModel:
+    """Yearly flow of the Nile at Aswan, in 10⁸ m³, as a random walk: StateSpaceModels.jl, test/models/locallevel.jl.
+
+    Its first covariance of 1e7 holds before the first update, whereas this package predicts first.
+    """
+    return LinearModel(
+        Phi=exact([["1"]]),
+        H=exact([["1"]]),
+        Q=exact([["1469.1"]]),
+        R=exact([["15099"]]),
+        x0=exact(["0"]),
+        P0=exact([["9998530.9"]]),
+        name="Nile, local level",
+    )
+
+
+def elaenia_gold() -> LinearModel:
+    """A constant, 990 at first, observed with a standard deviation of 15: sandialabs/elaenia, example 05_kalman."""
+    return LinearModel(
+        Phi=exact([["1"]]),
+        H=exact([["1"]]),
+        Q=exact([["0"]]),
+        R=exact([["225"]]),
+        x0=exact(["990"]),
+        P0=exact([["100"]]),
+        name="elaenia, gold",
+    )
+
+
+def dyer_mcreynolds(d: str = "0.0024") -> LinearModel:
+    """Three constants seen by two nearly parallel measurements: an example by Dyer and McReynolds.
+
+    Parameters
+    ----------
+    d : deviation of the two measurements from parallel. Grewal and Andrews compare filters for
+        ``d = eps**(2/3) * 10**(10 - k)``; in binary32, k = 8 gives about the default.
+
+    References
+    ----------
+    dyer1969; the script ``shootout.m`` of grewal2008.
+    """
+    e = Fraction(d)
+    return LinearModel(
+        Phi=exact(np.eye(3, dtype=np.int64)),
+        H=exact([[1, 1, 1], [1, 1, 1 + e]]),
+        Q=exact(np.zeros((3, 3), dtype=np.int64)),
+        R=exact(np.eye(2, dtype=np.int64)) * e**2,
+        x0=exact(["1", "1", "-1"]),
+        P0=exact(np.eye(3, dtype=np.int64)),
+        name="Dyer and McReynolds",
+    )
+
+
+def filterpy_velocity() -> LinearModel:
+    """Position and velocity by a sensor with a variance of 1e-8: rlabbe/filterpy, tests/test_kf.py."""
+    return LinearModel(
+        Phi=exact([["1", "1"], ["0", "1"]]),
+        H=exact([["1", "0"]]),
+        Q=exact([["0.001", "0"], ["0", "0.001"]]),
+        R=exact([["1e-8"]]),
+        x0=exact(["0", "0"]),
+        P0=exact([["1", "0"], ["0", "1"]]),
+        name="filterpy, velocity",
+    )
+
+
+def filterpy_fusion() -> LinearModel:
+    """Position and velocity ten times a second: rlabbe/filterpy, tests/test_sensor_fusion.py, its single sensor."""
+    return LinearModel(
+        Phi=exact([["1", "0.1"], ["0", "1"]]),
+        H=exact([["1", "0"]]),
+        Q=exact([["1/150000", "1/10000"], ["1/10000", "1/500"]]),
+        R=exact([["4"]]),
+        x0=exact(["0", "1"]),
+        P0=exact([["100", "0"], ["0", "100"]]),
+        name="filterpy, sensor fusion",
+    )
+
+
+def dynamax_tracking() -> LinearModel:
+    """A point in the plane, two positions and two velocities: probml/dynamax, notebook kf_tracking."""
+    unit = [[str(int(i == j)) for j in range(4)] for i in range(4)]
+    return LinearModel(
+        Phi=exact([["1", "0", "1", "0"], ["0", "1", "0", "1"], ["0", "0", "1", "0"], ["0", "0", "0", "1"]]),
+        H=exact([["1", "0", "0", "0"], ["0", "1", "0", "0"]]),
+        Q=exact(unit) / 1000,
+        R=exact([["1", "0"], ["0", "1"]]),
+        x0=exact(["8", "10", "1", "0"]),
+        P0=exact(unit) / 10,
+        name="dynamax, tracking",
+    )
+
+
+def px4_landing_target() -> LinearModel:
+    """A landing target's position and velocity, 50 times a second: PX4-Autopilot, at a distance of 1 m."""
+    return LinearModel(
+        Phi=exact([["1", "0.02"], ["0", "1"]]),
+        H=exact([["1", "0"]]),
+        Q=exact([["1/2500000", "1/25000"], ["1/25000", "1/250"]]),
+        R=exact([["0.005"]]),
+        x0=exact(["0", "0"]),
+        P0=exact([["0.1", "0"], ["0", "0.1"]]),
+        name="PX4, landing target",
+    )
+
+
+def fixif_longitudinal() -> dict[str, Any]:
+    """A controller of an aircraft's longitudinal motion with ten states: A, B, C, D, and FixIF's printed numbers."""
+    return dict(json.loads((_HERE / "fixif_longitudinal.json").read_text(encoding="utf-8")))

@@ -1,0 +1,467 @@
+r"""Derive the algebra of savage2016 again from (1) and (2), and the consequence that each misprint would have.
+
+Everything up to (35) is exact. P stands for the steady-state variance :math:`P_{11\infty} = \sigma_x^2`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import sympy as sp
+
+from gpbnb.report.display.derivation import Derivation, Step, over, together, unevaluated
+
+OMEGA, T, P, TAU, TIME = sp.symbols("omega T P tau t", positive=True)
+MU = sp.Symbol("mu", positive=True)
+L, PHI = sp.symbols("L varphi", positive=True)
+N = sp.Symbol("n", integer=True, nonnegative=True)
+
+#: States and noises of (10) before a step, and the covariances of the states.
+X1, X2, X3, Q1, Q2 = sp.symbols("x_1 x_2 x_3 q_1 q_2")
+P11, P12, P22, P31, P32, P33 = sp.symbols("P_11 P_12 P_22 P_31 P_32 P_33")
+PHI11, PHI21, P11N, P12N, P22N = sp.symbols("phi_11 phi_21 P_11n P_12n P_22n")
+
+DECAY = sp.exp(-OMEGA * T)
+
+
+# -- the transition, (5)-(9) ----------------------------------------------------------------------
+
+
+@cache
+def transition_matrix() -> sp.ImmutableMatrix:
+    """Return the matrix exponential of A T, from (4) alone."""
+    return sp.ImmutableMatrix((sp.Matrix([[-OMEGA, 0], [1, 0]]) * T).exp().applyfunc(sp.simplify))
+
+
+def printed_transition() -> sp.Matrix:
+    """Return the matrix as printed in (7)."""
+    return sp.Matrix([[DECAY, 0], [(1 - DECAY) / OMEGA, 1]])
+
+
+def transition_residual(identity: bool) -> sp.Matrix:
+    r"""Return (7) minus :math:`\int_0^T A\Phi\,d\tau`, the right side of (6), and minus the identity that (6) omits."""
+    a = sp.Matrix([[-OMEGA, 0], [1, 0]])
+    integrand = (a * printed_transition()).subs(T, TAU)
+    integral = integrand.applyfunc(lambda entry: sp.integrate(entry, (TAU, 0, T)))
+    return (printed_transition() - integral - (sp.eye(2) if identity else sp.zeros(2))).applyfunc(sp.simplify)
+
+
+def transition() -> Derivation:
+    """Derive (7) and (9) from (6), with the identity that (6) omits."""
+    ours = transition_matrix()
+    integral = sp.Integral(sp.exp(-OMEGA * TAU), (TAU, 0, T))
+    return Derivation(
+        (
+            Step(
+                "equation (6) with $I$ added, first row: $\\phi_{11}$",
+                together(1, -OMEGA * integral),
+                ours[0, 0],
+            ),
+            Step("second row: $\\phi_{21}$ of (7) and (9)", integral, ours[1, 0]),
+            Step("(9): $\\phi_{21}$ by $\\phi_{11}$", ours[1, 0], over(1 - ours[0, 0], OMEGA)),
+        )
+    )
+
+
+@cache
+def noise(kernel: str = "right") -> sp.ImmutableMatrix:
+    r"""Return the covariance of q_n in (6), from white noise of density :math:`N = 2\omega P`.
+
+    Parameters
+    ----------
+    kernel : "right", :math:`\int\Phi(t_n-\tau)n_p(\tau)d\tau`; "reversed", with :math:`\Phi(\tau-t_{n-1})`; "printed",
+        with :math:`\Phi(\tau)`, τ counted from the start of all cycles, t = t_{n-1}.
+    """
+    arguments = {"right": T - TAU, "reversed": TAU, "printed": TIME + TAU}
+    if kernel not in arguments:
+        raise ValueError(f"got kernel {kernel!r}; needed one of {', '.join(arguments)}")
+    column = printed_transition()[:, 0].subs(T, arguments[kernel])
+    density = 2 * OMEGA * P * column * column.T
+    return sp.ImmutableMatrix(density.applyfunc(_over_cycle))
+
+
+def _over_cycle(entry: sp.Expr) -> sp.Expr:
+    """Integrate a sum of exponentials of τ over a cycle."""
+    total = sp.S.Zero
+    for term in sp.Add.make_args(sp.expand(entry)):
+        rate = sp.expand(sp.diff(term, TAU) / term)
+        total += term * T if rate == 0 else (term.subs(TAU, T) - term.subs(TAU, 0)) / rate
+    return sp.expand(total)
+
+
+def discretization() -> Derivation:
+    r"""Derive the joint covariance of process and integral over a cycle, which the document does not need."""
+    q = noise()
+    lost = 1 - DECAY
+    kernel = (1 - sp.exp(-OMEGA * TAU)) / OMEGA
+    density = 2 * OMEGA * P
+    walk = (1 + DECAY) / (1 - DECAY) - 2 / (OMEGA * T)
+    bridge = P * T * walk * 2 / OMEGA * over(lost, 1 + DECAY)
+    return Derivation(
+        (
+            Step("$q_{11}$", sp.Integral(density * sp.exp(-2 * OMEGA * TAU), (TAU, 0, T)), P * (1 - DECAY**2)),
+            Step("$q_{12}$", sp.Integral(density * sp.exp(-OMEGA * TAU) * kernel, (TAU, 0, T)), P * lost**2 / OMEGA),
+            Step(
+                "$q_{22}$",
+                sp.Integral(sp.expand(density * kernel**2), (TAU, 0, T)),
+                P * (2 * OMEGA * T - 3 + 4 * DECAY - DECAY**2) / OMEGA**2,
+            ),
+            Step(
+                "$q_{22}$ from positive terms: the parts uncorrelated and correlated with $q_1$",
+                q[1, 1],
+                together(bridge, over(q[0, 1] ** 2, q[0, 0])),
+            ),
+        )
+    )
+
+
+# -- covariances from cycle to cycle, (10)-(18) ---------------------------------------------------
+
+
+def expected(expression: sp.Expr) -> sp.Expr:
+    """Return the expected value of a product of states before a step and noises of this step, which are independent."""
+    moments = {
+        (2, 0, 0, 0, 0): P11,
+        (1, 1, 0, 0, 0): P12,
+        (0, 2, 0, 0, 0): P22,
+        (1, 0, 1, 0, 0): P31,
+        (0, 1, 1, 0, 0): P32,
+        (0, 0, 2, 0, 0): P33,
+        (0, 0, 0, 2, 0): P11N - PHI11**2 * P11,
+        (0, 0, 0, 1, 1): P12N - PHI11 * (P12 + PHI21 * P11),
+        (0, 0, 0, 0, 2): P22N - P22 - 2 * PHI21 * P12 - PHI21**2 * P11,
+    }
+    polynomial = sp.Poly(sp.expand(expression), X1, X2, X3, Q1, Q2)
+    return sp.expand(sum(c * moments.get(powers, 0) for powers, c in polynomial.terms()))
+
+
+def after() -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return the states after a step, (10)."""
+    x1 = PHI11 * X1 + Q1
+    return x1, X2 + PHI21 * X1 + Q2, X3 + (x1 + X1) * T / 2
+
+
+def printed_18(half: bool) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return P31, P32 and P33 after a step by (18), as printed or with the missing 1/2 in the last term of P32."""
+    weight = sp.Rational(1, 2) if half else sp.Integer(1)
+    quarter = sp.Rational(1, 4)
+    return (
+        PHI11 * P31 + P11N * T / 2 + PHI11 * P11 * T / 2,
+        P32 + PHI21 * P31 + P12N * T / 2 + P12 * T / 2 + weight * PHI21 * P11 * T,
+        P33 + (1 + PHI11) * P31 * T + quarter * P11N * T**2 + (quarter + PHI11 / 2) * P11 * T**2,
+    )
+
+
+def covariances() -> Derivation:
+    """Derive (16)-(18): products of (10), expected values, and the remaining terms."""
+    x1, x2, x3 = after()
+    printed = printed_18(half=True)
+    names = (
+        "(18), $P_{31_n}=E(x_{3n}x_{1n})$",
+        "(18), $P_{32_n}$, with $\\frac12$ in its last term",
+        "(18), $P_{33_n}$",
+    )
+    products = (x3 * x1, x3 * x2, x3**2)
+    return Derivation(
+        tuple(
+            Step(name, expected(product), right) for name, product, right in zip(names, products, printed, strict=True)
+        )
+    )
+
+
+# -- the continuous covariances, (19)-(28) --------------------------------------------------------
+
+
+def p12(t: sp.Expr) -> sp.Expr:
+    """Return P12 of (23) at the time t."""
+    return P * (1 - sp.exp(-OMEGA * t)) / OMEGA
+
+
+def p22(t: sp.Expr) -> sp.Expr:
+    """Return P22 of (23) at the time t."""
+    return 2 * P / OMEGA * (t - (1 - sp.exp(-OMEGA * t)) / OMEGA)
+
+
+def p22_change(printed: bool) -> sp.Expr:
+    r"""Return (25) minus :math:`P_{22_{n-1}}`, t = t_{n-1}; as printed it lacks a factor :math:`1/\omega`."""
+    factor = 1 if printed else 1 / OMEGA
+    return 2 * P / OMEGA * (T - factor * (1 - DECAY) * sp.exp(-OMEGA * TIME))
+
+
+def continuous() -> Derivation:
+    """Derive (19)-(25): the covariance equation in components, and its solution from zero."""
+    a = sp.Matrix([[-OMEGA, 0], [1, 0]])
+    covariance = sp.Matrix([[P11, P12], [P12, P22]])
+    density = sp.Symbol("N_P11")
+    rate = a * covariance + covariance * a.T + sp.Matrix([[density, 0], [0, 0]])
+    return Derivation(
+        (
+            Step("(21), $\\dot P_{11}$", rate[0, 0], -2 * OMEGA * P11 + density),
+            Step("(21), $\\dot P_{12}$", rate[0, 1], P11 - OMEGA * P12),
+            Step("(21), $\\dot P_{22}$", rate[1, 1], 2 * P12),
+            Step("(22) is solved by $P_{12}$ of (23)", sp.Derivative(p12(TIME), TIME) + OMEGA * p12(TIME), P),
+            Step("(22) is solved by $P_{22}$ of (23)", sp.Derivative(p22(TIME), TIME), 2 * p12(TIME)),
+            Step("both start at zero", together(p12(sp.Integer(0)), p22(sp.Integer(0))), sp.Integer(0)),
+            Step(
+                "(25) with the missing $1/\\omega$",
+                together(p22(TIME + T), -p22(TIME)),
+                p22_change(printed=False),
+            ),
+        )
+    )
+
+
+# -- the steady state, (30)-(35) ------------------------------------------------------------------
+
+
+def steady_changes(half: bool = True) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Return ΔP32, ΔP33 and ΔP22 of (32), from (18) and (25) for large n."""
+    p31 = P * T / 2 * (1 + DECAY) / (1 - DECAY)
+    steady = {P11: P, P11N: P, P12: P / OMEGA, P12N: P / OMEGA, P31: p31, PHI11: DECAY, PHI21: (1 - DECAY) / OMEGA}
+    _, second, third = printed_18(half)
+    return (second - P32).subs(steady), (third - P33).subs(steady), 2 * P / OMEGA * T
+
+
+def walk() -> sp.Expr:
+    """Return the square of (35), divided by P T, as a function of μ."""
+    return (1 + sp.exp(-MU)) / (1 - sp.exp(-MU)) - 2 / MU
+
+
+def steady_state() -> Derivation:
+    """Derive (30)-(35), each as printed."""
+    quotient = (1 + DECAY) / (1 - DECAY)
+    phi21 = (1 - DECAY) / OMEGA
+    p31 = P * T / 2 * quotient
+    d32, d33, d22 = steady_changes()
+    last = quotient * T - 2 / OMEGA
+    return Derivation(
+        (
+            Step(
+                "(31) solves (30)",
+                together(DECAY * p31, P * T / 2 * (1 + DECAY)),
+                p31,
+            ),
+            Step("(32), $\\Delta P_{32}$", d32, (phi21 / (1 - DECAY) + 1 / OMEGA) * P * T),
+            Step("(32), $\\Delta P_{33}$", d33, quotient * P * T**2),
+            Step(
+                "(33)",
+                over(together(d33, d22, -2 * d32), T),
+                P * over((1 + DECAY) * T - 2 * phi21, 1 - DECAY),
+            ),
+            Step("(34) with the missing $T$ in its second member", over((1 + DECAY) * T - 2 * phi21, 1 - DECAY), last),
+            Step("(35), squared, in units of $P\\,T$", (last / T).subs(OMEGA, MU / T), walk()),
+            Step("a Langevin function", walk(), sp.coth(MU / 2).rewrite(sp.exp) - 2 / MU),
+        )
+    )
+
+
+def independent() -> Derivation:
+    r"""Derive (35) from the errors of single cycles, without (10)-(34).
+
+    With :math:`R(\tau) = Pe^{-\omega|\tau|}`, the error of one cycle has the variance r_0. Its covariance with the
+    error k cycles later is :math:`r_k = r_1e^{-\omega(k-1)T}`. The variance of the sum therefore grows by
+    :math:`r_0 + 2r_1 + 2r_2 + \dots` per cycle.
+    """
+    s = sp.Symbol("s", positive=True)
+    along = sp.Integral(P * sp.exp(-OMEGA * TAU), (TAU, 0, T))
+    inner = sp.Integral(2 * P * (T - s) * sp.exp(-OMEGA * s), (s, 0, T))
+    r0 = P * (1 + DECAY) * T**2 / 2 + inner.doit() - T * 2 * along.doit()
+    drawn = T * (1 + DECAY) / 2 - (1 - DECAY) / OMEGA
+    r1 = P * drawn**2
+    grow = walk().subs(MU, OMEGA * T)
+    return Derivation(
+        (
+            Step(
+                "$r_0$: variance of the trapezoid, of the integral, and their covariance",
+                together(P * T**2 * (1 + DECAY) / 2, inner, -2 * T * along),
+                r0,
+            ),
+            Step(
+                "$gT$: expected error of the next cycle for a sample of size 1",
+                drawn / T,
+                (1 - DECAY) / 2 * grow,
+            ),
+            Step(
+                "the sum $r_0 + 2r_1/(1-e^{-\\omega T})$ equals (35)",
+                together(r0, over(2 * r1, 1 - DECAY)),
+                P * T**2 * grow,
+            ),
+        )
+    )
+
+
+def transient() -> Derivation:
+    r"""Derive the variance at every n for an input in its steady state, with Langevin's L and :math:`φ = e^{-\mu}`."""
+    pee = N * L - L**2 / 2 * (1 - PHI**N)
+    c = L / 2 * (1 - PHI**N)
+    g = (1 - PHI) * L / 2
+    r = L - (1 - PHI) * L**2 / 2
+    r0, r1 = sp.symbols("r_0 r_1")
+    grown = {r0: r, r1: g**2}
+    k = sp.Symbol("k", integer=True, positive=True)
+    total = N * r0 + 2 * r1 * (N / (1 - PHI) - (1 - PHI**N) / (1 - PHI) ** 2)
+    return Derivation(
+        (
+            Step("$c_n = E(e_nx_{1n})$ in units of $\\sigma_x^2T$: its recursion", PHI * c + g, c.subs(N, N + 1)),
+            Step("$P_{n+1}$ from $P_n$, in units of $\\sigma_x^2T^2$", together(pee, 2 * g * c, r), pee.subs(N, N + 1)),
+            Step("the variance starts at zero", pee.subs(N, 0), sp.Integer(0)),
+            Step(
+                "the same from $n\\,r_0 + 2\\sum_{k<n}(n-k)\\,r_1\\varphi^{k-1}$, summed",
+                total.subs(grown),
+                pee,
+            ),
+            Step(
+                "that sum, by induction over $n$: one more cycle adds $r_0 + 2r_1(1-\\varphi^n)/(1-\\varphi)$",
+                together(total.subs(N, k + 1), -total.subs(N, k)),
+                r0 + 2 * r1 * (1 - PHI**k) / (1 - PHI),
+            ),
+        )
+    )
+
+
+# -- other rules ----------------------------------------------------------------------------------
+
+
+def least() -> Derivation:
+    r"""Derive the least error variance of n + 1 weighted samples that integrate a constant exactly; T = P = 1.
+
+    The samples leave n times the variance of one cycle's integral. The best weights minimize the variance of a sum
+    of samples whose weights, beyond those of the expected integral, add up to n(1 - h). They are proportional to
+    w, for which the covariances :math:`\varphi^{|i-j|}` of the samples give 1 in each row.
+    """
+    i = sp.Symbol("i", integer=True, positive=True)
+    n = sp.Symbol("n", integer=True, positive=True)
+    end, inner = 1 / (1 + PHI), (1 - PHI) / (1 + PHI)
+    phi = sp.exp(-MU)
+    walk_rate, th, s = walk(), (1 - phi) / (1 + phi), sp.Symbol("s", positive=True)
+    h = 2 * th / MU
+    along = sp.Integral(sp.exp(-MU * s), (s, 0, 1))
+    own = sp.Integral(2 * (1 - s) * sp.exp(-MU * s), (s, 0, 1))
+
+    def powers(count: sp.Expr) -> sp.Expr:
+        return PHI * (1 - PHI**count) / (1 - PHI)
+
+    return Derivation(
+        (
+            Step(
+                "row $i$ between the ends: $\\sum_j\\varphi^{|i-j|}w_j$",
+                together(end * PHI**i, inner * powers(i - 1), inner, inner * powers(n - i - 1), end * PHI ** (n - i)),
+                sp.S.One,
+            ),
+            Step("the first row, and the last", together(end, inner * powers(n - 1), end * PHI**n), sp.S.One),
+            Step(
+                "the sum of $w$, with $\\tanh\\frac\\mu2=\\frac{1-\\varphi}{1+\\varphi}$",
+                together(2 * end, (n - 1) * inner),
+                1 + n * inner,
+            ),
+            Step("the integral over a cycle that two samples of size 1 let expect", over(2 * along, 1 + phi), h),
+            Step("the variance of that integral that the samples leave", together(own, -h * along), h * walk_rate),
+            Step("$1-h=L\\tanh\\frac\\mu2$", 1 - h, walk_rate * th),
+            Step(
+                "the least variance",
+                together(n * L * (1 - L * inner), over((n * L * inner) ** 2, 1 + n * inner)),
+                n * L - L**2 + L**2 / (1 + n * inner),
+            ),
+        )
+    )
+
+
+def derivatives() -> Derivation:
+    r"""Derive the two-point rule with two derivatives, and its random walk relative to the trapezoidal rule; T = 1.
+
+    A component with ωT = 2πk is folded to frequency zero; m lags give it a density proportional to :math:`k^{-2m}`
+    for fast sampling.
+    """
+    c, k = sp.symbols("c_0:6"), sp.Symbol("k", integer=True, positive=True)
+    weights = (sp.Rational(1, 2), sp.Rational(1, 10), sp.Rational(1, 120))
+    polynomial = sum(c[d] * TIME**d for d in range(6))
+    slopes = [sp.diff(polynomial, TIME, j) for j in range(3)]
+    rule = [
+        w * (f.subs(TIME, 0) + (-1) ** j * f.subs(TIME, 1))
+        for j, (w, f) in enumerate(zip(weights, slopes, strict=True))
+    ]
+    angle = sp.Symbol("theta", real=True)
+    old, new = (sum(w * (sign * sp.I * angle) ** j for j, w in enumerate(weights)) for sign in (1, -1))
+    kept = 1 - angle**2 / 60
+    steps = [
+        Step("exact for each polynomial of degree 5", sp.Integral(polynomial, (TIME, 0, 1)), together(*rule)),
+        Step("a sample's part in the cycles after and before it, at $\\theta=\\omega T$", together(old, new), kept),
+    ]
+    folded = sp.expand(kept.subs(angle, 2 * sp.pi * k) ** 2)
+    for m, ratio in ((3, sp.Rational(3, 10)), (4, sp.Rational(2, 15)), (5, sp.Rational(3, 25))):
+        split = (term.as_independent(k) for term in sp.Add.make_args(folded))
+        sums = together(*(factor * sp.Sum(power * k ** (-2 * m), (k, 1, sp.oo)) for factor, power in split))
+        steps.append(Step(f"the share of the variance after {m} lags", over(sums, sp.zeta(2 * m)), ratio))
+    return Derivation(tuple(steps))
+
+
+# -- the expansion for small μ, (36)-(39) ---------------------------------------------------------
+
+
+def expansion(terms: int) -> list[sp.Expr]:
+    """Return coefficients of μ⁻¹, 1, μ, … in the walk, with `terms` of them from μ on, by power series of e^{-μ}."""
+    order = terms + 3
+    numerator = [sp.Rational((-1) ** k, sp.factorial(k)) + int(k == 0) for k in range(order)]
+    denominator = [-sp.Rational((-1) ** (k + 1), sp.factorial(k + 1)) for k in range(order)]
+    quotient: list[sp.Expr] = []
+    for k in range(order):
+        quotient.append((numerator[k] - sum(quotient[j] * denominator[k - j] for j in range(k))) / denominator[0])
+    if quotient[0] != 2 or quotient[1] != 0:
+        raise ArithmeticError(f"got {quotient[:2]} for the terms in 1/μ and 1; needed 2 and 0")
+    return quotient[2 : terms + 2]
+
+
+@cache
+def printed_37(cubic: sp.Expr) -> sp.Expr:
+    r"""Return the walk to order μ² from (37) with the numerator :math:`1-\frac12\mu+\frac14\mu^2-c\mu^3`."""
+    numerator = 1 - MU / 2 + MU**2 / 4 - cubic * MU**3
+    denominator = 1 - MU / 2 + MU**2 / 6 - MU**3 / 24
+    return sp.series(2 / MU * (numerator / denominator - 1), MU, 0, 3).removeO()
+
+
+def small_mu() -> Derivation:
+    """Derive (36)-(39), term by term."""
+    cubic = 1 - MU + MU**2 / 2 - MU**3 / 6
+    sigma, f = sp.symbols("sigma_x f_c", positive=True)
+    return Derivation(
+        (
+            Step(
+                "(36): the omitted terms are of higher order",
+                sp.Limit((sp.exp(-MU) - cubic) / MU**3, MU, 0),
+                sp.Integer(0),
+            ),
+            Step(
+                "(37), numerator: the cubic term is $\\frac1{12}\\mu^3$, not $\\frac16\\mu^3$ as printed",
+                together(1, cubic),
+                sp.Mul(2, unevaluated(1 - MU / 2 + MU**2 / 4 - MU**3 / 12), evaluate=False),
+            ),
+            Step("(37), result", sp.Limit(walk() / MU, MU, 0), sp.Rational(1, 6)),
+            Step("the next term", sp.Limit((walk() - MU / 6) / MU**3, MU, 0), sp.Rational(-1, 360)),
+            Step("(38) to (39)", sigma * sp.sqrt(unevaluated(OMEGA / f) / (6 * f)), sp.sqrt(OMEGA / 6) / f * sigma),
+        )
+    )
+
+
+# -- what the misprints would have led to -------------------------------------------------------------
+
+
+@cache
+def misprints() -> dict[str, sp.Expr]:
+    """Return, as a function of μ, the steady-state rate over P T that each misprint would give.
+
+    "(12)" omits P22, for which the print has the square of a mean. "(18)" has the full last term of P32. "(25)" is
+    taken for large n. "(34)" omits T, which is set to 1 s. "(37)" is expanded to μ².
+    """
+    d32, d33, d22 = steady_changes()
+    wrong32 = steady_changes(half=False)[0]
+
+    def rate(expression: sp.Expr) -> sp.Expr:
+        return sp.simplify((expression / (P * T**2)).subs(OMEGA, MU / T))
+
+    return {
+        "(12)": rate(d33 - 2 * d32),
+        "(18)": rate(d33 + d22 - 2 * wrong32),
+        "(25)": rate(d33 + sp.limit(p22_change(printed=True), TIME, sp.oo) - 2 * d32),
+        "(34)": sp.simplify(((1 + DECAY - 2 / OMEGA * (1 - DECAY)) / (1 - DECAY) / T).subs(OMEGA, MU / T)),
+        "(37)": printed_37(sp.Rational(1, 6)),
+    }

@@ -1,0 +1,361 @@
+"""The numerical example of section 11.4: Table 1 in every reading.
+
+The report gives a matrix, three wordlengths and six numbers. It does not state the meaning of a wordlength in "places
+after decimal point", the norm, or which quantities were computed with how many digits. This module computes each number
+in every plausible way, with exact errors, and compares it with the printed one.
+
+Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import exact, inverse_of
+from gpbnb.report.inversion import procedure
+from gpbnb.report.inversion.procedure import NORMS
+
+#: The matrix, as printed.
+MATRIX = (("3.235", "-1.234", "3.256"), ("1.023", "-5.235", "0.921"), ("1.336", "2.120", "-8.235"))
+
+#: The printed numbers of Table 1, places after the decimal point and the two columns of error norms.
+PLACES = (3, 5, 8)
+PRINTED = {"bound": ("3.706e-2", "3.706e-4", "3.706e-7"), "error": ("7.782e-5", "4.530e-7", "4.672e-10")}
+
+Rounder = Callable[[Fraction], Fraction]
+Matrix = NDArray[Any]
+
+# -- what a wordlength may be ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Wordlength:
+    """A reading of "places after decimal point".
+
+    Parameters
+    ----------
+    kind : "t = places", as in the significand .ddd of (1); "t = places + 1", as in d.ddd, or more; "fixed point", every
+        number rounded to that many decimals.
+    rounding : to nearest or chopped.
+
+    Raises
+    ------
+    ValueError : another kind.
+    """
+
+    kind: str
+    rounding: Rounding
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"fixed point|t = places( \+ [1-9])?", self.kind):
+            raise ValueError(f"kind: got {self.kind!r}; needed 't = places', 't = places + 1' or 'fixed point'")
+
+    def format(self, places: int) -> FloatFormat:
+        """Floating-point format; for fixed point, the format with the same unit roundoff for numbers near 1."""
+        more = 1 if self.kind == "fixed point" else int(self.kind.partition("+")[2] or 0)
+        return FloatFormat(10, places + more, self.rounding)
+
+    def rounder(self, places: int) -> Rounder:
+        """Function that rounds one number."""
+        return self.fixed(places) if self.kind == "fixed point" else self.format(places).round
+
+    def fixed(self, places: int) -> Rounder:
+        """Round to a multiple of the last place, half away from zero or towards zero."""
+        unit = Fraction(1, 10**places)
+        half = Fraction(1, 2) if self.rounding is Rounding.NEAREST else 0
+
+        def fix(x: Fraction) -> Fraction:
+            steps = math.floor(abs(x) / unit + half)
+            return unit * (steps if x > 0 else -steps)
+
+        return fix
+
+    def __str__(self) -> str:
+        return f"{self.kind}, {self.rounding.value}"
+
+
+KINDS = ("t = places", "t = places + 1", "fixed point")
+WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KINDS, Rounding.documented()))
+
+# -- ways to invert, with a rounding after each operation -----------------------------------------
+
+
+def eliminate(a: Matrix, fl: Rounder) -> Matrix:
+    """Invert by elimination and back substitution in the order of section 11; pivoting would change nothing here."""
+    n = len(a)
+    rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
+    for k in range(n):
+        for i in range(k + 1, n):
+            m = -fl(rows[i][k] / rows[k][k])
+            rows[i] = [fl(p + fl(m * q)) if j > k else p for j, (p, q) in enumerate(zip(rows[i], rows[k], strict=True))]
+    for k in reversed(range(n)):
+        for c in range(n, 2 * n):
+            x = rows[k][c]
+            for i in range(k + 1, n):
+                x = fl(x - fl(rows[k][i] * rows[i][c]))
+            rows[k][c] = fl(x / rows[k][k])
+    return np.array([row[n:] for row in rows], dtype=object)
+
+
+def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
+    """Invert by Gauss-Jordan: divide each row by its pivot and subtract multiples of it from all others."""
+    n = len(a)
+    rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
+    for k in range(n):
+        pivot = rows[k][k]
+        rows[k] = [fl(p / pivot) for p in rows[k]]
+        for i in range(n):
+            if i != k:
+                m = rows[i][k]
+                rows[i] = [fl(p - fl(m * q)) for p, q in zip(rows[i], rows[k], strict=True)]
+    return np.array([row[n:] for row in rows], dtype=object)
+
+
+def round_once(a: Matrix, fl: Rounder) -> Matrix:
+    """Round each entry of the true inverse: the most accurate inverse in a format."""
+    return each_rounded(inverse_of(a), fl)
+
+
+METHODS: dict[str, Callable[[Matrix, Rounder], Matrix]] = {
+    "elimination": eliminate,
+    "Gauss-Jordan": gauss_jordan,
+    "rounded once": round_once,
+}
+
+
+def each_rounded(a: Matrix, fl: Rounder) -> Matrix:
+    """Round each entry of a matrix."""
+    out = np.empty_like(a)
+    for index in np.ndindex(a.shape):
+        entry: Any = a[index]
+        out[index] = fl(entry)
+    return out
+
+
+# -- readings -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Column:
+    """One reading of a column of Table 1 and its three numbers.
+
+    Parameters
+    ----------
+    column : "bound" or "error".
+    wordlength, detail : the wordlength of the reading, and everything else in words.
+    norm : one of :data:`gpbnb.report.inversion.procedure.NORMS`.
+    relative : whether the values are divided by the norm of the inverse.
+    values : one value for each of :data:`PLACES`.
+    """
+
+    column: str
+    wordlength: Wordlength
+    detail: str
+    norm: str
+    relative: bool
+    values: tuple[float, ...]
+
+    @property
+    def ratios(self) -> tuple[float, ...]:
+        """Ratio of each number to the printed one."""
+        return tuple(v / float(p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
+
+    @property
+    def distance(self) -> float:
+        """Largest factor between a number and the printed one; 1 for equality."""
+        return max(max(r, 1 / r) if r else math.inf for r in self.ratios)
+
+    @property
+    def agreements(self) -> int:
+        """Number of values that agree with the print in all four digits."""
+        return sum(agree(v, p) for v, p in zip(self.values, PRINTED[self.column], strict=True))
+
+    @property
+    def same_digits(self) -> bool:
+        """Whether all values have the same four digits and differ only in their exponents."""
+        return len({f"{v:.3e}".split("e")[0] for v in self.values}) == 1
+
+    @property
+    def decreasing(self) -> bool:
+        """Whether more places give a smaller number."""
+        return all(p > q for p, q in zip(self.values, self.values[1:], strict=False))
+
+
+def agree(value: float | Fraction, printed: str) -> bool:
+    """Whether a value, rounded or chopped to the printed digits, agrees with the printed number."""
+    low, high = interval(printed)
+    return bool(low <= Fraction(value) < high)
+
+
+def chance(printed: str) -> float:
+    """Return the probability that a number with uniformly distributed logarithm agrees with the printed digits."""
+    low, high = interval(printed)
+    return math.log10(high / low)
+
+
+@cache
+def interval(printed: str) -> tuple[Fraction, Fraction]:
+    """Return the interval of the numbers that round or chop to the printed one."""
+    digits, exponent = printed.split("e")
+    unit = Fraction(10) ** (int(exponent) - len(digits.split(".")[1]))
+    return Fraction(printed) - unit / 2, Fraction(printed) + unit
+
+
+def matrix() -> Matrix:
+    """Return the exact matrix of the example."""
+    return exact(np.array(MATRIX))
+
+
+@cache
+def bound_readings() -> tuple[Column, ...]:
+    """Compute every reading of the column "By proposed method".
+
+    The readings combine two wordlengths, rounded or chopped; quantities computed in that wordlength or with a unit
+    roundoff of :math:`10^{-50}`; all :func:`~gpbnb.report.inversion.procedure.readings` of the procedure in every norm;
+    and the absolute bound (96) or the relative bound (97).
+    """
+    result = []
+    for wordlength in WORDLENGTHS[:4]:
+        formats = [wordlength.format(places) for places in PLACES]
+        for source in ("its own digits", "more digits"):
+            computing = formats if source == "its own digits" else [FloatFormat(10, 50)] * 3
+            reductions = [procedure.as_floats(procedure.reduce(fmt.array(MATRIX))) for fmt in computing]
+            all_outcomes = [
+                procedure.evaluate_all(reduction, float(fmt.unit_roundoff), procedure.readings())
+                for reduction, fmt in zip(reductions, formats, strict=True)
+            ]
+            for outcomes in zip(*all_outcomes, strict=True):
+                reading = outcomes[0].reading
+                detail = f"{str(reading).removesuffix(f', {reading.norm}')}, {source}"
+                for relative in (False, True):
+                    values = tuple(float(o.relative_bound if relative else o.bound) for o in outcomes)
+                    result.append(Column("bound", wordlength, detail, reading.norm, relative, values))
+    return tuple(result)
+
+
+@cache
+def error_readings() -> tuple[Column, ...]:
+    """Compute every reading of the column "Actual value".
+
+    The readings combine three wordlengths, rounded or chopped; three ways to invert; the error against the inverse of
+    the given matrix, or of the stored matrix if three digits cannot hold the given one; every norm; and absolute or
+    relative errors.
+    """
+    given = matrix()
+    result = []
+    for wordlength, (method, invert) in product(WORDLENGTHS, METHODS.items()):
+        rounders = [wordlength.rounder(places) for places in PLACES]
+        stored = [each_rounded(given, fl) for fl in rounders]
+        computed = [invert(a, fl) for a, fl in zip(stored, rounders, strict=True)]
+        references = {"given": [given] * 3} | ({"stored": stored} if (stored[0] != given).any() else {})
+        for reference, matrices in references.items():
+            true = [inverse_of(a) for a in matrices]
+            for (name, norm), relative in product(NORMS.items(), (False, True)):
+                values = tuple(
+                    float(norm(x - t)) / (float(norm(t)) if relative else 1)
+                    for x, t in zip(computed, true, strict=True)
+                )
+                detail = f"{method}, against the matrix as {reference}"
+                result.append(Column("error", wordlength, detail, name, relative, values))
+    return tuple(result)
+
+
+def pairs(
+    norm: str = "column sum", relative: bool = False, source: str = "its own digits"
+) -> list[tuple[Column, Column]]:
+    """Pair each reading of the bound with the error of elimination in the same wordlength."""
+    errors = {
+        (one.wordlength, one.norm, one.relative): one
+        for one in error_readings()
+        if one.detail == "elimination, against the matrix as given"
+    }
+    return [
+        (one, errors[one.wordlength, norm, relative])
+        for one in bound_readings()
+        if (one.norm, one.relative) == (norm, relative) and one.detail.endswith(source)
+    ]
+
+
+@dataclass(frozen=True)
+class Search:
+    """Result of a search among readings: agreements in all digits, and the number expected by chance.
+
+    Parameters
+    ----------
+    agreements : count of numbers that agree with the print in each digit, out of `numbers` compared.
+    columns : readings in which all three numbers agree.
+    expected : number of agreements expected by chance, if digits have their usual distribution and every power of
+        ten is right, which overestimates it.
+    closest : the reading with the smallest :attr:`Column.distance`.
+    """
+
+    column: str
+    readings: int
+    numbers: int
+    agreements: int
+    columns: int
+    expected: float
+    closest: Column
+
+
+def search(column: str) -> Search:
+    """Compare every reading of a column, "bound" or "error", with the print."""
+    found = bound_readings() if column == "bound" else error_readings()
+    return Search(
+        column,
+        len(found),
+        len(found) * len(PLACES),
+        sum(one.agreements for one in found),
+        sum(one.agreements == len(PLACES) for one in found),
+        len(found) * sum(chance(printed) for printed in PRINTED[column]),
+        min(found, key=lambda one: one.distance),
+    )
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A sentence of section 11.4 and the number of readings for which it holds."""
+
+    name: str
+    readings: int
+    holds: int
+    exception: str
+
+
+def claims() -> tuple[Claim, ...]:
+    """Test each sentence about Table 1 in every reading.
+
+    Whether a bound is conservative is tested against the error of elimination with the same wordlength and norm, both
+    absolute or both relative.
+    """
+    read, errors = bound_readings(), {}
+    for one in error_readings():
+        if one.detail == "elimination, against the matrix as given":
+            errors[one.wordlength, one.norm, one.relative] = one.values
+
+    def conservative(one: Column) -> bool:
+        actual = errors[one.wordlength, one.norm, one.relative]
+        return all(v >= e for v, e in zip(one.values, actual, strict=True))
+
+    tests: dict[str, Callable[[Column], bool]] = {
+        "the bound decreases with the wordlength": lambda one: one.decreasing,
+        "all bounds have the same digits": lambda one: one.same_digits,
+        "the bounds are above the errors": conservative,
+    }
+    result = []
+    for name, test in tests.items():
+        failing = [one for one in read if not test(one)]
+        exception = f"{failing[0].wordlength}: {failing[0].detail}, {failing[0].norm}" if failing else ""
+        result.append(Claim(name, len(read), len(read) - len(failing), exception))
+    return tuple(result)

@@ -1,0 +1,196 @@
+"""Search for matrices of a given wordlength that have the error printed in Table 1 of section 11.4.
+
+Source: hung1984, ch. II, section 11.4; hung1982, ch. III, section 11.4.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from gpbnb.arithmetic.formats import Rounding
+from gpbnb.arithmetic.rational import inverse_of
+from gpbnb.report.inversion.example import (
+    KINDS,
+    MATRIX,
+    PLACES,
+    PRINTED,
+    Matrix,
+    Wordlength,
+    each_rounded,
+    interval,
+    matrix,
+)
+from gpbnb.report.inversion.procedure import NORMS
+
+
+@dataclass(frozen=True)
+class Possible:
+    """Whether some matrix of a wordlength has a printed error, with one such matrix.
+
+    `reference` is the matrix whose inverse defines the error: "given", or "stored" in the wordlength.
+    """
+
+    wordlength: Wordlength
+    reference: str
+    places: int
+    norm: str
+    relative: bool
+    printed: str
+    witness: Matrix | None
+
+
+#: Norms that are sums of sizes or squares over groups of entries, or the largest such sum.
+SEARCHED = ("column sum", "row sum", "largest entry", "Frobenius")
+
+
+def possible(
+    wordlength: Wordlength,
+    places: int,
+    norm: str,
+    relative: bool = False,
+    printed: str | None = None,
+    reference: str = "given",
+) -> Possible:
+    """Search all matrices X of a wordlength for one whose error has the printed norm.
+
+    It does not matter how X was computed. Only the set of numbers of the wordlength matters, not the rounding.
+
+    Parameters
+    ----------
+    printed : an error norm as text; by default that of Table 1.
+    reference : whose inverse defines the error, the matrix as "given" or as "stored" in the wordlength.
+
+    Raises
+    ------
+    ValueError : `norm` is not one of :data:`SEARCHED`, or `reference` has another value.
+    """
+    if norm not in SEARCHED:
+        raise ValueError(f"norm: got {norm!r}; needed one of {', '.join(SEARCHED)}")
+    if reference not in ("given", "stored"):
+        raise ValueError(f"reference: got {reference!r}; needed 'given' or 'stored'")
+    printed = printed or PRINTED["error"][PLACES.index(places)]
+    true = inverse_of(matrix() if reference == "given" else each_rounded(matrix(), wordlength.rounder(places)))
+    scale = Fraction(float(NORMS[norm](true))) if relative else Fraction(1)
+    low, high = (end * scale for end in interval(printed))
+    square = norm == "Frobenius"
+    if square:
+        low, high = low * low, high * high
+    groups = _groups(norm)
+    entries: dict[tuple[int, ...], Any] = {index: true[index] for index in np.ndindex(true.shape)}
+    candidates = {index: _near(x, wordlength, places, high, square) for index, x in entries.items()}
+    least = [sum(min((size for size, _ in candidates[i]), default=high) for i in group) for group in groups]
+    for g, group in enumerate(groups):
+        others = [least[h] for h in range(len(groups)) if h != g]
+        if any(value >= high for value in others):
+            continue
+        if (chosen := _fit([candidates[i] for i in group], low, high)) is not None:
+            witness = np.empty_like(true)
+            for index in np.ndindex(true.shape):
+                witness[index] = min(candidates[index])[1]
+            for index, value in zip(group, chosen, strict=True):
+                witness[index] = value
+            return Possible(wordlength, reference, places, norm, relative, printed, witness)
+    return Possible(wordlength, reference, places, norm, relative, printed, None)
+
+
+@cache
+def all_possible() -> tuple[Possible, ...]:
+    """Search every wordlength, one more with an additional digit, and every norm.
+
+    Rounding matters only if three digits cannot hold the given matrix.
+    """
+    given = [(Wordlength(kind, Rounding.NEAREST), "given") for kind in (*KINDS, "t = places + 2")]
+    stored = [(Wordlength(KINDS[0], rounding), "stored") for rounding in Rounding.documented()]
+    cases = product((*given, *stored), SEARCHED, (False, True), PLACES)
+    return tuple(possible(w, places, norm, relative, None, r) for (w, r), norm, relative, places in cases)
+
+
+def _groups(norm: str) -> list[list[tuple[int, int]]]:
+    """List the groups of entries whose sizes are summed; the norm is the largest of the sums."""
+    n = range(len(MATRIX))
+    match norm:
+        case "column sum":
+            return [[(i, j) for i in n] for j in n]
+        case "row sum":
+            return [[(i, j) for j in n] for i in n]
+        case "largest entry":
+            return [[(i, j)] for i in n for j in n]
+        case _:
+            return [[(i, j) for i in n for j in n]]
+
+
+def _near(
+    x: Fraction, wordlength: Wordlength, places: int, most: Fraction, square: bool
+) -> list[tuple[Fraction, Fraction]]:
+    """List numbers of the wordlength near x, nearest first, whose distance (or its square) is below `most`."""
+    found = []
+    for step in (1, -1):
+        y = _toward(x, wordlength, places, step)
+        while (size := (y - x) ** 2 if square else abs(y - x)) < most:
+            found.append((size, y))
+            y = _next(y, wordlength, places, step)
+    return sorted(set(found))
+
+
+def _toward(x: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
+    """Return the nearest number of the wordlength on one side of x; the upper side includes x itself."""
+    chopped = Wordlength(wordlength.kind, Rounding.CHOP).rounder(places)(x)
+    if step > 0:
+        return chopped if chopped >= x else _next(chopped, wordlength, places, 1)
+    return chopped if chopped < x else _next(chopped, wordlength, places, -1)
+
+
+@cache
+def _next(y: Fraction, wordlength: Wordlength, places: int, step: int) -> Fraction:
+    """Return the neighbour of a number of the wordlength."""
+    if wordlength.kind == "fixed point":
+        return y + step * Fraction(1, 10**places)
+    if y == 0:
+        raise ValueError(
+            "got zero; needed a nonzero number, because zero has no neighbour when the exponent is unlimited"
+        )
+    fmt = wordlength.format(places)
+    _, _, e = fmt.split(y)
+    unit = Fraction(10) ** (e - fmt.precision)
+    if step * y < 0 and abs(y) == Fraction(10) ** (e - 1):  # towards zero at a power of ten
+        unit /= 10
+    return y + step * unit
+
+
+def _fit(
+    candidates: Sequence[Sequence[tuple[Fraction, Fraction]]], low: Fraction, high: Fraction
+) -> list[Fraction] | None:
+    """Choose one candidate of each list so that the sizes sum to at least `low` and less than `high`, or None."""
+    order = sorted(range(len(candidates)), key=lambda i: len(candidates[i]))
+    if not all(candidates):
+        return None
+    last = candidates[order[-1]]
+    sizes = [size for size, _ in last]
+
+    def choose(depth: int, total: Fraction) -> Iterator[list[Fraction]]:
+        if depth == len(order) - 1:
+            i = bisect_left(sizes, low - total)
+            if i < len(sizes) and total + sizes[i] < high:
+                yield [last[i][1]]
+            return
+        for size, value in candidates[order[depth]]:
+            if total + size >= high:
+                break
+            for rest in choose(depth + 1, total + size):
+                yield [value, *rest]
+
+    chosen = next(choose(0, Fraction(0)), None)
+    if chosen is None:
+        return None
+    values: list[Any] = [None] * len(candidates)
+    for i, value in zip(order, chosen, strict=True):
+        values[i] = value
+    return values

@@ -1,0 +1,470 @@
+"""Experiments: compute inverses in a format, with their true errors and every bound.
+
+True errors are exact rationals, computed by python-flint, so even the smallest violation counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, cached_property, partial
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic import linalg
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.bounded import BoundedError
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
+from gpbnb.bounds import inverse as bounds
+from gpbnb.report.inversion import procedure, theory
+from gpbnb.sweeps import Column, read
+
+# -- one inverse beside its bounds ----------------------------------------------------------------
+
+#: Every reading of the printed procedure in the norm of the report.
+PRINTED = tuple(reading for reading in procedure.readings() if reading.norm == "column sum")
+
+#: Other bounds, which are valid; see :func:`trial`.
+BETTER = (
+    "corrected",
+    "strict",
+    "Wilkinson",
+    "Higham",
+    "probabilistic",
+    "rule of thumb",
+    "ball",
+    "preconditioned ball",
+    "a posteriori",
+)
+
+
+#: Bounds that may not exist.
+MAY_BE_ABSENT = BETTER[1:]
+
+
+@dataclass(frozen=True)
+class Trial(BoundedError):
+    r"""One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
+
+    `bounds` omits bounds that do not exist for this inverse. `condition` is :math:`\|A\|\|A^{-1}\|`.
+    """
+
+    family: str
+    matrix: FloatArray
+    computed: FloatArray
+    pivot: bool
+    condition: float
+    error: Fraction
+    bounds: Mapping[str, float]
+
+    @property
+    def n(self) -> int:
+        """Rows of the matrix."""
+        return len(self.matrix)
+
+    @property
+    def regular(self) -> bool:
+        """Whether the condition number is at most :data:`REGULAR` over β, which leaves at least two correct digits."""
+        return self.condition * float(self.matrix.format.unit_roundoff) <= REGULAR
+
+
+def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None, family: str = "") -> Trial:
+    """Invert a matrix and evaluate bounds on the error of its inverse.
+
+    Parameters
+    ----------
+    a : (n, n).
+    names : names of bounds from :data:`PRINTED`, as text, and :data:`BETTER`; all by default.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError : the matrix is singular, or elimination in the format finds it singular.
+    """
+    inverse = true_inverse(a)
+    wanted = ALL_BOUNDS if names is None else tuple(names)
+    computing = _Computing(a, pivot)
+    evaluated = {}
+    for name in wanted:
+        try:
+            evaluated[name] = float(_BOUNDS[name](computing))
+        except ValueError:  # the bound does not exist here
+            if name not in MAY_BE_ABSENT:
+                raise
+    error = bounds.true_error(computing.x, inverse)
+    condition = float(column_sum_norm(rationals(a))) * float(column_sum_norm(inverse))
+    return Trial(family, a, computing.x, pivot, condition, error, evaluated)
+
+
+class _Computing:
+    """A matrix, its inverse and intermediate results, each computed once when it is needed."""
+
+    def __init__(self, a: FloatArray, pivot: bool) -> None:
+        self.a, self.pivot = a, pivot
+        self.x = linalg.inv(a, pivot)
+        self.beta = float(a.format.unit_roundoff)
+
+    @cached_property
+    def reduction(self) -> theory.Reduction:
+        return procedure.as_floats(procedure.reduce(self.a, self.pivot))
+
+    @cached_property
+    def factors(self) -> linalg.LU:
+        return linalg.lu(self.a, self.pivot)
+
+    @cached_property
+    def printed(self) -> dict[str, float]:
+        """The bound in every reading of the printed procedure."""
+        outcomes = procedure.evaluate_all(self.reduction, self.beta, PRINTED)
+        return {str(one.reading): float(one.bound) for one in outcomes}
+
+
+def _printed(name: str, c: _Computing) -> float:
+    return c.printed[name]
+
+
+_BOUNDS: dict[str, Callable[[_Computing], Any]] = {str(r): partial(_printed, str(r)) for r in PRINTED}
+_BOUNDS |= {
+    "corrected": lambda c: theory.bound(c.reduction, c.beta),
+    "strict": lambda c: theory.strict_bound(c.reduction, c.beta),
+    "Wilkinson": lambda c: bounds.wilkinson(c.factors, c.x),
+    "Higham": lambda c: bounds.higham(c.factors, c.x),
+    "probabilistic": lambda c: bounds.higham_probabilistic(c.factors, c.x),
+    "rule of thumb": lambda c: bounds.rule_of_thumb(c.factors, c.x),
+    "ball": lambda c: bounds.ball(c.a, c.x),
+    "preconditioned ball": lambda c: bounds.ball(c.a, c.x, preconditioned=True),
+    "a posteriori": lambda c: bounds.a_posteriori(c.a, c.x),
+}
+ALL_BOUNDS = tuple(_BOUNDS)
+
+
+# -- matrices -------------------------------------------------------------------------------------
+
+
+def _uniform(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Draw entries from -1 to 1 in steps of 2**-30, which are the same on every machine."""
+    return np.asarray(rng.integers(-(2**30), 2**30, (n, n)).astype(object) * Fraction(1, 2**30))
+
+
+def _graded(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    rows, columns = (Fraction(10) ** -rng.permutation(n).astype(object) for _ in range(2))
+    return rows[:, np.newaxis] * _uniform(n, rng) * columns
+
+
+def _symmetric(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    a = _uniform(n, rng)
+    return a + a.T
+
+
+def _nearly_singular(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    return conditioned(n, 3, rng)
+
+
+def conditioned(n: int, digits: float, rng: np.random.Generator) -> NDArray[Any]:
+    """Draw a nearly singular matrix: the last row is the sum of the others plus a part of size 10**-digits."""
+    a = _uniform(n, rng)
+    a[-1] = a[:-1].sum(axis=0) + a[-1] * Fraction(10.0**-digits)
+    return a
+
+
+def _hilbert(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    return _table(n, lambda i, j: Fraction(1, i + j + 1))
+
+
+def _wilkinson(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Return a randomly scaled Wilkinson matrix, whose last column doubles in each step of pivoted elimination."""
+    a = _table(n, lambda i, j: Fraction(1) if i == j or j == n - 1 else Fraction(-1 if i > j else 0))
+    scale = 1 + _uniform(n, rng)[0] / 1000
+    return a * scale
+
+
+def _frank(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    return _table(n, lambda i, j: Fraction(n - max(i, j)) if j >= i - 1 else Fraction(0))
+
+
+def _kahan(n: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Return Kahan's upper triangular matrix: row i is s**i times (1, -c, -c, …), with s = 4/5 and c = 3/5."""
+    s, c = Fraction(4, 5), Fraction(3, 5)
+    return _table(n, lambda i, j: s**i * (1 if i == j else -c if j > i else 0))
+
+
+def _table(n: int, entry: Callable[[int, int], Fraction]) -> NDArray[Any]:
+    return np.array([[entry(i, j) for j in range(n)] for i in range(n)], dtype=object)
+
+
+FAMILIES: dict[str, Callable[[int, np.random.Generator], NDArray[Any]]] = {
+    "random": _uniform,
+    "graded": _graded,
+    "symmetric": _symmetric,
+    "nearly singular": _nearly_singular,
+    "Hilbert": _hilbert,
+    "Wilkinson": _wilkinson,
+    "Frank": _frank,
+    "Kahan": _kahan,
+}
+
+#: Families whose matrices are the same at every draw.
+FIXED = ("Hilbert", "Frank", "Kahan")
+
+
+# -- sweeps ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An independent part of a sweep, with its own seed.
+
+    `sizes` are the numbers of rows, each drawn `repeats` times, or once if every draw gives the same matrix.
+    """
+
+    family: str
+    fmt: FloatFormat
+    pivot: bool
+    sizes: tuple[int, ...]
+    repeats: int
+    seed: tuple[int, ...]
+
+    def trials(self, names: Iterable[str] | None = None) -> Iterator[Trial | None]:
+        """Yield the trials one after the other; None if the matrix is singular in the format."""
+        rng = np.random.default_rng(self.seed)
+        for n in self.sizes:
+            for _ in range(1 if self.family in FIXED else self.repeats):
+                a = self.fmt.array(FAMILIES[self.family](n, rng))
+                try:
+                    yield trial(a, self.pivot, names, self.family)
+                except np.linalg.LinAlgError:
+                    yield None
+
+    @property
+    def count(self) -> int:
+        """Return the number of trials."""
+        return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
+
+
+def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
+    """Invert random matrices of growing size with pivoting, and evaluate :data:`BETTER`."""
+    return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
+
+
+def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np.random.Generator) -> list[Trial]:
+    """Invert matrices of one size that approach a singular one, by :func:`conditioned`, and evaluate :data:`BETTER`.
+
+    Matrices that are singular in the format are omitted.
+    """
+    trials = []
+    for d in digits:
+        with suppress(np.linalg.LinAlgError):
+            trials.append(trial(fmt.array(conditioned(n, d, rng)), True, BETTER, "nearly singular"))
+    return trials
+
+
+SEED = 1984
+
+#: The formats of the sweep over all readings and families, and of the sweep over random matrices.
+VARIANT_FORMATS = (FloatFormat(10, 4), FloatFormat(10, 9), FloatFormat(2, 24), FloatFormat(10, 4, Rounding.CHOP))
+RANDOM_FORMATS = (
+    FloatFormat(2, 11),
+    FloatFormat(2, 24),
+    FloatFormat(2, 24, Rounding.CHOP),
+    FloatFormat(10, 8),
+    FloatFormat(16, 6, Rounding.CHOP),
+)
+
+#: Number of random inversions for each size and format.
+RANDOM_SIZES = {n: 3000 if n <= 6 else 1010 if n <= 10 else 100 for n in range(2, 21)}
+
+
+def variant_cells() -> list[Cell]:
+    """Return the cells of the sweep over all families of matrices, n = 2 ... 20, with and without pivoting."""
+    cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
+    sizes = tuple(range(2, 21))
+    return [Cell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
+
+
+def random_cells() -> list[Cell]:
+    """Return the cells of the sweep over a hundred thousand random matrices, with pivoting."""
+    cases = product(RANDOM_FORMATS, RANDOM_SIZES.items())
+    return [Cell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
+
+
+#: Cells and bounds of each sweep whose results are kept in the package.
+SWEEPS: dict[str, tuple[Callable[[], list[Cell]], tuple[str, ...]]] = {
+    "variants": (variant_cells, ALL_BOUNDS),
+    "random": (random_cells, BETTER[2:]),
+}
+
+_FIELDS = ("family", "format", "pivot", "n", "bound")
+_COUNTS = ("trials", "failed", "exact", "absent", "violations", "regular", "violations_regular", "tight")
+_RATIOS = ("smallest", "smallest_regular", "median", "largest")
+
+#: Columns of the stored sweeps; a ratio is empty if no inverse had an error.
+COLUMNS = (
+    *(Column(name, "text") for name in _FIELDS),
+    *(Column(name, "integer", 0) for name in _COUNTS),
+    *(Column(name, low=0, optional=True) for name in _RATIOS),
+)
+
+#: A bound is tight if it is at most this many times the error.
+TIGHT = 1.1
+
+#: Largest condition number times unit roundoff at which first-order analysis can be expected to hold.
+REGULAR = 0.01
+
+
+class Sample:
+    """Statistics of trials: how often each bound was absent or violated, and its ratios to the error.
+
+    `failed` counts matrices that are singular in the format. `exact` counts inverses without error, which have no
+    ratio. `regular` counts matrices whose condition number is at most :data:`REGULAR` over β.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self.trials = self.failed = self.exact = self.regular = 0
+        self.present = dict.fromkeys(names, 0)
+        self.violations = dict.fromkeys(names, 0)
+        self.violations_regular = dict.fromkeys(names, 0)
+        self.ratios: dict[str, list[float]] = {name: [] for name in names}
+        self.ratios_regular: dict[str, list[float]] = {name: [] for name in names}
+
+    def add(self, one: Trial | None) -> None:
+        """Count a trial; None for a matrix that is singular in the format."""
+        if one is None:
+            self.failed += 1
+            return
+        regular = one.regular
+        self.trials += 1
+        self.exact += not one.error
+        self.regular += regular
+        for name in one.bounds:
+            self.present[name] += 1
+            self.violations[name] += one.violates(name)
+            self.violations_regular[name] += regular and one.violates(name)
+            if one.error:
+                self.ratios[name].append(one.overestimation(name))
+                if regular:
+                    self.ratios_regular[name].append(one.overestimation(name))
+
+    def merge(self, other: Sample) -> None:
+        """Count the trials of another sample."""
+        for name in ("trials", "failed", "exact", "regular"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        for counts in ("present", "violations", "violations_regular", "ratios", "ratios_regular"):
+            mine = getattr(self, counts)
+            for name, count in getattr(other, counts).items():
+                mine[name] = mine[name] + count
+
+    def rows(self, *where: str) -> list[dict[str, str]]:
+        """Return one row of text for each bound, with four digits of every ratio."""
+        result = []
+        for name, ratios in self.ratios.items():
+            counts = (
+                self.trials,
+                self.failed,
+                self.exact,
+                self.trials - self.present[name],
+                self.violations[name],
+                self.regular,
+                self.violations_regular[name],
+                sum(r <= TIGHT for r in ratios),
+            )
+            pairs = ((np.min, ratios), (np.min, self.ratios_regular[name]), (np.median, ratios), (np.max, ratios))
+            of = [f"{f(r):.4g}" if r else "" for f, r in pairs]
+            result.append(
+                dict(zip((*_FIELDS, *_COUNTS, *_RATIOS), (*where, name, *map(str, counts), *of), strict=True))
+            )
+        return result
+
+
+def cell_sample(cell: Cell, names: Sequence[str]) -> Sample:
+    """Compute a cell."""
+    sample = Sample(names)
+    for one in cell.trials(names):
+        sample.add(one)
+    return sample
+
+
+def cell_rows(cell: Cell, sample: Sample) -> list[dict[str, str]]:
+    """Return the rows of one cell of a sweep, as stored."""
+    return sample.rows(*_where(cell).values())
+
+
+def _where(cell: Cell) -> dict[str, str]:
+    """Return the key of the rows of a cell."""
+    sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
+    texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
+    return dict(zip(_FIELDS, texts, strict=False))
+
+
+def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> list[dict[str, str]]:
+    """Return rows for each family, if there are several, and for all families together."""
+    rows, whole, families = [], Sample(names), dict[str, Sample]()
+    for cell, sample in samples:
+        families.setdefault(cell.family, Sample(names)).merge(sample)
+        whole.merge(sample)
+    if len(families) > 1:
+        for family, sample in families.items():
+            rows += sample.rows(family, "all", "all", "all")
+    return rows + whole.rows("all", "all", "all", "all")
+
+
+def sweep_rows(cells: Iterable[Cell], names: Sequence[str]) -> list[dict[str, str]]:
+    """Compute cells and return the rows of each cell, each family, and all families together."""
+    samples = [(cell, cell_sample(cell, names)) for cell in cells]
+    return [row for each in samples for row in cell_rows(*each)] + sum_rows(samples, names)
+
+
+def worst(bound: str, sweep: str = "variants") -> Trial:
+    """Recompute the regular matrix of a stored sweep whose error is largest relative to a bound.
+
+    Parameters
+    ----------
+    bound : a bound of the sweep, as text.
+
+    Raises
+    ------
+    ValueError : the sweep does not have the bound.
+    """
+    rows = [row for row in frozen(sweep).select(bound=bound) if row["format"] != "all" and row["smallest_regular"]]
+    if not rows:
+        raise ValueError(f"got bound {bound!r}; needed one of {', '.join(SWEEPS[sweep][1])}")
+    row = min(rows, key=lambda row: float(row["smallest_regular"]))
+    (cell,) = (cell for cell in SWEEPS[sweep][0]() if all(row[key] == text for key, text in _where(cell).items()))
+    regular = (one for one in cell.trials((bound,)) if one is not None and one.error and one.regular)
+    return min(regular, key=lambda one: one.overestimation(bound))
+
+
+def format_name(fmt: FloatFormat) -> str:
+    """Return base, precision and rounding in one word, as in "10:4:chop"."""
+    return f"{fmt.base}:{fmt.precision}:{fmt.rounding.value}"
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Stored result of a sweep: its provenance and its rows."""
+
+    provenance: Mapping[str, str]
+    rows: tuple[Mapping[str, str], ...]
+
+    def select(self, **where: str) -> list[Mapping[str, str]]:
+        """Return the rows whose fields have these values."""
+        return [row for row in self.rows if all(row[name] == value for name, value in where.items())]
+
+
+@cache
+def frozen(sweep: str) -> Frozen:
+    """Read the stored result of a sweep, "variants" or "random"; ``python -m gpbnb.report.inversion`` recomputes it.
+
+    Raises
+    ------
+    ValueError : there is no such sweep.
+    """
+    if sweep not in SWEEPS:
+        raise ValueError(f"got sweep {sweep!r}; needed one of {', '.join(SWEEPS)}")
+    table = read(Path(__file__).with_name(f"{sweep}.csv"), COLUMNS, f"python -m gpbnb.report.inversion {sweep}")
+    return Frozen(table.provenance, tuple(table.records()))

@@ -1,0 +1,415 @@
+"""Run many filters, models x formats x forms x seeds, on any executor: ``python -m gpbnb.report.kalman.ensembles``.
+
+A few numbers define each trial, so it can run anywhere with the same result. The results are stored next to this file
+in ``ensembles.csv``, and their provenance in ``ensembles.json``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, ProcessPoolExecutor, wait
+from dataclasses import dataclass
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, NamedTuple, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb import sweeps
+from gpbnb.arithmetic.bounds import column_sum
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.report.kalman import report_bounds
+from gpbnb.sweeps import Column
+
+#: The kinds of random models; see :func:`random_model`.
+KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
+
+#: Formats with few and with many digits, in three bases, with both roundings.
+FORMATS = tuple(
+    FloatFormat(base, precision, rounding)
+    for base, precision in ((2, 11), (2, 24), (2, 53), (10, 4), (10, 8), (16, 6))
+    for rounding in Rounding.documented()
+)
+
+#: Number of repetitions of each combination, 34 x 5 x 12 x 5 = 10,200 trials.
+REPEATS = 34
+
+_HERE = Path(__file__).parent
+
+#: The stored sweep.
+FILE = _HERE / "ensembles.csv"
+
+
+class Task(NamedTuple):
+    """One trial: a random model of a kind, and a filter."""
+
+    kind: str
+    fmt: FloatFormat
+    form: Form
+    seed: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Largest error over bound of a trial, over all steps and entries.
+
+    Parameters
+    ----------
+    state, gain, covariance : error / contraction bound; 0 if the bound is infinite.
+    last : error / contraction bound of the state after the last step; 0 if the bound is infinite.
+    bounded : share of the steps at which the contraction bound of the state is finite.
+    printed_covariance, printed_gain, printed_state : error / (105), (108) and (125) of hung1984, ch. II.
+    indefinite : whether a variance or pivot was not positive at some step.
+    """
+
+    task: Task
+    state: float
+    gain: float
+    covariance: float
+    last: float
+    bounded: float
+    printed_covariance: float
+    printed_gain: float
+    printed_state: float
+    indefinite: bool
+
+
+def random_model(rng: np.random.Generator, kind: str) -> tuple[LinearModel, float]:
+    """Draw a random model with 1 to 4 states and 1 or 2 measurements, and the size of its measurements.
+
+    Parameters
+    ----------
+    kind : "stable" has poles anywhere within the unit circle, "oscillating" near the circle; "drifting" has chains of
+        integrators, of which only the closed loop is stable; "one sign" has positive numbers and measurements, so that
+        chopping errors always have the same sign; "far scales" is stable, with units of the states up to eight powers
+        of ten apart and a precise first measurement, so that covariances cancel.
+
+    Raises
+    ------
+    ValueError : another kind.
+    """
+    if kind not in KINDS:
+        raise ValueError(f"got kind {kind!r}; needed one of {', '.join(KINDS)}")
+    n, m = int(rng.integers(1, 5)), int(rng.integers(1, 3))
+    Phi: Any = rng.standard_normal((n, n))
+    H: Any = rng.standard_normal((m, n))
+    if kind == "one sign":
+        Phi, H = np.abs(Phi), np.abs(H)
+    radius = float(np.abs(np.linalg.eigvals(Phi)).max())
+    if kind == "drifting":
+        Phi = np.eye(n) + np.diag(rng.uniform(0.01, 1, n - 1), 1)
+        H[:, 0] += np.sign(H[:, 0])
+    else:
+        Phi *= rng.uniform(0.98, 0.999) / radius if kind == "oscillating" else rng.uniform(0.3, 0.95) / radius
+    q = 10.0 ** rng.uniform(-4, 0, n)
+    r: Any = 10.0 ** rng.uniform(-2, 1, m)
+    P0 = 10.0 ** rng.uniform(-1, 2, n)
+    scale: Any = np.ones(n)
+    if kind == "far scales":
+        scale, r = 10.0 ** rng.integers(-4, 5, n), r * np.array([1e-4, 1.0])[:m]
+    model = LinearModel(
+        Phi=_short(Phi * scale[:, np.newaxis] / scale),
+        H=_short(H / scale),
+        Q=np.diag(_short(q * scale**2)),
+        R=np.diag(_short(r)),
+        x0=_short(rng.standard_normal(n) * scale),
+        P0=np.diag(_short(P0 * scale**2)),
+        name=kind,
+    )
+    return model, float(10.0 ** rng.uniform(0, 2))
+
+
+def _short(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Round to six digits, which are the same on every machine."""
+    return np.array([float(f"{value:.6g}") for value in values.flat]).reshape(values.shape)
+
+
+def trial(task: Task) -> Outcome:
+    """Draw the model and the measurements of a task, run the filter, and compare it with its bounds."""
+    rng = np.random.default_rng([task.seed, KINDS.index(task.kind)])
+    model, size = random_model(rng, task.kind)
+    z = _short(size * rng.standard_normal((task.steps, model.m)))
+    found = emulate_with_bound(
+        model, np.abs(z) if task.kind == "one sign" else z, task.fmt, task.form, range(1, task.steps + 1)
+    )
+    ratios = found.ratios()
+    finite = np.isfinite(found.state).all(axis=1)
+    largest = ratios.max(axis=0, initial=0.0) if len(ratios) else np.zeros(3)
+    history = found.history
+    state, gain, covariance = (float(each) for each in largest)
+    lost = history.indefinite is not None or history.stopped is not None
+    share = float(finite.sum() / task.steps)
+    last = float(ratios[-1, 0]) if len(ratios) == task.steps else 0.0
+    return Outcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
+
+
+def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
+    """Return the largest error / bound for (105) and (108) over all entries and steps, and for (125) over all steps."""
+    history, beta = found.history, float(task.fmt.unit_roundoff)
+    c = len(history.steps)
+    if not c:
+        return 0.0, 0.0, 0.0
+    true, n, m = history.reference, history.model.n, history.model.m
+    x, K, P = (each[:c].astype(np.float64) for each in (true.x, true.K, true.P))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        covariance = np.abs(history.covariance) / (report_bounds.covariance_count(n, m) * beta * np.abs(P))
+        gain = np.abs(history.gain) / (report_bounds.gain_count(n, m) * beta * np.abs(K))
+        return _largest(covariance), _largest(gain), _largest(history.state_norm / _printed_state(found, task, x, K))
+
+
+def _printed_state(
+    found: BoundedHistory, task: Task, x: NDArray[np.float64], K: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Evaluate (125) as printed after each step, with the least B of (122)."""
+    model, beta = found.history.model, float(task.fmt.unit_roundoff)
+    given = model.to_float()
+    bounds, F, u = np.empty(len(x)), 0.0, 0.0
+    for k in range(len(x)):
+        phi, h = given["Phi"][k % len(given["Phi"])], given["H"][k % len(given["H"])]
+        before = phi @ (x[k - 1] if k else given["x0"])
+        loop = phi - K[k] @ (h @ phi)
+        F = max(F, float(column_sum(loop)))
+        # u = K z = x minus F times x of the previous step, (111)
+        u = max(u, float(np.abs(x[k] - before + K[k] @ (h @ before)).max()))
+        first, second = report_bounds.coefficients(k + 1, model.n, model.m)
+        bounds[k] = beta * (first * np.abs(x[k]).max() + second * u * max(1.0, F**k))
+    return bounds
+
+
+def _largest(ratios: NDArray[np.float64]) -> float:
+    """Return the largest of some ratios, where 0/0 is not a violation."""
+    return float(np.nan_to_num(ratios, nan=0.0, posinf=np.inf).max(initial=0.0))
+
+
+# -- sweeps -------------------------------------------------------------------------------------------
+
+
+def tasks(repeats: int, steps: int = 32, first_seed: int = 0) -> tuple[Task, ...]:
+    """List every kind, format and form, `repeats` times."""
+    return tuple(
+        Task(kind, fmt, form, seed, steps)
+        for seed in range(first_seed, first_seed + repeats)
+        for kind in KINDS
+        for fmt in FORMATS
+        for form in Form
+    )
+
+
+def sweep(
+    todo: Sequence[Task], executor: Executor | None = None, batch: int = 25, attempts: int = 10, progress: bool = False
+) -> tuple[Outcome, ...]:
+    """Run all trials on an executor; the results are in the order of the tasks and do not depend on the executor.
+
+    Parameters
+    ----------
+    executor : any executor, such as Dask's ``Client.get_executor()``; by default processes of this machine, or this
+        process for a single batch.
+    batch : number of trials sent at once.
+    attempts : number of times that a batch is sent again if its worker dies.
+
+    Raises
+    ------
+    RuntimeError : workers died more than `attempts` times while running a batch.
+    """
+    if batch < 1 or attempts < 1:
+        raise ValueError(f"got batch = {batch}, attempts = {attempts}; needed both at least 1")
+    batches = [tuple(todo[start : start + batch]) for start in range(0, len(todo), batch)]
+    with tqdm(total=len(todo), desc="trials", unit="trial", disable=not progress) as bar:
+        if executor is None and len(batches) <= 1:
+            return tuple(outcome for each in batches for outcome in _some(each))
+        if executor is None:
+            # A forked process may inherit locks held by threads of this one.
+            with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+                return _gather(batches, pool, attempts, bar)
+        return _gather(batches, executor, attempts, bar)
+
+
+def _gather(batches: Sequence[tuple[Task, ...]], executor: Executor, attempts: int, bar: Any) -> tuple[Outcome, ...]:
+    results: dict[int, tuple[Outcome, ...]] = {}
+    tries = dict.fromkeys(range(len(batches)), 1)
+    pending = {executor.submit(_some, each): number for number, each in enumerate(batches)}
+    while pending:
+        finished = wait(pending, return_when=FIRST_COMPLETED).done
+        for future in finished:
+            number = pending.pop(future)
+            try:
+                results[number] = future.result()
+                bar.update(len(batches[number]))
+            except Exception as error:
+                if not _is_of_the_worker(error):
+                    raise
+                if tries[number] >= attempts:
+                    raise RuntimeError(
+                        f"got {attempts} workers that died under one batch of {len(batches[number])} "
+                        "trials; needed workers that survive; give them more memory, or send smaller "
+                        "batches"
+                    ) from error
+                tries[number] += 1
+                pending[executor.submit(_some, batches[number])] = number
+    return tuple(outcome for number in range(len(batches)) for outcome in results[number])
+
+
+def _is_of_the_worker(error: BaseException) -> bool:
+    """Whether a batch failed because of its worker; Dask's own exceptions are recognized without importing Dask."""
+    if isinstance(error, BrokenExecutor):
+        return False  # the executor accepts no more work
+    return isinstance(error, CancelledError) or type(error).__module__.partition(".")[0] in ("distributed", "dask")
+
+
+def _some(batch: Sequence[Task]) -> tuple[Outcome, ...]:
+    return tuple(trial(task) for task in batch)
+
+
+# -- what was found -----------------------------------------------------------------------------------
+
+
+class Summary(NamedTuple):
+    """Trials of one kind and form, and the largest error over each bound.
+
+    Violations count trials with an error above the bound at any step; an infinite bound is not violated.
+    `steps_bounded` is the mean share of steps at which the contraction bound is finite. `typical` is the geometric mean
+    of error / contraction bound for the state after the last step, over the `compared` trials in which neither is zero.
+    """
+
+    kind: str
+    form: str
+    trials: int
+    steps_bounded: float
+    contraction_violations: int
+    state: float
+    gain: float
+    covariance: float
+    compared: int
+    typical: float
+    violations_105: int
+    worst_105: float
+    violations_108: int
+    worst_108: float
+    violations_125: int
+    worst_125: float
+    indefinite: int
+
+
+def _alone(outcome: Outcome) -> Summary:
+    task, ratios = outcome.task, (outcome.state, outcome.gain, outcome.covariance)
+    compared = outcome.last > 0
+    return Summary(
+        kind=task.kind,
+        form=task.form.name.lower(),
+        trials=1,
+        steps_bounded=outcome.bounded,
+        contraction_violations=int(not all(ratio <= 1 for ratio in ratios)),
+        state=outcome.state,
+        gain=outcome.gain,
+        covariance=outcome.covariance,
+        compared=int(compared),
+        typical=outcome.last if compared else 1.0,
+        violations_105=int(outcome.printed_covariance > 1),
+        worst_105=outcome.printed_covariance,
+        violations_108=int(outcome.printed_gain > 1),
+        worst_108=outcome.printed_gain,
+        violations_125=int(outcome.printed_state > 1),
+        worst_125=outcome.printed_state,
+        indefinite=int(outcome.indefinite),
+    )
+
+
+def merged(parts: Sequence[Summary]) -> tuple[Summary, ...]:
+    """Return one summary for each kind and form, in order of appearance."""
+    groups: dict[tuple[str, str], list[Summary]] = {}
+    for part in parts:
+        groups.setdefault((part.kind, part.form), []).append(part)
+    return tuple(_merged(group) for group in groups.values())
+
+
+def _merged(group: Sequence[Summary]) -> Summary:
+    trials, compared = sum(each.trials for each in group), sum(each.compared for each in group)
+    share = math.fsum(each.trials * each.steps_bounded for each in group) / trials
+    logarithm = math.fsum(each.compared * math.log(each.typical) for each in group) / max(compared, 1)
+    largest = {name: max(getattr(each, name) for each in group) for name in _LARGEST}
+    counts = {name: sum(getattr(each, name) for each in group) for name in _COUNTED}
+    return group[0]._replace(steps_bounded=share, typical=math.exp(logarithm), **largest, **counts)
+
+
+_LARGEST = ("state", "gain", "covariance", "worst_105", "worst_108", "worst_125")
+_COUNTED = (
+    "trials", "contraction_violations", "compared", "violations_105", "violations_108", "violations_125", "indefinite"
+)  # fmt: skip
+
+
+def summaries(outcomes: Sequence[Outcome]) -> tuple[Summary, ...]:
+    """Return one summary for each kind and form, in order of appearance."""
+    return merged([_alone(outcome) for outcome in outcomes])
+
+
+def lines(seed: int, outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+    """Return the rows of ``ensembles.csv`` for the trials of one seed, with six significant digits."""
+    return [
+        (str(seed), *(f"{each:.6g}" if isinstance(each, float) else str(each) for each in summary))
+        for summary in summaries([outcome for outcome in outcomes if outcome.task.seed == seed])
+    ]
+
+
+HEADER = ("seed", *Summary._fields)
+COMMAND = "python -m gpbnb.report.kalman.ensembles"
+
+
+def _column(name: str, kind: type) -> Column:
+    if kind is str:
+        return Column(name, "text")
+    return Column(name, "integer" if kind is int else "number", low=0)
+
+
+#: Columns of ``ensembles.csv``.
+COLUMNS = (Column("seed", "integer", 0), *(_column(*each) for each in get_type_hints(Summary).items()))
+
+
+@cache
+def load(directory: Path = _HERE) -> tuple[Summary, ...]:
+    """Load the sweep that ships with the package, for all seeds together."""
+    body = sweeps.read(directory / "ensembles.csv", COLUMNS, COMMAND).rows
+    types = get_type_hints(Summary).values()
+    return merged([Summary(*(kind(cell) for kind, cell in zip(types, line[1:], strict=True))) for line in body])
+
+
+def provenance(directory: Path = _HERE) -> dict[str, Any]:
+    """Return the provenance of the sweep."""
+    return sweeps.read_record(directory / "ensembles.json", COMMAND)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; returns its exit status."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Survey thousands of random filters.")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="number of trials for each kind, format and form")
+    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="folder for the two files")
+    given = parser.parse_args(arguments)
+    todo, start = tasks(given.repeats), time.perf_counter()
+    outcomes = sweep(todo, progress=True)
+    given.output.mkdir(parents=True, exist_ok=True)
+    rows = [line for seed in range(given.repeats) for line in lines(seed, outcomes)]
+    sweeps.write(given.output / "ensembles.csv", COLUMNS, rows, {"command": COMMAND, **sweeps.machine()})
+    made = {
+        "command": COMMAND,
+        "trials": len(todo),
+        "steps": todo[0].steps,
+        "formats": [str(fmt) for fmt in FORMATS],
+        "seconds": round(time.perf_counter() - start),
+        **sweeps.machine(),
+    }
+    sweeps.write_record(given.output / "ensembles.json", made)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

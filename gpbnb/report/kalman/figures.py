@@ -1,0 +1,77 @@
+"""Figures of the chapter on the Kalman filter: results in, artists out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.bounds.bounded_run import BoundedHistory
+from gpbnb.filters.forms import Form
+from gpbnb.report.display.style import (
+    OBSERVED,
+    OBSERVED_OTHERS,
+    REFUTED,
+    VALID,
+    label,
+    legend,
+    loglog,
+)
+from gpbnb.report.kalman import report_bounds
+from gpbnb.report.kalman.ensembles import Summary
+
+DIGITS = np.linspace(3.5, 23, 50)
+
+
+def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[Line2D]:
+    """Draw bound (125) at the end of a year against the decimal digits, in mas."""
+    betas = [Fraction(0.5 * 10.0 ** (1 - digits)) for digits in DIGITS.tolist()]
+    heights = [report_bounds.gravity_probe_b_bound(beta, report_bounds.EXAMPLE[0], **faults) for beta in betas]
+    return ax.plot(DIGITS, heights, color=REFUTED, **style)
+
+
+def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
+    """Return bound (125) in one format after some steps, in mas, for :func:`lines`."""
+    return [report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), **faults) for k in steps]
+
+
+def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[Artist]:
+    """Draw the error of one state (points) and its contraction bound (line) against the step."""
+    steps, error, bound = found.history.steps, np.abs(found.history.state[:, state]), found.state[:, state]
+    seen = error > 0
+    artists: list[Artist] = [*ax.plot(steps[seen], error[seen], "o", color=OBSERVED, label="observed")]
+    artists += ax.plot(steps, bound, color=VALID, label="contraction bound")
+    middle = 2 * len(steps) // 3
+    places: list[tuple[str, float, str, dict[str, Any]]] = [
+        ("contraction bound", bound[middle], VALID, {"xytext": (-4, 6), "ha": "right"}),
+        ("observed", error[middle], OBSERVED, {"xytext": (8, -6), "ha": "left", "va": "top"}),
+    ]
+    for text, y, colour, where in places:
+        artists.append(ax.annotate(text, (steps[middle], y), color=colour, textcoords="offset points", **where))
+    loglog(ax)
+    label(ax, "step $k$", f"error of {name}")
+    return artists
+
+
+def violations(summaries: Sequence[Summary], ax: Axes) -> list[Artist]:
+    """Draw the share of random filters that violate each bound, with a group of bars for each form."""
+    bounds = (("(105)", "violations_105"), ("(108)", "violations_108"), ("(125)", "violations_125"))
+    forms = list(dict.fromkeys(summary.form for summary in summaries))
+    artists: list[Artist] = []
+    for number, ((name, field), colour) in enumerate(zip(bounds, (OBSERVED, *OBSERVED_OTHERS), strict=False)):
+        shares = []
+        for form in forms:
+            group = [summary for summary in summaries if summary.form == form]
+            shares.append(100 * sum(getattr(each, field) for each in group) / sum(each.trials for each in group))
+        artists += ax.bar(np.arange(len(forms)) + 0.27 * (number - 1), shares, 0.25, color=colour, label=name).patches
+    ax.set_xticks(range(len(forms)), [str(Form[form.upper()]).replace(", ", ",\n") for form in forms])
+    ax.set_ylim(0, 118)
+    legend(ax, ncols=3, loc="upper right")
+    label(ax, "form of the filter", "filters that violate the bound (%)")
+    return artists

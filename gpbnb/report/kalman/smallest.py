@@ -1,0 +1,206 @@
+"""The smallest filters that violate (105), (108) and (125), in exact arithmetic on rounded Fractions.
+
+The code is slow and obvious, shares nothing with the compiled filter of :mod:`gpbnb.filters.run`, and is its
+oracle.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact, max_norm
+from gpbnb.report.kalman import exact_step, report_bounds
+
+
+class Case(NamedTuple):
+    """A filter and its first measurement, exact, as arguments of :func:`gpbnb.report.kalman.exact_step.exact_step`."""
+
+    Phi: NDArray[Any]
+    H: NDArray[Any]
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    x: NDArray[Any]
+    P: NDArray[Any]
+    z: NDArray[Any]
+
+
+class Ratios(NamedTuple):
+    """Largest error / bound over all entries; infinite for an error where the bound is zero."""
+
+    covariance: float
+    gain: float
+    state: float
+
+
+def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
+    """Return a filter with one state and one measurement, with Q = 0 and every other number 1 except R, z and maybe H.
+
+    Parameters
+    ----------
+    fmt : format that determines the default R, b**(-t - 1), which is so small that 1 + R rounds to 1.
+    r, h, z : other values of R, H and z; numbers or strings.
+    """
+    one = exact([[1]])
+    small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else r
+    return Case(one, exact([[h]]), one * 0, exact([[small]]), exact([1]), one, exact([z]))
+
+
+def correlated() -> Case:
+    """Return the smallest filter, with two states, that violates (108) with the first form of (99) in four digits.
+
+    The first entry of the gain is (1.001 · 1.001 - 1.002)/S, which four-digit arithmetic rounds to zero.
+    """
+    one = np.eye(2, dtype=int)
+    P = [["1.001", "-1.002"], ["-1.002", "2"]]
+    return Case(exact(one), exact([["1.001", "1"]]), exact(one * 0), exact([[1]]), exact([0, 0]), exact(P), exact([1]))
+
+
+def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Take one step with each operation rounded, in the order of the report: (100), (99), (101), (109)-(111).
+
+    Parameters
+    ----------
+    fmt : format that rounds each result; the numbers of `case` are not rounded.
+    case : filter with one measurement.
+    second : whether the estimate uses the second form of (99), with the new covariance.
+
+    Returns
+    -------
+    x (n,), K (n, 1), P (n, n), as Fractions.
+
+    Raises
+    ------
+    ValueError : more than one measurement.
+    """
+    Phi, H, Q, R, x, P, z = case
+    if len(H) != 1:
+        raise ValueError(f"got {len(H)} measurements; needed one; process several one after another")
+    fl = np.vectorize(fmt.round, otypes=[object])
+
+    def product(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
+        total = fl(np.multiply.outer(A[:, 0], B[0]))
+        for k in range(1, len(B)):
+            total = fl(total + fl(np.multiply.outer(A[:, k], B[k])))
+        return np.asarray(total)
+
+    predicted = fl(product(product(Phi, P), Phi.T) + Q)
+    PH = product(predicted, H.T)
+    S = fl(product(H, PH) + R)
+    K = product(PH, fl(1 / S))
+    identity = exact(np.eye(len(x), dtype=int))
+    W = fl(identity - product(K, H))
+    P = product(W, predicted)
+    if second:
+        K = product(product(P, H.T), fl(1 / R))
+        W = fl(identity - product(K, H))
+    x = fl(product(product(W, Phi), x[:, None]) + product(K, z[:, None]))
+    return x[:, 0], K, P
+
+
+def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -> Ratios:
+    r"""Compare the errors of the last of `steps` rounded steps with (105), (108) and (125).
+
+    Parameters
+    ----------
+    fmt, case, second : as for :func:`rounded_step`; each step has the same measurement.
+    steps : k. The B of (125) is the least that (122) allows.
+    """
+    rounded, exactly = case, case
+    transitions, inputs = [], []
+    for _ in range(steps):
+        x, K, P = rounded_step(fmt, rounded, second)
+        rounded = rounded._replace(x=x, P=P)
+        true = exact_step.exact_step(*exactly)
+        exactly = exactly._replace(x=true.x, P=true.P)
+        transitions.append(true.transition)
+        inputs.append(true.gain @ case.z)
+    beta, (n, m) = fmt.unit_roundoff, true.gain.shape
+    B = report_bounds.printed_input_bound(transitions, inputs)
+    bound = report_bounds.state_bound(max_norm(true.x), B, beta, report_bounds.coefficients(steps, n, m))
+    return Ratios(
+        _worst(P - true.P, report_bounds.printed_covariance_bound(true.P, m, beta)),
+        _worst(K - true.gain, report_bounds.printed_gain_bound(true.gain, beta)),
+        _worst(exact([max_norm(x - true.x)]), exact([bound])),
+    )
+
+
+class RandomSteps(NamedTuple):
+    """Numbers of first steps of random filters with one state, and of those that violate (105) and (125)."""
+
+    steps: int
+    covariance: int
+    state: int
+
+
+def random_numbers(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> tuple[FloatArray, ...]:
+    """Draw Φ, H, x, z as normal numbers and P, Q, R as squares of such, (steps,) each, rounded to a format."""
+    drawn = rng.standard_normal((7, steps))
+    drawn[4:] **= 2
+    return tuple(fmt.array(row) for row in drawn)
+
+
+def random_steps(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> RandomSteps:
+    """Take one step with each operation rounded, as :func:`rounded_step`, for random filters with one state.
+
+    The exact step is computed in float64, so the format must be much coarser.
+
+    Raises
+    ------
+    ValueError : the unit roundoff is below 2**-30.
+    """
+    if fmt.unit_roundoff < Fraction(1, 2**30):
+        raise ValueError(f"got {fmt}; needed a unit roundoff of at least 2**-30, so that float64 can serve as exact")
+    numbers = random_numbers(fmt, steps, rng)
+    rounded_x, _, rounded_P = scalar_step(fmt.array(np.ones(steps)), *numbers)
+    Phi, H, x, z, P, Q, R = (each.to_float() for each in numbers)
+    predicted = Phi * P * Phi + Q
+    S = H * predicted * H + R
+    gain, P, transition = predicted * H / S, predicted * R / S, R / S * Phi  # without subtractions
+    x, beta = transition * x + gain * z, float(fmt.unit_roundoff)
+    first, second = (float(count) for count in report_bounds.coefficients(1, 1, 1))
+    bound = beta * (first * abs(x) + second * abs(gain * z))
+    allowed = report_bounds.covariance_count(1, 1) * beta * P
+    return RandomSteps(
+        steps,
+        int(np.sum(abs(rounded_P.to_float() - P) > allowed)),
+        int(np.sum(abs(rounded_x.to_float() - x) > bound)),
+    )
+
+
+def scalar_step(one: FloatArray, *numbers: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return x, K and P after one step of filters with one state, in the order of :func:`rounded_step`."""
+    Phi, H, x, z, P, Q, R = numbers
+    predicted = Phi * P * Phi + Q
+    PH = predicted * H
+    K = PH * (one / (H * PH + R))
+    W = one - K * H
+    return W * Phi * x + K * z, K, W * predicted
+
+
+def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:
+    """Find the largest R in :func:`scalar` that violates each bound, among all R of the format above b**-t up to 1.
+
+    Returns
+    -------
+    largest : values by the names of `Ratios`; a bound that no R violates is omitted.
+    """
+    largest: dict[str, Fraction] = {}
+    b, t = fmt.base, fmt.precision
+    for e in range(t + 1):
+        for d in range(b**t - 1, b ** (t - 1) - 1, -1):
+            r = Fraction(d, b ** (t - 1 + e))
+            if r <= 1 and len(largest) < 3:
+                found = ratios(fmt, scalar(fmt, r), second)._asdict()
+                largest |= {name: r for name, ratio in found.items() if ratio > 1 and name not in largest}
+    return largest
+
+
+def _worst(error: NDArray[Any], bound: NDArray[Any]) -> float:
+    pairs = zip(abs(error).flat, bound.flat, strict=True)
+    return max((float(e / b) if b else float("inf") for e, b in pairs if e), default=0.0)

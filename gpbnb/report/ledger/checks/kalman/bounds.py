@@ -1,0 +1,196 @@
+"""Check three steps, four steps and k steps: (119)-(125) and the claims about them."""
+
+from __future__ import annotations
+
+import operator
+from fractions import Fraction
+from typing import Any
+
+import sympy as sp
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact, max_norm
+from gpbnb.report.kalman import derivation, report_bounds, smallest
+from gpbnb.report.ledger.checks.inversion.first_order import FirstOrder
+from gpbnb.report.ledger.checks.kalman import algebra, worst_case
+from gpbnb.report.ledger.checks.kalman.judging import bounded, judge
+from gpbnb.report.ledger.checks.kalman.registry import CHECKS, FOUR
+from gpbnb.report.ledger.checks.kalman.steps import SIGNS
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
+from gpbnb.report.ledger.registry import both
+from gpbnb.report.ledger.statements import Statement, statement
+
+_NO_BOUND = (
+    "the case is one state with $P=H=\\Phi=x_0=1$, $z=0$ and $R$ below the last digit; the estimate "
+    "is then lost completely, in every format"
+)
+_BETA = "; the prefactor is $\\beta$, as in the example, although the scans show B"
+
+
+def _several_steps(printed: Statement, names: dict[str, Any], note: str, otherwise: str = "") -> Finding:
+    instances = (*worst_case.several_steps(), *worst_case.tight_steps())
+    return bounded(printed, instances, names, note, SIGNS, otherwise)
+
+
+@CHECKS.add(*both("eq119"), *both("eq120"))
+def three_steps(printed: Statement) -> Finding:
+    return _several_steps(
+        printed,
+        algebra.three_steps(twice=True),
+        "(114) rests on bounds that fail, and roundings are counted twice; each term of (118) has "
+        "its own error, so the errors do not combine into one multiple of $x_3$",
+        "; $3m+1$ is printed for $3n+1$",
+    )
+
+
+#: States, measurements, x_0 and inputs for (121). In the first two, each term of (120) has the same sign.
+_SCALARS = (
+    (2, 1, (20, -1, -2, -3)),
+    (3, 2, (30, -5, -1, -4)),
+    (1, 1, (2, 3, 5, 7)),
+    (1, 1, (2, -3, 5, -7)),
+    (1, 1, (-3, 1, 1, 1)),
+)
+
+
+def _instances() -> list[dict[str, Any]]:
+    """Return scalars for (121) with closed loops of 1 and inputs of different sign; the last inputs make x_3 zero."""
+    found = []
+    for n, m, numbers in _SCALARS:
+        values = [Fraction(each) for each in numbers]
+        counts = [derivation.count_start(derivation.TWICE[0])] + [
+            derivation.count_input(*derivation.TWICE).subs(derivation.NTH, i) for i in (1, 2, 3)
+        ]
+        at = {derivation.K: 3, derivation.N: n, derivation.M: m}
+        error = sum(int(count.subs(at)) * value for count, value in zip(counts, values, strict=True))
+        found.append(
+            {"n": n, "m": m, "epsilon": 1, "F_3": 1, "F_2": 1, "norm": abs, "x_3": sum(values), "x_tilde_3": error}
+            | {f"u_{i}": values[i] for i in (1, 2, 3)}
+        )
+    return found
+
+
+@CHECKS.add(*both("eq121"))
+def norm_with_minus(printed: Statement) -> Finding:
+    links = [link for names in _instances() for link in printed.links(names, Fraction)]
+    last = links[-1]
+    return compare(
+        all(link.symbol == "<=" and link.left <= link.right for link in links)
+        and all(link.left == link.right for link in links[:2]),
+        f"for $n=m=1$, $F_k=1$, $x_0=-3$ and $u_k=1$, the left side is ${last.left}\\epsilon$ and the "
+        f"right side is ${last.right}\\epsilon$",
+        otherwise_note=(
+            "the sum of the norms bounds the norm of a difference, so (121) must add; (122) has plus signs again"
+        ),
+        root="minus-signs-in-a-norm-bound",
+    )
+
+
+#: Closed loops and inputs: one for which the norms (21) and (22) are not compatible, and one number.
+_LOOPS = (([["9/10", "9/10"], [0, 0]], [1, 1]), ([["3/2"]], [2]))
+
+
+@CHECKS.add(*both("s12.assumptions-before-122"))
+def assumptions(printed: Statement) -> Finding:
+    """Whether the least F, u and B that meet the printed assumptions bound the terms of (122)."""
+    right, terms, least = True, [], []
+    for loop, entered in _LOOPS:
+        F, u = exact(loop), exact(entered)
+        names: dict[str, Any] = {"norm": FirstOrder.norm, "F_k": FirstOrder(F), "u_k": FirstOrder(u[:, None])}
+        of_loop, of_input = (printed.relation(i).links(names, Fraction)[0] for i in (1, 2))
+        norms = {"F": of_loop.left.value, "u": of_input.left.value}
+        of_terms = [printed.relation(3).links(norms | {"i": i}, Fraction)[0] for i in range(3)]
+        bounded_by = zip((of_loop, of_input, *of_terms), ("F", "u", "B", "B", "B"), strict=True)
+        right = right and all(link.symbol == "<=" and link.right == sp.Symbol(name) for link, name in bounded_by)
+        needed, powers = [max_norm(u), max_norm(F @ u), max_norm(F @ F @ u)], [link.left for link in of_terms]
+        right = right and (needed == powers if len(u) == 1 else all(map(operator.le, needed, powers)))
+        terms.append(needed[-1])
+        least.append(max(powers))
+    return compare(
+        right,
+        "for two steps with the closed loop $F=(0.9,0.9;0,0)$ and $u=(1,1)$, "
+        f"$\\|FFu\\|={float(terms[0])}$; the smallest $B$ is {float(least[0])}",
+        otherwise_note="the norms (21) and (22) are not compatible: $\\|Fu\\|\\le\\|F\\|\\|u\\|$ needs row sums",
+        root="incompatible-norms",
+    )
+
+
+@CHECKS.add(*both("eq122"), *both("eq124"), *both("eq125"))
+def norm_bounds(printed: Statement) -> Finding:
+    return _several_steps(printed, algebra.norms(), _NO_BOUND + _BETA)
+
+
+@CHECKS.add(*both("s12.claim-main-result"))
+def claim_of_a_bound(printed: Statement) -> Finding:
+    found = judge(statement("hung1984.II.eq125"), (*worst_case.several_steps(), *worst_case.tight_steps()))
+    return compare(
+        printed.claims("equation (125)", {"gives the bound": found.right, "does not give a bound": not found.right}),
+        f"in four digits, the error of an example filter is {found.times:.3g} times what (125) allows",
+        otherwise_note=_NO_BOUND,
+        root=SIGNS,
+    )
+
+
+@CHECKS.add(*both("s12.125-found-from-pattern"))
+def pattern(printed: Statement) -> Finding:
+    found = algebra.holds(statement("hung1984.II.eq125"), algebra.norms())
+    return compare(
+        printed.claims("the general case", {"follows the pattern": found, "departs from the pattern": not found}),
+        "summation gives the coefficients of (125) for every $k$, $n$, $m$",
+        note="(125) continues the pattern of the preceding bounds correctly, but these bounds are wrong",
+    )
+
+
+@CHECKS.add(*both("s12.claim-similar-derivation"))
+def similar_derivation(printed: Statement) -> Finding:
+    found = algebra.holds(statement("hung1984.II.eq124"), algebra.norms())
+    return compare(
+        printed.claims("the same derivation", {"gives (124)": found, "does not give (124)": not found}),
+        "the coefficients of (124) follow by the same sums for $k=4$",
+        note="the derivation starts from bounds that fail",
+    )
+
+
+@CHECKS.add(*both("s12.125-dependence"))
+def dependence(printed: Statement) -> Finding:
+    def value(
+        k: int = 3, n: int = 2, m: int = 1, x: int = 1, B: int = 1, beta: Fraction = FOUR.unit_roundoff
+    ) -> Fraction:
+        return report_bounds.state_bound(Fraction(x), Fraction(B), beta, report_bounds.coefficients(k, n, m))
+
+    others = [value(k=4), value(n=3), value(m=2), value(x=2), value(B=2), value(beta=FOUR.unit_roundoff * 2)]
+    grows = all(other > value() for other in others)
+    return compare(
+        printed.claims("the bound", {"depends on all six": grows, "is independent of some of the six": not grows}),
+        f"the bound grows with each of the {len(others)}",
+        note="the error also depends on how far $I-KH$ cancels, which none of the six quantities shows",
+    )
+
+
+@CHECKS.add("hung1984.II.s12.word-interactions")
+def word(printed: Statement) -> Finding:
+    return compare(
+        printed.claims("k counts", {"interactions": False, "iterations": True}),
+        "$k$ counts the iterations of the filter",
+        Verdict.MISPRINT,
+        otherwise_note="the text means iterations, with a period of ten seconds",
+    )
+
+
+@CHECKS.add(*both("s12.claim-usefulness"))
+def usefulness(printed: Statement) -> Finding:
+    seventeen = FloatFormat(10, int(statement("hung1984.II.s12.example-17-digits").number("t").value))
+    times = smallest.ratios(seventeen, smallest.scalar(seventeen)).state
+    useful = times <= 1
+    return compare(
+        printed.claims(
+            "equation (125)",
+            {"gives a general idea of the digits": useful, "gives no idea of the digits": not useful},
+        ),
+        (
+            f"with 17 digits, the error of a filter with one state is {times:.2g} times what (125) allows "
+            "in the first step"
+        ),
+        otherwise_note="the number of digits that a formula requires is useful only if the formula is a bound",
+        root=SIGNS,
+    )

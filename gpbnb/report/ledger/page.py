@@ -1,0 +1,394 @@
+"""The evidence pages of the book: the ledger page by page, short tables of errors, root errors, and counts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from gpbnb.report.display.tables import Table
+from gpbnb.report.ledger.checking import Row, counts, in_reading_order
+from gpbnb.report.ledger.checks import TOPICS
+from gpbnb.report.ledger.corrections import load_corrections
+from gpbnb.report.ledger.finding import DISAGREEMENTS, Finding, Verdict
+from gpbnb.report.ledger.html import CHAPTERS, Html, badge, chapter_link, typeset
+from gpbnb.report.ledger.legibility import load_legibility
+from gpbnb.report.ledger.render import describe, outcome_name, section_name
+from gpbnb.report.ledger.roots import by_root, load_roots
+from gpbnb.report.ledger.statements import Statement
+
+
+@dataclass(frozen=True)
+class LedgerPage:
+    """A page of the book with a part of the ledger.
+
+    Parameters
+    ----------
+    name : file name of the page, without its ending.
+    title : title of the page.
+    document : short name of the document.
+    sections : regular expression of the chapter and section, as in ``II.11.2``, of the statements on the page.
+    """
+
+    name: str
+    title: str
+    document: str
+    sections: str
+
+    def holds(self, statement: Statement) -> bool:
+        """Whether a statement is on this page."""
+        place = section_name(statement.chapter, statement.section)
+        return statement.document == self.document and re.fullmatch(self.sections, place) is not None
+
+
+PAGES = (
+    LedgerPage(
+        "ledger-1984-1",
+        "Ledger: report of 1984, rounding and inversion in general",
+        "hung1984",
+        r"title|I|II\.([1-9]|9\..*|10)",
+    ),
+    LedgerPage("ledger-1984-2", "Ledger: report of 1984, inversion by elimination", "hung1984", r"II\.11.*"),
+    LedgerPage("ledger-1984-3", "Ledger: report of 1984, Kalman filter", "hung1984", r"II\.1[234]"),
+    LedgerPage("ledger-1984-4", "Ledger: report of 1984, roll and deroll", "hung1984", r"III.*"),
+    LedgerPage(
+        "ledger-1982-1", "Ledger: report of 1982, budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"
+    ),
+    LedgerPage("ledger-1982-2", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11.*"),
+    LedgerPage("ledger-1982-3", "Ledger: report of 1982, Kalman filter and geometry", "hung1982", r"III\.1[23]|IV"),
+    LedgerPage("ledger-2016", "Ledger: note of 2016, digital integration", "savage2016", r".*"),
+)
+"""The pages of the complete ledger; each statement is on exactly one of them."""
+
+CLAIMS = {
+    "hung1984.II.eq8": "Unit roundoff of rounding",
+    "hung1984.II.eq18": "Rounding error of a sum",
+    "hung1984.II.eq26": "Rounding error of an inner product",
+    "hung1984.II.eq31": "Rounding error of a product of matrices",
+    "hung1984.II.s10.practicality-of-44": "The residual bound of an inverse is impractical",
+    "hung1984.II.eq91": "Errors of elimination and back substitution add up",
+    "hung1984.II.s11-4.table-1-proposed-3-places": "Table 1: bounds of an inverse",
+    "hung1984.II.eq105": "Rounding error of one covariance update",
+    "hung1984.II.eq125": "Rounding error of the Kalman filter after k steps",
+    "hung1984.II.s12.example-9-digits": "Digits needed for a year of Gravity Probe B: 9",
+    "hung1984.II.s12.example-17-digits": "Digits needed for a year of Gravity Probe B: 17",
+    "hung1982.IV.eq8": "Deroll of the first drift",
+    "hung1982.IV.eq9": "Deroll of the second drift",
+    "savage2016.main.eq35": "Random walk of a trapezoidal integrator",
+    "savage2016.main.eq39": "Random walk for fast sampling",
+}
+"""The principal claims of the documents, by statement id."""
+
+_REPLICATION = {
+    Verdict.VERIFIED: "replicated",
+    Verdict.MISPRINT: "replicated after correcting a misprint",
+    Verdict.OCR: "replicated after correcting the scan",
+    Verdict.INCONSISTENT: "corrected",
+    Verdict.WRONG: "refuted",
+    Verdict.NOT_REPRODUCED: "not reproducible",
+    Verdict.UNVERIFIABLE: "not reproducible",
+}
+
+
+_SHOWN = {Verdict.VERIFIED.value: 1, Verdict.GIVEN.value: 1, Verdict.MISPRINT.value: 2}
+"""How many texts of its evidence a verdict shows; others are collapsed, as most readers look for other verdicts."""
+
+
+def topics() -> dict[str, str]:
+    """Name the topic that checks each statement, as in ``{"hung1984.II.eq20": "rounding"}``."""
+    return {key: topic for topic, checks in TOPICS.items() for key in checks}
+
+
+def address(statement: Statement) -> str:
+    """Return the link to a statement in the complete ledger."""
+    page = next(page for page in PAGES if page.holds(statement))
+    return f"{page.name}.html#{escape(statement.id)}"
+
+
+def select_topic(rows: Iterable[Row], topic: str, *verdicts: Verdict) -> tuple[Row, ...]:
+    """Pick the rows that a topic checks, with some verdicts; with all verdicts by default.
+
+    Raises
+    ------
+    ValueError : no such topic.
+    """
+    if topic not in TOPICS:
+        raise ValueError(f"got topic {topic!r}; needed one of {', '.join(TOPICS)}")
+    return tuple(
+        row
+        for row in rows
+        if row.statement.id in TOPICS[topic] and (not verdicts or (row.finding and row.finding.verdict in verdicts))
+    )
+
+
+def count_table(rows: Iterable[Row], by: str) -> Table:
+    """Count `rows` in a table with a row per document, chapter of this book or kind, and a column per verdict.
+
+    Parameters
+    ----------
+    rows : the rows to count.
+    by : ``document``, ``chapter`` (of this book) or ``kind``.
+
+    Raises
+    ------
+    ValueError : `by` has another value.
+    """
+    rows = in_reading_order(rows)
+    owner = topics()
+    groups: dict[str, Callable[[Row], str]] = {
+        "document": lambda row: row.statement.document,
+        "chapter": lambda row: CHAPTERS.get(owner.get(row.statement.id, ""), "-"),
+        "kind": lambda row: row.statement.kind,
+    }
+    if by not in groups:
+        raise ValueError(f"got by={by!r}; needed one of {', '.join(groups)}")
+    total = counts(rows)
+    inside: dict[str, list[Row]] = {}
+    for row in rows:
+        inside.setdefault(groups[by](row), []).append(row)
+    body = [
+        (name, *(str(counts(some).get(outcome, 0)) for outcome in total), str(len(some)))
+        for name, some in inside.items()
+    ]
+    body.append(("all", *map(str, total.values()), str(len(rows))))
+    header = (by.capitalize(), *map(outcome_name, total), "statements")
+    return Table(f"Counts of {len(rows)} statements by {by}", header, tuple(body))
+
+
+def ledger_page(rows: Iterable[Row], page: LedgerPage) -> Html:
+    """Lay out one page of the complete ledger: a form with filters, and a row per statement.
+
+    The form is hidden until the page's script, ``ledger.js``, shows it and responds to it.
+    """
+    rows = in_reading_order(row for row in rows if page.holds(row.statement))
+    owner = topics()
+    lines = [_entry(row, owner) for row in rows]
+    caption = f"<caption>{escape(page.document)}: {len(rows)} statements</caption>\n"
+    table = _table(("Statement", "Verdict", "Evidence"), lines, caption)
+    html = f'<div class="ledger">\n{_form(rows, owner)}\n{table}</div>'
+    return Html(f"Ledger of {len(rows)} statements: {describe(counts(rows)) or 'none'}", html)
+
+
+def error_table(rows: Iterable[Row]) -> Html:
+    """Tabulate the errors behind the statements that disagree, the most serious first, with the statements affected.
+
+    Statements with the same root error share a row, in which their notes are collapsed; so do those with the same note.
+    """
+    found = [row for row in in_reading_order(rows) if row.finding and row.finding.verdict in DISAGREEMENTS]
+    groups: dict[str, list[Row]] = {}
+    for row in found:
+        groups.setdefault((row.finding and (row.finding.root or row.finding.note)) or row.statement.id, []).append(row)
+    ordered = sorted(groups.values(), key=lambda group: (_seriousness(group[0]), -len(group)))
+    header = ("Error", "Verdict", "Statements affected")
+    table = _wrapped(header, [_error(group) for group in ordered], "ledger-errors")
+    return Html(f"{len(found)} statements that disagree", table)
+
+
+def printed_table(rows: Iterable[Row], title: str) -> Html:
+    """Show statements as printed, collapsed under a title."""
+    lines = [
+        f'<tr><th scope="row">{_link(row)}</th><td>{typeset(row.statement.printed)}</td></tr>'
+        for row in in_reading_order(rows)
+    ]
+    table = _wrapped(("Statement", "As printed"), lines, "ledger-printed")
+    return Html(title, f'<details class="derivation"><summary>{escape(title)}</summary>\n{table}</details>')
+
+
+def note_table(rows: Iterable[Row], left_undone: bool = False) -> Html:
+    """Tabulate some rows in reading order: place, verdict, note, and the printed text collapsed.
+
+    Parameters
+    ----------
+    rows : which.
+    left_undone : show all texts, labelled as what the documents leave undone and what is answered here.
+    """
+    rows = in_reading_order(rows)
+    owner = topics()
+    lines = [
+        f'<tr><th scope="row">{_link(row)}{_chapter(row, owner)}</th><td>{badge(row.outcome)}</td>'
+        f"{_evidence(row, note_first=not left_undone)}</tr>"
+        for row in rows
+    ]
+    classes = "ledger-undone" if left_undone else ""
+    return Html(f"{len(rows)} statements", _wrapped(("Statement", "Verdict", "Evidence"), lines, classes))
+
+
+def root_table(rows: Iterable[Row]) -> Html:
+    """Tabulate the root errors, by the number of statements affected: the mistake, the reason, the statements."""
+    roots = load_roots()
+    found = sorted(by_root(rows).items(), key=lambda item: -len(item[1]))
+    lines = []
+    for key, spoiled in found:
+        places = ", ".join(map(_link, in_reading_order(spoiled)))
+        lines.append(
+            f'<tr id="root-{escape(key)}"><th scope="row">{typeset(roots[key].title)}</th><td>{len(spoiled)}</td>'
+            f'<td><p>{typeset(roots[key].explanation)}</p><p class="spoils">{places}</p></td></tr>'
+        )
+    return Html(
+        f"{len(found)} root errors",
+        _wrapped(("Root error", "Statements", "Explanation and affected statements"), lines, "ledger-roots"),
+    )
+
+
+def claim_table(rows: Iterable[Row]) -> Html:
+    """Tabulate the principal claims of the documents: replicated, corrected, refuted or not reproducible."""
+    by_id = {row.statement.id: row for row in rows}
+    owner = topics()
+    lines = []
+    for key, claim in CLAIMS.items():
+        row = by_id[key]
+        outcome = _REPLICATION[row.finding.verdict] if row.finding else row.outcome
+        text = typeset(row.statement.printed)
+        lines.append(
+            f'<tr><th scope="row">{escape(claim)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
+            f"<td><p>{text}</p><p>{chapter_link(owner[key])}</p></td></tr>"
+        )
+    return Html(
+        f"{len(lines)} claims",
+        _wrapped(("Claim", "Outcome", "Printed statement, and the chapter that examines it"), lines),
+    )
+
+
+def _link(row: Row) -> str:
+    statement = row.statement
+    place = section_name(statement.chapter, statement.section)
+    link = f'<a href="{address(statement)}">{typeset(statement.item)}</a>'
+    return f"{link} <small>{statement.document}, {escape(place)}</small>"
+
+
+def _seriousness(row: Row) -> int:
+    return DISAGREEMENTS.index(row.finding.verdict) if row.finding else len(DISAGREEMENTS)
+
+
+def _error(group: Sequence[Row]) -> str:
+    """One error: what is wrong, what is right, the verdicts, and links to the statements of each document."""
+    notes = [typeset(row.finding.note or row.finding.recomputed) for row in group if row.finding]
+    finding = group[0].finding
+    text = _root_link(finding) if finding and finding.root else notes[0]
+    if finding and finding.root:
+        listed = "".join(
+            f"<li>{_link(row)}: {note}{_paragraphs(_correction(row))}</li>"
+            for row, note in zip(group, notes, strict=True)
+        )
+        text += f"<details><summary>In detail</summary><ul>{listed}</ul></details>"
+    else:
+        text += _paragraphs(dict.fromkeys(paragraph for row in group for paragraph in _correction(row)))
+    places: dict[str, list[str]] = {}
+    for row in group:
+        link = f'<a href="{address(row.statement)}">{typeset(row.statement.item)}</a>'
+        places.setdefault(row.statement.document, []).append(link)
+    affected = "".join(f"<p>{document[-4:]}: {', '.join(links)}</p>" for document, links in places.items())
+    badges = " ".join(
+        badge(outcome) for outcome in dict.fromkeys(row.outcome for row in sorted(group, key=_seriousness))
+    )
+    return f'<tr><th scope="row">{text}</th><td>{badges}</td><td>{affected}</td></tr>'
+
+
+def _entry(row: Row, owner: dict[str, str]) -> str:
+    statement = row.statement
+    section = section_name(statement.chapter, statement.section)
+    outcome = escape(outcome_name(row.outcome))
+    return (
+        f'<tr id="{escape(statement.id)}" data-kind="{statement.kind}" data-verdict="{outcome}" '
+        f'data-chapter="{owner.get(statement.id, "")}"><th scope="row"><a href="#{escape(statement.id)}">'
+        f"{typeset(statement.item)}</a><br>{escape(section)}, {statement.kind}{_chapter(row, owner)}</th>"
+        f"<td>{badge(outcome_name(row.outcome))}</td>"
+        f"{_evidence(row)}</tr>"
+    )
+
+
+def _chapter(row: Row, owner: dict[str, str]) -> str:
+    topic = owner.get(row.statement.id, "")
+    return f"<br>{chapter_link(topic)}" if topic in CHAPTERS else ""
+
+
+def _evidence(row: Row, note_first: bool = False) -> str:
+    found, note, root = "", "", ""
+    if row.finding:
+        found, note, root = typeset(row.finding.recomputed), typeset(row.finding.note), _root(row.finding)
+    scan = _scan(row.statement)
+    named = [
+        ("printed", typeset(row.statement.printed)),
+        *scan,
+        *_correction(row),
+        ("recomputed", found),
+        ("note", note),
+    ]
+    shown = _SHOWN.get(row.outcome, len(named))
+    if scan and row.finding and row.finding.verdict in DISAGREEMENTS:
+        shown += 1
+    if note_first and note:
+        named.insert(0, named.pop())
+        shown = 1
+    hidden = _paragraphs(named[shown:])
+    evidence = f"<details><summary>Evidence</summary>{hidden}</details>" if hidden else ""
+    return f"<td>{_paragraphs(named[:shown])}{root}{evidence}</td>"
+
+
+def _scan(statement: Statement) -> list[tuple[str, str]]:
+    """The characters of the scan where it is damaged, as the class and text of a paragraph."""
+    damage = load_legibility().get(statement.id)
+    return [("scan", f"<code>{escape(damage.scan).replace('$', '&#36;')}</code>")] if damage else []
+
+
+def _correction(row: Row) -> list[tuple[str, str]]:
+    """What a row that disagrees should say, or why no text can correct it, as the class and text of a paragraph."""
+    correction = load_corrections().get(row.statement.id)
+    if correction is None or row.finding is None or row.finding.verdict not in DISAGREEMENTS:
+        return []
+    corrected = correction.applied(row.statement)
+    return [("corrected", typeset(corrected.printed)) if corrected else ("uncorrected", typeset(correction.reason))]
+
+
+def _paragraphs(named: Iterable[tuple[str, str]]) -> str:
+    return "".join(f'<p class="{name}">{text}</p>' for name, text in named if text)
+
+
+def _root(finding: Finding) -> str:
+    return f'<p class="root">{_root_link(finding)}</p>' if finding.root else ""
+
+
+def _root_link(finding: Finding) -> str:
+    return f'<a href="errata.html#root-{escape(finding.root)}">{typeset(load_roots()[finding.root].title)}</a>'
+
+
+def _wrapped(header: Sequence[str], lines: Sequence[str], classes: str = "") -> str:
+    return f'<div class="ledger">\n{_table(header, lines, classes=classes)}</div>'
+
+
+def _table(header: Sequence[str], lines: Sequence[str], caption: str = "", classes: str = "") -> str:
+    head = "".join(f'<th scope="col">{name}</th>' for name in header)
+    return (
+        f'<table class="{f"ledger-table {classes}".strip()}">\n{caption}<thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{chr(10).join(lines)}\n</tbody>\n</table>\n"
+    )
+
+
+def _form(rows: Sequence[Row], owner: dict[str, str]) -> str:
+    def options(values: Iterable[str], name: Callable[[str], str] = str) -> str:
+        values = [value for value in values if value]
+        every = "".join(
+            f'<option value="{escape(v)}">{escape(name(v))} ({values.count(v)})</option>' for v in dict.fromkeys(values)
+        )
+        return f'<option value="">all</option>{every}'
+
+    in_order = [outcome_name(outcome) for outcome in counts(rows) for row in rows if row.outcome == outcome]
+    selects = {
+        "verdict": ("Verdict", options(in_order)),
+        "kind": ("Kind", options(sorted(row.statement.kind for row in rows))),
+        "chapter": (
+            "Chapter of this book",
+            options((owner.get(r.statement.id, "") for r in rows), lambda t: CHAPTERS[t]),
+        ),
+    }
+    labels = "".join(
+        f'<label>{label} <select name="{name}" autocomplete="off">{choice}</select></label>\n'
+        for name, (label, choice) in selects.items()
+    )
+    return (
+        '<form class="ledger-form" role="search" aria-label="The ledger" hidden>\n'
+        '<label>Search <input type="search" name="words" autocomplete="off" spellcheck="false"></label>\n'
+        f'{labels}<button type="button">Show all</button>\n'
+        '<output role="status" aria-live="polite"></output>\n</form>'
+    )

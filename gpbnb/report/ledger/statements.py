@@ -1,0 +1,276 @@
+"""The printed statements of the three documents, read from ``statements.csv``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from functools import cache, cached_property
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import Any, TypeVar
+
+import sympy as sp
+
+from gpbnb.report.ledger.formula import Link, Number, Part, Relation, Words, read
+
+_L = TypeVar("_L", Number, Words)
+
+DOCUMENTS = ("hung1984", "hung1982", "savage2016")
+KINDS = ("equation", "number", "example", "claim", "figure", "table", "open")
+
+
+@dataclass(frozen=True)
+class Statement:
+    """One printed statement.
+
+    Parameters
+    ----------
+    id : unique; ``document.chapter.place``, as in ``hung1984.II.eq20``.
+    document : short name, one of `DOCUMENTS`.
+    chapter, section : as numbered there; ``-`` if the document has none.
+    item : its name in the document, as in ``eq (20)``.
+    kind : one of `KINDS`.
+    text : the printed text, with math between single dollar signs; ``{{1}}`` stands for the first part of the form.
+    form : the machine-readable form, see :mod:`gpbnb.report.ledger.formula`; empty if there is none.
+    """
+
+    id: str
+    document: str
+    chapter: str
+    section: str
+    item: str
+    kind: str
+    text: str
+    form: str = ""
+
+    @cached_property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts of the machine-readable form."""
+        return read(self.form)
+
+    @cached_property
+    def printed(self) -> str:
+        """The printed text with its formulas typeset from the machine-readable form."""
+        return _PLACE.sub(lambda place: self.parts[int(place[1]) - 1].markdown(), self.text)
+
+    def relation(self, number: int = 1) -> Relation:
+        """Return the relation with this number among the relations of the form, counted from 1.
+
+        Raises
+        ------
+        LookupError : the form has no relation with this number.
+        """
+        relations = [part for part in self.parts if isinstance(part, Relation)]
+        if not 1 <= number <= len(relations):
+            raise LookupError(f"got relation number {number} of {self.id}; needed a number from 1 to {len(relations)}")
+        return relations[number - 1]
+
+    @property
+    def equates(self) -> bool:
+        """Whether each comparison of each relation is = or ≈."""
+        return all(part.equates for part in self.parts if isinstance(part, Relation))
+
+    def links(
+        self, names: Mapping[str, Any] | None = None, number: Callable[[Fraction], Any] = sp.Rational
+    ) -> tuple[Link, ...]:
+        """Evaluate all comparisons of all relations; parameters as for :meth:`.formula.Relation.links`."""
+        relations = [part for part in self.parts if isinstance(part, Relation)]
+        return tuple(link for relation in relations for link in relation.links(names, number))
+
+    def number(self, label: str) -> Number:
+        """Return the printed number with this label.
+
+        Raises
+        ------
+        LookupError : the form has no such number.
+        """
+        return self._labelled(Number, label)
+
+    def says(self, label: str) -> str:
+        """Return the phrase that the document prints for this label.
+
+        Raises
+        ------
+        LookupError : the form has no such phrase.
+        """
+        return self._labelled(Words, label).printed
+
+    def claims(self, label: str, meanings: Mapping[str, bool]) -> bool:
+        """Whether the phrase that the document prints for this label is right.
+
+        Parameters
+        ----------
+        meanings : every phrase that could be printed, and whether it would be right.
+
+        Raises
+        ------
+        LookupError : the form has no phrase with this label, or prints one that is not in `meanings`.
+        """
+        return meanings[self.says(label)]
+
+    def _labelled(self, sort: type[_L], label: str) -> _L:
+        for part in self.parts:
+            if isinstance(part, sort) and part.label == label:
+                return part
+        labels = ", ".join(part.label for part in self.parts if isinstance(part, sort)) or "none"
+        raise LookupError(f"got {sort.__name__.lower()} {label!r} of {self.id}; needed one of {labels}")
+
+
+_PLACE = re.compile(r"\{\{(\d+)\}\}")
+HEADER = tuple(field.name for field in fields(Statement))
+
+
+def load_statements(source: Traversable | None = None) -> tuple[Statement, ...]:
+    """Read and validate the inventory.
+
+    Parameters
+    ----------
+    source : a CSV file, such as a ``pathlib.Path``; by default that of the package.
+
+    Returns
+    -------
+    entries : in the order of the file.
+
+    Raises
+    ------
+    OSError : the file cannot be read.
+    ValueError : the file is not a valid inventory; the message names the line.
+    """
+    return _stored() if source is None else _read(source)
+
+
+@cache
+def _stored() -> tuple[Statement, ...]:
+    return _read(files(__package__) / "statements.csv")
+
+
+def _read(source: Traversable) -> tuple[Statement, ...]:
+    try:
+        text = source.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"got {source.name}, which is not UTF-8 ({error}); save it as UTF-8") from error
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    entries: list[Statement] = []
+    seen: dict[str, int] = {}
+    try:
+        header = next(reader, [])
+        if tuple(header) != HEADER:
+            raise ValueError(f"got the header {','.join(header)!r}; needed {','.join(HEADER)!r}")
+        for record in reader:
+            entry = _entry(record)
+            if entry.id in seen:
+                raise ValueError(
+                    f"got id {entry.id!r}, which line {seen[entry.id]} has already; needed a unique id; rename one"
+                )
+            seen[entry.id] = reader.line_num
+            entries.append(entry)
+    except (ValueError, csv.Error) as error:
+        raise ValueError(f"{source.name}, line {max(reader.line_num, 1)}: {error}") from error
+    return tuple(entries)
+
+
+@cache
+def _by_id() -> dict[str, Statement]:
+    return {each.id: each for each in load_statements()}
+
+
+def statement(key: str) -> Statement:
+    """Return the statement with the id `key`.
+
+    Raises
+    ------
+    KeyError : there is no statement with this id.
+    """
+    if key not in _by_id():
+        raise KeyError(f"got {key!r}; needed the id of a statement in statements.csv")
+    return _by_id()[key]
+
+
+def quote(key: str) -> str:
+    """Return the printed text of the statement `key`; KeyError as for :func:`statement`."""
+    return statement(key).printed
+
+
+def _entry(record: list[str]) -> Statement:
+    if len(record) != len(HEADER):
+        raise ValueError(f"got {len(record)} fields; needed {len(HEADER)}; quote a field that contains a comma")
+    entry = Statement(*record)
+    for name, value in zip(HEADER, record, strict=True):
+        if (not value and name != "form") or value != value.strip():
+            raise ValueError(
+                f"got {name}={value!r}; needed a text without leading or trailing blanks; write '-' where there is none"
+            )
+    if entry.document not in DOCUMENTS:
+        raise ValueError(f"got document {entry.document!r}; needed one of {', '.join(DOCUMENTS)}")
+    if entry.kind not in KINDS:
+        raise ValueError(f"got kind {entry.kind!r}; needed one of {', '.join(KINDS)}")
+    if not entry.id.startswith(f"{entry.document}."):
+        raise ValueError(f"got id {entry.id!r}; needed an id that begins with its document: '{entry.document}.…'")
+    check_text(entry)
+    return entry
+
+
+def check_text(entry: Statement) -> None:
+    """Check that the form of a statement can be read and that its text can be typeset with the parts of the form.
+
+    Raises
+    ------
+    ValueError : it cannot.
+    """
+    if entry.text.count("$") % 2 or "$$" in entry.text:
+        raise ValueError(f"got text={entry.text!r} with an unpaired or doubled dollar sign; needed math as $...$")
+    for place in _PLACE.findall(entry.text):
+        if not 1 <= int(place) <= len(entry.parts):
+            raise ValueError(
+                f"got the place {{{{{place}}}}} in text; needed a number up to {len(entry.parts)}, the "
+                "number of parts of the form"
+            )
+    _ = entry.printed
+
+
+def select(
+    entries: Iterable[Statement],
+    document: str | None = None,
+    chapter: str | None = None,
+    sections: str | Iterable[str | int] | None = None,
+) -> tuple[Statement, ...]:
+    """Pick the entries of a document, a chapter, some sections.
+
+    Parameters
+    ----------
+    entries : the entries to choose from.
+    document, chapter : all by default.
+    sections : numbers or names; ``9`` includes 9.1 and 9.2. All by default.
+
+    Raises
+    ------
+    ValueError : there are no entries of this document, of this chapter, or of one of the sections.
+    """
+    found = tuple(entries)
+    if document is not None:
+        found = _keep(found, "document", document)
+    if chapter is not None:
+        found = _keep(found, "chapter", chapter)
+    if sections is not None:
+        wanted = [sections] if isinstance(sections, str) else [str(section) for section in sections]
+        if not wanted:
+            raise ValueError("got an empty sections; needed at least one section, or None for all")
+        within = {entry.id for section in wanted for entry in _keep(found, "section", section)}
+        found = tuple(entry for entry in found if entry.id in within)
+    return found
+
+
+def _keep(entries: tuple[Statement, ...], field: str, value: str) -> tuple[Statement, ...]:
+    kept = tuple(
+        entry
+        for entry in entries
+        if getattr(entry, field) == value or (field == "section" and entry.section.startswith(f"{value}."))
+    )
+    if not kept:
+        there = ", ".join(dict.fromkeys(getattr(entry, field) for entry in entries))
+        raise ValueError(f"got {field} {value!r}, which no entry has; needed one of {there}")
+    return kept

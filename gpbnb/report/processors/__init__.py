@@ -1,0 +1,1 @@
+"""Filters on processors: fused operations, wide accumulators and other orders of addition."""

@@ -1,0 +1,185 @@
+"""Rounded rotations, emulated digit by digit: by recursion, and directly from each angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache
+from typing import Any
+
+import mpmath
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.scalar import add, load, multiply, store, subtract
+from gpbnb.arithmetic.search import smallest_precision
+from gpbnb.report.measurement import YEAR
+from gpbnb.report.rolling import theory
+from gpbnb.report.rolling.theory import INTERVAL
+
+
+def rounded_rate_error(period: float, fmt: FloatFormat) -> float:
+    """Return the rounding error of ω_r = 2π/T in a register: rounded rate minus true rate, rad/s."""
+    rate = theory.roll_rate(period)
+    return float(fmt.round(rate) - rate)
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """A rotation (cos nδ, sin nδ) computed in a format, with its amplitude error, phase error and total error.
+
+    `method` is "recursion" or "direct", `step` holds the samples n, and `bound` the bound on `size`, the total error.
+    """
+
+    fmt: FloatFormat
+    period: float
+    interval: float
+    method: str
+    step: NDArray[np.int64]
+    amplitude: NDArray[np.float64]
+    phase: NDArray[np.float64]
+    size: NDArray[np.float64]
+    bound: NDArray[np.float64]
+
+    def drift_error(self, drift: float) -> float:
+        """Return the largest error in mas of a ramp of `drift` mas a year that is derolled with this rotation."""
+        return float(np.max(self.size * self.step * (drift * self.interval / YEAR)))
+
+
+@compiled
+def _rotate(fmt, step, state, marks, out):  # type: ignore[no-untyped-def]
+    a, b = load(fmt, step, 0), load(fmt, step, 1)
+    c, s = load(fmt, state, 0), load(fmt, state, 1)
+    n = 0
+    for k in range(len(marks)):
+        for _ in range(marks[k] - n):
+            c, s = (
+                subtract(fmt, multiply(fmt, c, a), multiply(fmt, s, b)),
+                add(fmt, multiply(fmt, s, a), multiply(fmt, c, b)),
+            )
+        n = marks[k]
+        store(fmt, out, (k, 0), c)
+        store(fmt, out, (k, 1), s)
+
+
+@cache
+def _exact_turn(n: int, period: float, interval: float) -> tuple[Fraction, Fraction]:
+    """Return cosine and sine of n steps, to 60 digits."""
+    turns = n * Fraction(interval) / Fraction(period) % 1
+    with mpmath.workdps(60):
+        angle = 2 * mpmath.mpf(turns.numerator) / turns.denominator
+        return _fraction(mpmath.cospi(angle)), _fraction(mpmath.sinpi(angle))
+
+
+def _fraction(x: Any) -> Fraction:
+    sign, mantissa, exponent, _ = x._mpf_
+    return Fraction(-int(mantissa) if sign else int(mantissa)) * Fraction(2) ** exponent
+
+
+def _compared(
+    fmt: FloatFormat, period: float, interval: float, method: str, steps: Any, values: Any, bounds: Any
+) -> Rotation:
+    """Return the errors of computed pairs (m, 2) of exact Fractions."""
+    errors = []
+    for n, (c, s) in zip(steps, values, strict=True):
+        cosine, sine = _exact_turn(int(n), period, interval)
+        # z e^{-inδ} - 1, without cancellation
+        errors.append(complex((c - cosine) * cosine + (s - sine) * sine, (s - sine) * cosine - (c - cosine) * sine))
+    e = np.array(errors)
+    amplitude = np.hypot(1 + e.real, e.imag) - 1
+    small = np.abs(e) < 1e-8
+    amplitude[small] = e.real[small]
+    return Rotation(
+        fmt, period, interval, method, np.asarray(steps), amplitude, np.arctan2(e.imag, 1 + e.real), np.abs(e), bounds
+    )
+
+
+def recursion(
+    fmt: FloatFormat,
+    period: float,
+    steps: Sequence[int],
+    interval: float = INTERVAL,
+) -> Rotation:
+    """Rotate by the angle of one sample repeatedly, with every operation rounded: the recursive deroll of (7).
+
+    Parameters
+    ----------
+    fmt : a format in base 2, 10 or 16 with a precision that has compiled loops.
+    period, interval : roll period and time between samples, s.
+    steps : samples at which errors are evaluated, ascending.
+
+    Raises
+    ------
+    ValueError : a format without compiled loops; steps that do not ascend.
+    """
+    marks = np.asarray(steps, dtype=np.int64)
+    if marks.ndim != 1 or not len(marks) or marks[0] < 0 or np.any(np.diff(marks) <= 0):
+        raise ValueError(f"got steps {steps!r}; needed numbers of samples that ascend from 0 or later")
+    backend = fmt.backend
+    if not isinstance(backend, Compiled):
+        raise ValueError(f"got {fmt}; needed base 2, 10 or 16 and at most 53, 18 or 13 digits; take fewer")
+    angle = fmt.array(list(_exact_turn(1, period, interval)))
+    start = fmt.array([1, 0])
+    step, state = (backend.pack(a.components) for a in (angle, start))
+    out = np.empty((len(marks), *step.shape), dtype=step.dtype)
+    _rotate(backend.tag, step, state, marks, out)
+    values = FloatArray.from_components(backend, backend.unpack(out), fmt).to_fractions()
+    bounds = np.array([theory.recursion_bound(int(n), fmt.unit_roundoff) for n in marks])
+    return _compared(fmt, period, interval, "recursion", marks, values, bounds)
+
+
+def direct(fmt: FloatFormat, period: float, steps: Sequence[int], interval: float = INTERVAL) -> Rotation:
+    """Compute cosine and sine of a rounded roll rate times a rounded time, each rounded to a format."""
+    marks = np.asarray(steps, dtype=np.int64)
+    rate = fmt.array(theory.roll_rate(period))
+    values = []
+    for n in marks:
+        angle = Fraction((rate * fmt.array(int(n) * Fraction(interval))).to_fractions())
+        with mpmath.workdps(60):
+            x = mpmath.mpf(angle.numerator) / angle.denominator
+            values.append([fmt.round(_fraction(mpmath.cos(x))), fmt.round(_fraction(mpmath.sin(x)))])
+    phases = 2 * np.pi * marks * (interval / period)
+    bounds = np.array([theory.direct_bound(float(phase), fmt.unit_roundoff) for phase in phases])
+    return _compared(fmt, period, interval, "direct", marks, values, bounds)
+
+
+def digits_needed_observed(
+    method: str, base: int, drift: float, period: float, steps: Sequence[int], error: float = 1.0
+) -> int:
+    """Find the smallest precision with which a year's deroll of a drift stays within `error` mas.
+
+    :func:`gpbnb.arithmetic.search.smallest_precision` searches up to the precision that the bound proves to be enough.
+
+    Raises
+    ------
+    ValueError : the precision that is proved to be enough cannot be emulated, and none below it is enough.
+    """
+    return _digits_needed_observed(method, base, drift, period, tuple(map(int, steps)), error)
+
+
+@cache
+def _digits_needed_observed(
+    method: str, base: int, drift: float, period: float, steps: tuple[int, ...], error: float
+) -> int:
+    bound = theory.rotation_bound(method, period, steps[-1])
+    rotate = {"recursion": recursion, "direct": direct}[method]
+    enough = theory.digits_needed(bound, base, error / (drift * steps[-1] * INTERVAL / YEAR))
+    most = min(LARGEST_PRECISION[base], enough)
+    first = steps[: len(steps) // 2]
+
+    def within(fmt: FloatFormat) -> bool:
+        try:
+            # With too few digits, the first half of the steps is usually enough to see it.
+            return all(rotate(fmt, period, some).drift_error(drift) <= error for some in (first, steps) if some)
+        except OverflowError:  # with few digits, the rotation grows without limit
+            return False
+
+    found = smallest_precision(within, base, least=2, largest=most)
+    if found is None:
+        raise ValueError(f"got an error of {error:g} mas; needed one that base {base} reaches within {most} digits")
+    return found.precision

@@ -1,0 +1,357 @@
+"""Measure what determines a wordlength: the number of steps, the range of the numbers, losses in additions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
+
+from gpbnb.arithmetic import search
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+from gpbnb.bounds.bounded_run import BoundedRun
+from gpbnb.bounds.inverse import check_relative, smallest_precision
+from gpbnb.filters.contraction import companion_bound
+from gpbnb.filters.emulation import compare_runs
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Run, log_spaced, reference, reference_states
+from gpbnb.report.gravity_probe_b.year import Year
+from gpbnb.report.kalman import report_bounds
+from gpbnb.wordlength.precision import required_precision
+from gpbnb.wordlength.requirement import Requirement
+
+
+def printed_precision(
+    k: int, n: int, m: int, tolerance: Fraction, size: Fraction, base: int = 2, **faults: bool
+) -> int:
+    r"""Return the digits that (125) requires if :math:`\|x_k\| = B` = size, for an error of `tolerance`.
+
+    Parameters
+    ----------
+    tolerance, size : in the same unit. faults : options of :func:`gpbnb.report.kalman.report_bounds.coefficients` that
+        correct (125).
+
+    References
+    ----------
+    hung1984, ch. II, eq. (125) and the example of section 12.
+    """
+
+    def meets(fmt: FloatFormat) -> bool:
+        return report_bounds.bound_for_size(fmt.unit_roundoff, k, n, m, size, **faults) <= tolerance
+
+    found = search.smallest_precision(meets, base, Rounding.NEAREST, monotone=True)
+    if found is None:
+        raise ArithmeticError("got no sufficient precision, although the unit roundoff can be arbitrarily small")
+    return found.precision
+
+
+def required_precision_by_steps(
+    model: LinearModel, z: NDArray[Any], tolerance: float | Sequence[float], steps: Sequence[int], **options: Any
+) -> tuple[Requirement, ...]:
+    """Return answers of :func:`gpbnb.wordlength.precision.required_precision` for several numbers of first steps.
+
+    Parameters
+    ----------
+    options : form, basis, base and rounding for that function.
+
+    Raises
+    ------
+    ValueError : a number of steps is below 1 or exceeds the measurements; or for a reason given in that function.
+    """
+    if not all(1 <= k <= len(z) for k in steps):
+        raise ValueError(f"got steps {list(steps)} and {len(z)} measurements; needed from 1 to {len(z)} steps")
+    return tuple(required_precision(_first(model, k), k, tolerance, z=z[:k], **options) for k in steps)
+
+
+def _first(model: LinearModel, steps: int) -> LinearModel:
+    """Return the model for `steps` steps; later matrices of its cycle need not be rounded and checked."""
+    given = [letter for letter in ("Phi", "H", "Q", "R", "B", "b", "d") if getattr(model, letter) is not None]
+    cut = {letter: getattr(model, letter)[:steps] for letter in given}
+    if model.u is not None and model.u.ndim == 2:
+        cut["u"] = model.u[:steps]
+    return replace(model, **cut, steps=None if model.steps is None else steps)
+
+
+def precision_by_step(runs: Sequence[Year], tolerance: float) -> tuple[tuple[int, int], ...]:
+    """For each step, find the fewest digits that keep drift (mas) and rate (mas/yr) within `tolerance` up to this step.
+
+    Raises
+    ------
+    ValueError : runs of several bases, roundings or forms, whose digits are not comparable.
+    """
+    kinds = {(run.case.model, run.case.base, run.case.rounding, run.case.form) for run in runs}
+    if len(kinds) != 1:
+        raise ValueError(f"got runs of {len(kinds)} kinds; needed runs of one model, base, rounding and form")
+    found: dict[int, int] = {}
+    for run in runs:
+        errors = np.maximum.accumulate(np.abs(np.hstack([run.drift, run.rate])).max(axis=1))
+        for step, error in zip(run.steps.tolist(), errors.tolist(), strict=True):
+            if error <= tolerance:
+                found[step] = min(found.get(step, run.case.precision), run.case.precision)
+    return tuple(sorted(found.items()))
+
+
+class UpdateStagnation(NamedTuple):
+    """Effect of few digits on one state, whose updates may round to nothing.
+
+    Parameters
+    ----------
+    variance : last computed variance of the state / true variance.
+    unchanged : share of the last steps in which the estimate did not change at all.
+    error : largest error of the first state, in its unit.
+    """
+
+    fmt: FloatFormat
+    variance: float
+    unchanged: float
+    error: float
+
+
+def update_stagnation(
+    model: LinearModel,
+    z: NDArray[Any],
+    state: int,
+    formats: Sequence[FloatFormat],
+    form: Form | str = Form.INNOVATION,
+    last: int = 200,
+) -> tuple[UpdateStagnation, ...]:
+    """Measure how much the updates of a slow state stagnate in several formats.
+
+    Errors are defined as in :func:`gpbnb.wordlength.precision.survey`.
+
+    Parameters
+    ----------
+    state : index of the state. last : number of steps at the end that are examined one by one.
+
+    Raises
+    ------
+    ValueError : no such state, or not more measurements than the steps to be examined.
+    """
+    _check_state(model, state)
+    if not 0 < last < len(z):
+        raise ValueError(f"got {last} steps to watch of {len(z)}; needed at least 1, and at most all but one")
+    checkpoint_steps = tuple(sorted({*log_spaced(len(z), 16), *range(max(len(z) - last, 1), len(z) + 1)}))
+    true, found = reference(model, z, checkpoint_steps), []
+    for fmt in formats:
+        run = Run(model, fmt, form, checkpoint_steps)
+        run.take(fmt.array(z))
+        history, checkpoints = compare_runs(run, true), run.checkpoints()
+        variance = float(checkpoints.P[-1, state, state] / true.P[len(checkpoints.P) - 1, state, state])
+        unchanged = sum(a == b for a, b in pairwise(checkpoints.x[-last - 1 :, state])) / last
+        found.append(UpdateStagnation(fmt, variance, unchanged, float(np.abs(history.state[:, 0]).max())))
+    return tuple(found)
+
+
+def bits_hiding_process_noise(model: LinearModel, z: NDArray[Any], state: int) -> float:
+    r"""Return :math:`\log_2 P_{ii}/Q_{ii}` after the last step; with roughly fewer bits, adding Q has no effect.
+
+    The value is infinite if the state has no process noise.
+
+    Raises
+    ------
+    ValueError : no such state.
+    """
+    _check_state(model, state)
+    checkpoints, noise = reference(model, z, (len(z),)), float(model.Q[0, state, state])
+    return math.log2(float(checkpoints.P[-1, state, state]) / noise) if noise else math.inf
+
+
+def _check_state(model: LinearModel, state: int) -> None:
+    if state not in range(model.n):
+        raise ValueError(f"got state {state!r}; needed an index from 0 to {model.n - 1}")
+
+
+def largest_estimate(model: LinearModel, z: NDArray[Any]) -> Fraction:
+    """Return the largest entry of the estimates at the steps of :func:`gpbnb.filters.run.log_spaced`."""
+    return Fraction(np.abs(reference(model, z, log_spaced(len(z), 16)).x).max())
+
+
+def companion_run(
+    model: LinearModel, z: NDArray[Any], fmt: FloatFormat, form: Form = Form.INNOVATION
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Bound a run by its distance from a companion run in double-double plus the bound of the companion.
+
+    Both use the model and the measurements as the format stores them.
+
+    Returns
+    -------
+    error, bound : (n,), largest value for each state at the steps of :func:`gpbnb.filters.run.log_spaced`.
+    """
+    stored, measured, checkpoint_steps = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
+    run = Run(model, fmt, form, checkpoint_steps)
+    companion = BoundedRun(stored, None, Form.INNOVATION, checkpoint_steps)
+    run.take(measured)
+    companion.take(measured.to_fractions())
+    history = compare_runs(run, companion.checkpoints())
+    bound = companion_bound(history.state, companion.bounds[0][: len(history.steps)])
+    return np.abs(history.state).max(axis=0), bound.max(axis=0)
+
+
+def native(
+    model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]], progress: bool = False
+) -> NDArray[np.float64]:
+    """Run the innovation form in a NumPy type, with the limited range of a processor.
+
+    Operations and their order are those of the emulation. Here results are rounded to nearest, ties to even. Small
+    numbers become subnormal or zero, and large numbers infinite. Products and sums are rounded one by one, not fused.
+
+    Parameters
+    ----------
+    model, z : as for :func:`gpbnb.wordlength.precision.survey`; each entry is converted to float64, then to the type.
+    dtype : numpy.float16, numpy.float32 or numpy.float64.
+    progress : show a progress bar that counts steps.
+
+    Returns
+    -------
+    x : (steps, n), the estimate after each step; not finite if the range is too small.
+    """
+    if not (isinstance(dtype, type) and issubclass(dtype, np.floating)):
+        raise TypeError(f"got dtype {dtype!r}; needed numpy.float16, numpy.float32 or numpy.float64")
+    model.refuse_inputs("NumPy's own types")
+    with np.errstate(all="ignore"):
+        given = {letter: values.astype(dtype) for letter, values in model.to_float().items()}
+        return innovation_form(given, np.asarray(z, dtype=np.float64).astype(dtype), progress).astype(np.float64)
+
+
+def native_error(model: LinearModel, z: NDArray[Any], dtype: type[np.floating[Any]]) -> NDArray[np.float64]:
+    """Return the largest errors (n,) of :func:`native`, as :func:`gpbnb.wordlength.precision.survey` defines them.
+
+    It includes the errors of storing model and measurements, and is infinite or NaN if the range is too small.
+    """
+    return np.asarray(np.abs(native(model, z, dtype) - reference_states(model, z)[:, :, 0]).max(axis=0))
+
+
+def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress: bool = False) -> NDArray[Any]:
+    """Run the innovation form in the number type of the arrays; see :func:`native`.
+
+    Parameters
+    ----------
+    given : Phi, H, Q, R with a leading axis, x0 and P0, as from :meth:`gpbnb.filters.model.LinearModel.to_float`.
+    z : (steps, m).
+
+    Returns
+    -------
+    x : (steps, n), the estimate after each step.
+    """
+    x, P, estimates = given["x0"][:, np.newaxis], given["P0"], np.empty((len(z), len(given["x0"])), z.dtype)
+    identity = np.eye(len(P), dtype=P.dtype)
+    for k, measured in enumerate(tqdm(z, desc="native", unit="step", disable=not progress)):
+        Phi, H, Q, R = (given[letter][k % len(given[letter])] for letter in ("Phi", "H", "Q", "R"))
+        predicted = _times(_times(Phi, P), Phi.T) + Q
+        PHt = _times(predicted, H.T)
+        K = _times(PHt, _inverse(_times(H, PHt) + R))
+        P = _times(identity - _times(K, H), predicted)
+        x = _times(Phi, x)
+        x = x + _times(K, measured[:, np.newaxis] - _times(H, x))
+        estimates[k] = x[:, 0]
+    return estimates
+
+
+def _times(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Multiply matrices, each entry summed from left to right; NumPy sums in another order."""
+    result = a[:, :1] * b[:1]
+    for k in range(1, a.shape[1]):
+        result = result + a[:, k : k + 1] * b[k : k + 1]
+    return result
+
+
+def _inverse(a: NDArray[Any]) -> NDArray[Any]:
+    """Invert a matrix by elimination without pivoting."""
+    upper, m = a.copy(), len(a)
+    result = np.eye(m, dtype=a.dtype)
+    for k in range(m):
+        for i in range(k + 1, m):
+            factor = upper[i, k] / upper[k, k]
+            upper[i, k + 1 :] = upper[i, k + 1 :] - factor * upper[k, k + 1 :]
+            result[i] = result[i] - factor * result[k]
+    for k in range(m - 1, -1, -1):
+        for i in range(k + 1, m):
+            result[k] = result[k] - upper[k, i] * result[i]
+        result[k] = result[k] / upper[k, k]
+    return result
+
+
+class InversePrecision(NamedTuple):
+    """Bits that the inverse of a matrix needs, and the bits that its condition number suggests."""
+
+    name: str
+    condition: float
+    scaled: float
+    expected: int
+    proved: int
+
+
+def inverse_precision(
+    name: str, matrix: NDArray[Any], tolerance: float, rounding: Rounding = Rounding.NEAREST
+) -> InversePrecision:
+    r"""Return bits by the rule of thumb :math:`\beta\,\kappa_1(DAD)\le` tolerance, and proved bits.
+
+    D scales by powers of two to a diagonal near 1, as a choice of units would. Elimination makes the same rounding
+    errors with and without D. :func:`gpbnb.bounds.inverse.smallest_precision` proves the other number.
+
+    Parameters
+    ----------
+    matrix : (n, n), exact, symmetric positive definite.
+    tolerance : largest error of the inverse, relative to it in norm; above 0.
+
+    Raises
+    ------
+    ValueError : a matrix that is not symmetric, or without a positive diagonal; a tolerance that is not above 0.
+    numpy.linalg.LinAlgError : a singular matrix.
+    """
+    matrix = exact(matrix)
+    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
+        raise ValueError(f"{name}: got shape {matrix.shape}; needed a square matrix (n, n) with n at least 1")
+    check_relative(tolerance)
+    try:
+        inverse = true_inverse(matrix)
+    except np.linalg.LinAlgError as error:
+        raise np.linalg.LinAlgError(f"{name}: {error}") from None
+    for i, j in np.argwhere(matrix != matrix.T)[:1]:
+        raise ValueError(
+            f"{name}: got {matrix[i, j]} at [{i}, {j}] and {matrix[j, i]} at [{j}, {i}]; needed a symmetric matrix"
+        )
+    for (i,) in np.argwhere(matrix.diagonal() <= 0)[:1]:
+        raise ValueError(f"{name}: got {matrix[i, i]} at [{i}, {i}]; needed a positive diagonal")
+    scale = [Fraction(2) ** -round(math.log2(d) / 2) for d in matrix.diagonal()]
+    scaled = matrix * np.multiply.outer(np.array(scale, dtype=object), np.array(scale, dtype=object))
+    pairs = ((matrix, inverse), (scaled, true_inverse(scaled)))
+    conditions = [column_sum_norm(rationals(a)) * column_sum_norm(b) for a, b in pairs]
+    expected = report_bounds.precision_for_coefficient(conditions[1], Fraction(tolerance), 2, rounding)
+    proved = smallest_precision(matrix, tolerance, 2, rounding).fmt.precision
+    return InversePrecision(name, float(conditions[0]), float(conditions[1]), expected, proved)
+
+
+def rescaled(model: LinearModel, sizes: Sequence[Any]) -> LinearModel:
+    """Return the same filter with states in other units.
+
+    Parameters
+    ----------
+    sizes : (n,), exact, old unit / new unit for each state.
+
+    Raises
+    ------
+    ValueError : `sizes` does not have one positive number for each state.
+    """
+    given = exact(sizes)
+    if given.shape != (model.n,) or not (given > 0).all():
+        raise ValueError(f"got sizes {list(sizes)}; needed {model.n} positive numbers, one per state")
+    square = np.multiply.outer(given, given)
+    return replace(
+        model,
+        Phi=model.Phi * np.multiply.outer(given, 1 / given),
+        H=model.H / given,
+        Q=model.Q * square,
+        x0=model.x0 * given,
+        P0=model.P0 * square,
+        B=None if model.B is None else model.B * given[:, np.newaxis],
+        b=None if model.b is None else model.b * given,
+    )

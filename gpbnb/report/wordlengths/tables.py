@@ -1,0 +1,74 @@
+"""Tables of the chapter on wordlength."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.report.display.tables import Table, arithmetic, digits, short
+from gpbnb.report.integration.theory import best_rate, needed_precision, stall_rate
+from gpbnb.report.wordlengths.study import InversePrecision, UpdateStagnation
+from gpbnb.wordlength.examples import NORMAL_RANGE
+from gpbnb.wordlength.ranges import BinaryRange
+from gpbnb.wordlength.requirement import Requirement
+
+
+def bits(answer: Requirement) -> str:
+    """Return the precision of an answer for a cell, or "none"."""
+    return str(answer.fmt.precision) if answer.fmt else "none"
+
+
+def answers(found: Mapping[str, Sequence[tuple[str, Requirement]]]) -> Table:
+    """Compare answers, with one row for each name and one column for each question.
+
+    Raises
+    ------
+    ValueError : rows that do not answer the same questions.
+    """
+    questions = {tuple(question for question, _ in line) for line in found.values()}
+    if len(questions) != 1:
+        raise ValueError(
+            f"got rows with {len(questions)} different sets of questions; needed the same questions in each row"
+        )
+    body = tuple((name, *(bits(answer) for _, answer in line)) for name, line in found.items())
+    return Table(f"{len(body)} lines of answers", ("form", *questions.pop()), body)
+
+
+def update_stagnation(found: Sequence[UpdateStagnation], tolerance: float) -> Table:
+    """Tabulate the effect of few digits on a state that hardly changes."""
+    body = tuple(
+        (arithmetic(each.fmt), short(each.variance, 3), f"{100 * each.unchanged:.0f} %", short(each.error / tolerance))
+        for each in found
+    )
+    header = ("arithmetic", "variance, computed / true", "steps without a change", "error / tolerance")
+    return Table(f"{len(body)} formats", header, body)
+
+
+def binary_ranges(found: Sequence[BinaryRange]) -> Table:
+    """Tabulate the ranges of a filter's numbers, and the standard formats in which they are normal."""
+    body = []
+    for each in found:
+        suitable = [name for name, (low, high) in NORMAL_RANGE.items() if low <= each.least and each.largest <= high]
+        body.append((each.name, f"$2^{{{each.least}}}$", f"$2^{{{each.largest}}}$", ", ".join(suitable) or "none"))
+    return Table(f"{len(body)} kinds of numbers", ("numbers", "smallest", "largest", "normal in"), tuple(body))
+
+
+def integrator(omega_bw: float, f_c: float, durations: Mapping[str, float], fmt: FloatFormat) -> Table:
+    """Tabulate bits at which rounding is a tenth of the discretization error, and the rates that a format allows."""
+    body = []
+    for name, duration in durations.items():
+        needed = [needed_precision(omega_bw, f_c, duration, 2, rounding) for rounding in Rounding.documented()]
+        rates = best_rate(omega_bw, duration, fmt), stall_rate(omega_bw, duration, fmt)
+        body.append((name, *map(str, needed), *(f"{rate:,.3g}" for rate in rates)))
+    kind = digits(fmt)
+    header = ("duration", "bits, rounded", "bits, chopped", f"best rate with {kind}, Hz", "increments vanish at, Hz")
+    return Table(f"{len(body)} durations", header, tuple(body))
+
+
+def inverse_precisions(found: Sequence[InversePrecision]) -> Table:
+    """Tabulate the bits that inverses need, by the rule of thumb and proved."""
+    body = tuple(
+        (each.name, short(each.condition), short(each.scaled), str(each.expected), str(each.proved)) for each in found
+    )
+    header = ("matrix", "condition $\\kappa_1$", "$\\kappa_1$, scaled", "bits, rule of thumb", "bits, proved")
+    return Table(f"{len(body)} inverses", header, body)
