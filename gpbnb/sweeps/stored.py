@@ -41,7 +41,7 @@ def run(sweeps: Sequence[Sweep[Any]], arguments: Sequence[str] | None = None) ->
         if given.command == "list":
             for sweep in sweeps:
                 table = sweep.load()
-                about = "; ".join(f"{key} {value}" for key, value in table.provenance.items() if key != "sha256")
+                about = "; ".join(f"{key} {value}" for key, value in table.provenance.items())
                 print(f"{sweep.name}: {about}")
             return 0
         if unknown := set(given.names) - set(known):

@@ -1,47 +1,19 @@
-"""The stored sweeps of the package: their files are as they were written, and no file was rewritten unnoticed."""
+"""The stored sweeps of the package can be read, and a sample of them comes out again."""
 
 from __future__ import annotations
 
-import csv
-import hashlib
 import os
 from datetime import UTC, datetime
-from pathlib import Path
 
 import pytest
 
-import gpbnb
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.stored import YEAR, first_steps
 from gpbnb.report.stored import SWEEPS
 from gpbnb.sweeps import DamagedFileError
 
-PACKAGE = Path(gpbnb.__file__).parent
 #: Sweeps of which a cell, or its first steps, takes seconds; `make verify-sweeps` computes cells of the others.
 CHEAP = (YEAR,)
-DIGESTS = Path(__file__).parents[1] / "stored_digests.csv"
-
-
-def digests():
-    with DIGESTS.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-@pytest.mark.parametrize("row", digests(), ids=lambda row: row["file"])
-def test_no_stored_file_was_rewritten_unnoticed(row):
-    # After a sweep has been computed again on purpose, its line in stored_digests.csv is changed by hand.
-    found = hashlib.sha256((PACKAGE / row["file"]).read_bytes()).hexdigest()
-    assert found == row["sha256"], f"{row['file']} is not the file of which tests/stored_digests.csv has the digest"
-
-
-def test_every_stored_file_has_its_digest():
-    stored = {str(sweep.file.relative_to(PACKAGE)) for sweep in SWEEPS}
-    assert stored <= {row["file"] for row in digests()}
-    assert stored >= {"kalman/year.csv", "kalman/ensembles.csv", "inversion/random.csv", "inversion/variants.csv"}
-    # Every file of results. Printed statements, texts of the ledger and an example of a budget are no results.
-    inputs = {"ledger/statements.csv", "ledger/roots.csv", "budget/example.csv"}
-    found = {str(path.relative_to(PACKAGE)) for kind in ("csv", "json") for path in PACKAGE.rglob(f"*.{kind}")}
-    assert {path.replace("\\", "/") for path in found} - inputs == {row["file"] for row in digests()}
 
 
 @pytest.mark.parametrize("sweep", SWEEPS, ids=lambda sweep: sweep.name)
@@ -64,7 +36,7 @@ def test_a_cut_sweep_is_rejected(sweep, tmp_path):
 def test_a_year_cut_at_the_end_of_a_row_does_not_load(tmp_path):
     text = YEAR.file.read_text(encoding="utf-8").splitlines(keepends=True)
     (tmp_path / "year.csv").write_text("".join(text[: len(text) // 2]), encoding="utf-8")
-    (tmp_path / "year.json").write_bytes((PACKAGE / "kalman" / "year.json").read_bytes())
+    (tmp_path / "year.json").write_bytes(YEAR.file.with_suffix(".json").read_bytes())
     with pytest.raises(DamagedFileError, match="the file ends after"):
         year.load(tmp_path)
 
