@@ -24,7 +24,7 @@ from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
 from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b import model as gravity_probe_b
-from gpbnb.report.gravity_probe_b import year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.mission import Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH
 
@@ -54,20 +54,18 @@ def seconds(work: Callable[[], Any]) -> float:
 
 def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
     """Run both arithmetics and NumPy in turns, block by block; NumPy takes every twentieth, and its time is scaled."""
-    usual = year_cases.MODELS[0]
+    usual = year.MODELS[0]
     runs = {
-        FloatFormat(base, precision): Run(
-            year_cases.model(usual, base), FloatFormat(base, precision), Form.INNOVATION, ()
-        )
+        FloatFormat(base, precision): Run(year.model(usual, base), FloatFormat(base, precision), Form.INNOVATION, ())
         for base, precision in ((2, 24), (10, 8))
     }
-    given = year_cases.model(usual, 2).to_float()
+    given = year.model(usual, 2).to_float()
     Phi, H = given["Phi"][0], given["H"]
     plain = [(Phi, Phi.T, given["Q"][0], h, h.T, given["R"][0]) for h in H]
     x, P, identity = given["x0"].reshape(-1, 1), given["P0"], np.eye(len(Phi))
-    source, truth = year_cases.simulation(usual), np.array(TRUTH)
+    source, truth = year.simulation(usual), np.array(TRUTH)
     for fmt in runs:  # compiles
-        Run(year_cases.model(usual, fmt.base), fmt, Form.INNOVATION, ()).take(source.measurements(1))
+        Run(year.model(usual, fmt.base), fmt, Form.INNOVATION, ()).take(source.measurements(1))
     total, numpy_steps, numpy_total = dict.fromkeys(runs, 0.0), 0, 0.0
     for number in tqdm(range(-(-steps // BLOCK)), desc="a year, thrice", unit="block"):
         before = number * BLOCK
@@ -93,9 +91,9 @@ def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
 
 def many_records(steps: int) -> float:
     """A year of many records through one gain; the time of every twentieth block is scaled."""
-    given = year_cases.model(year_cases.MODELS[0], 2)
+    given = year.model(year.MODELS[0], 2)
     run = Records(given, FloatFormat(2, 24), Form.INNOVATION, RECORDS)
-    one = year_cases.simulation(year_cases.MODELS[0]).measurements(BLOCK)
+    one = year.simulation(year.MODELS[0]).measurements(BLOCK)
     z = np.ascontiguousarray(np.repeat(one[:, :, np.newaxis], RECORDS, axis=2))
     run.carry(z[:1], 1)  # compiles
     blocks = -(-steps // BLOCK)

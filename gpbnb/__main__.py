@@ -16,7 +16,7 @@ COMMANDS = {
     "report.gravity_probe_b.year": "compute the emulated years again",
     "report.kalman.ensembles": "compute the random filters again",
     "report.gravity_probe_b.threshold": "compute the years of hundreds of records again",
-    "report.gravity_probe_b.mission_runs": "compute the years of the mission model again",
+    "report.gravity_probe_b.mission": "compute the years of the mission model again",
     "report.gravity_probe_b.horizon": "compute the bounds for a year of Gravity Probe B again",
     "report.guarantees.survey": "compute the survey of guarantees again",
     "report.guarantees.filters": "compute random Kalman filters against their guarantees again",

@@ -15,7 +15,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.budget import theory as budget
 from gpbnb.report.geometry import theory as geometry
-from gpbnb.report.gravity_probe_b import answers, probability, threshold, year, year_cases
+from gpbnb.report.gravity_probe_b import answers, threshold, year
 from gpbnb.report.kalman import ensembles
 from gpbnb.report.rolling import experiment as rolling_experiment
 from gpbnb.report.rolling import theory as rolling
@@ -42,7 +42,7 @@ def says(page: str, name: str, *phrases: str) -> None:
 def test_years_within_a_milliarcsecond():
     places = {}
     spread = {}
-    for each in probability.shares(threshold.SWEEP.load()):
+    for each in threshold.shares(threshold.SWEEP.load()):
         if each.fmt.base == 2 and each.fmt.rounding is Rounding.NEAREST:
             share = each.within / each.records
             place = (
@@ -148,7 +148,7 @@ def test_budget():
 
 def test_the_year():
     runs = {run.case: run for run in year.load()}
-    base = year_cases.Case(year_cases.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
+    base = year.Case(year.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
     end = {t: float(np.abs(runs[base._replace(precision=t)].rate[-1]).max()) for t in (18, 24, 32, 40, 53)}
     assert round(end[18], -3) == 26_000
     assert 0.8 < end[32] < 1

@@ -72,7 +72,7 @@ def test_help_only_helps(command, helped):
         "gpbnb.report.rolling.__main__",
         "gpbnb.report.inversion.__main__",
         "gpbnb.report.gravity_probe_b.threshold",
-        "gpbnb.report.gravity_probe_b.mission_runs",
+        "gpbnb.report.gravity_probe_b.mission",
     ],
 )
 def test_long_commands_write_to_the_given_folder(module, monkeypatch, tmp_path):

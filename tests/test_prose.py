@@ -26,7 +26,7 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.filters.forms import Form
 from gpbnb.report.budget import theory as budget
-from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.integration import theory as integration
 from gpbnb.report.kalman import report_bounds
@@ -149,7 +149,7 @@ def error_of_integration(rounding: Rounding) -> float:
 
 def decades_a_digit() -> float:
     """Decades that each decimal digit takes off the error of the drift rate after a year, on average."""
-    base = year_cases.Case(year_cases.MODELS[0], 10, 8, Rounding.NEAREST, Form.HUNG)
+    base = year.Case(year.MODELS[0], 10, 8, Rounding.NEAREST, Form.HUNG)
     runs = {run.case: run for run in year.load()}
     ends = [float(np.abs(runs[base._replace(precision=t)].rate[-1]).max()) for t in (8, 16)]
     return math.log10(ends[0] / ends[1]) / 8

@@ -5,8 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from gpbnb.report.gravity_probe_b import mission_runs, threshold
-from gpbnb.report.gravity_probe_b.stored import YEAR
+from gpbnb.report.gravity_probe_b import mission, threshold, year
 from gpbnb.report.guarantees import filters, scalar
 from gpbnb.report.inversion import stored as inversion
 from gpbnb.report.kalman.stored import ENSEMBLES
@@ -15,10 +14,10 @@ from gpbnb.sweeps import Sweep
 from gpbnb.sweeps.stored import run
 
 SWEEPS: tuple[Sweep[Any], ...] = (
-    YEAR,
+    year.SWEEP,
     ENSEMBLES,
     threshold.SWEEP,
-    mission_runs.SWEEP,
+    mission.SWEEP,
     filters.SWEEP,
     scalar.SWEEP,
     *inversion.stored(),

@@ -234,6 +234,11 @@ class Sweep(Generic[C]):
                     yield chunks[number], results
 
 
+def as_computed(cell: Any, result: Sequence[Any]) -> list[Record]:
+    """Return rows as computed; a saved result has lists in place of tuples."""
+    return [tuple(row) for row in result]
+
+
 def cell_key(cell: Any) -> Record:
     """Return the first columns of a cell's rows: its `key`, or nothing."""
     return tuple(getattr(cell, "key", ()))

@@ -11,7 +11,7 @@ import pytest
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.report.display import style
-from gpbnb.report.gravity_probe_b import answers, year, year_cases
+from gpbnb.report.gravity_probe_b import answers, year
 from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
 from gpbnb.report.kalman import figures, report_bounds
 from gpbnb.report.wordlengths import study
@@ -85,7 +85,7 @@ def test_the_tolerance_itself_is_met_and_what_is_just_below_is_not(rounding):
 
 
 def test_only_the_usual_model_counts():
-    assert {run.case.model for run in answers.find_answers().runs} == {year_cases.MODELS[0]}
+    assert {run.case.model for run in answers.find_answers().runs} == {year.MODELS[0]}
 
 
 def test_the_picture_shows_each_answer_on_the_tolerance():

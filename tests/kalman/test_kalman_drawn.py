@@ -31,9 +31,9 @@ from matplotlib.colors import to_hex
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
-from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.answers import Answers
-from gpbnb.report.gravity_probe_b.probability import Share
+from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.guarantees import figures as guarantee_figures
 from gpbnb.report.kalman import figures
 
@@ -43,7 +43,7 @@ STEPS = np.array([1, 10, 100])
 
 def run(precision, rounding, form, size, base=2):
     """A year with errors of its own: the rate's are largest, 4 size, half-way; the drift's reach 3 size."""
-    case = year_cases.Case(year_cases.MODELS[0], base, precision, rounding, form)
+    case = year.Case(year.MODELS[0], base, precision, rounding, form)
     drift = size * np.array([[1.0, -2.0], [-3.0, 1.0], [0.5, 0.25]])
     rate = size * np.array([[0.0, 0.0], [1.0, -4.0], [2.0, 1.5]])
     one = size * np.array([5.0, 6.0, 7.0])

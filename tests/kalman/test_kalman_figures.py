@@ -12,12 +12,12 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
-from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.answers import decimal_digits
 from gpbnb.report.kalman import ensembles, figures, report_bounds, smallest
 
-USUAL = year_cases.MODELS[0]
-TWENTY_FOUR = year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG)
+USUAL = year.MODELS[0]
+TWENTY_FOUR = year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from gpbnb.filters.forms import Form
 from gpbnb.filters.lockstep import Lockstep
 from gpbnb.filters.parallel import Records
 from gpbnb.filters.simulation import BLOCK
-from gpbnb.report.gravity_probe_b import mission, mission_runs
+from gpbnb.report.gravity_probe_b import mission
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS, STATES, Mission
 
 YEAR = np.linspace(0, 3_153_600, 2001).astype(np.int64)
@@ -139,38 +139,38 @@ def test_the_filter_finds_scale_and_roll_phase_by_the_aberration():
 
 
 def test_the_sweep_changes_one_choice_at_a_time():
-    usual = mission_runs.SETTINGS["mission"]
+    usual = mission.SETTINGS["mission"]
     fields = list(vars(usual))
-    for name, setting in mission_runs.SETTINGS.items():
+    for name, setting in mission.SETTINGS.items():
         changed = [field for field in fields if getattr(setting, field) != getattr(usual, field)]
         assert len(changed) == (name != "mission")
-    assert mission_runs.SETTINGS["steps and roll as flown"].steps == 15_768_000
-    cell = mission_runs.CELLS[0]
+    assert mission.SETTINGS["steps and roll as flown"].steps == 15_768_000
+    cell = mission.CELLS[0]
     assert cell.mission.deviations
-    found = mission_runs.rows(cell, mission_runs.compute(replace(cell, count=2), steps=500))
+    found = mission.rows(cell, mission.compute(replace(cell, count=2), steps=500))
     assert next(row[:7] for row in found) == cell.key
     assert len(found) == 2 * len(cell.precisions)
 
 
 def test_a_sample_is_one_record_of_one_format(monkeypatch):
     asked = set()
-    monkeypatch.setattr(mission_runs, "compute", lambda cell: asked.add((cell.precisions, cell.first, cell.count)))
-    monkeypatch.setattr(mission_runs, "rows", lambda cell, result: [])
-    cell = replace(mission_runs.CELLS[0], precisions=(20, 24), first=5, count=3)
+    monkeypatch.setattr(mission, "compute", lambda cell: asked.add((cell.precisions, cell.first, cell.count)))
+    monkeypatch.setattr(mission, "rows", lambda cell, result: [])
+    cell = replace(mission.CELLS[0], precisions=(20, 24), first=5, count=3)
     for seed in range(40):
-        mission_runs.sample(cell, np.random.default_rng(seed))
+        mission.sample(cell, np.random.default_rng(seed))
     assert asked == {((precision,), record, 1) for precision in (20, 24) for record in (5, 6, 7)}
 
 
 def test_every_cell_of_the_sweep_can_be_computed():
-    heads = [(*head, cell.first) for cell in mission_runs.CELLS for head in cell.heads()]
+    heads = [(*head, cell.first) for cell in mission.CELLS for head in cell.heads()]
     assert len(set(heads)) == len(heads)
     records = [
-        (*head, str(cell.first + i)) for cell in mission_runs.CELLS for head in cell.heads() for i in range(cell.count)
+        (*head, str(cell.first + i)) for cell in mission.CELLS for head in cell.heads() for i in range(cell.count)
     ]
-    assert sorted(records) == sorted(row[: mission_runs.SWEEP.key] for row in mission_runs.SWEEP.load().rows)
-    for cell in mission_runs.CELLS:
-        found = mission_runs.lockstep(replace(cell, count=1), 1)
+    assert sorted(records) == sorted(row[: mission.SWEEP.key] for row in mission.SWEEP.load().rows)
+    for cell in mission.CELLS:
+        found = mission.lockstep(replace(cell, count=1), 1)
         assert str(found.runs[0].form) == {"hung": "Hung (1984)", "innovation": "innovation"}[cell.form]
         assert [run.fmt.precision for run in found.runs] == list(cell.precisions)
 
@@ -188,7 +188,7 @@ def test_measurements_are_whole_multiples_of_their_resolution(monkeypatch):
 
 
 def test_the_filter_learns_the_roll_phase():
-    early, late = (mission_runs.roll_phase_after(blocks) for blocks in (1, 6))
+    early, late = (mission.roll_phase_after(blocks) for blocks in (1, 6))
     assert early.days == pytest.approx(4096 * 10 / 86400)
     # A milliradian before the first measurement.
     assert late.deviation < early.deviation < 206

@@ -1,4 +1,4 @@
-"""gravity_probe_b.probability: confidence intervals against their definition, and the precision they give."""
+"""gravity_probe_b.threshold: confidence intervals against their definition, and the precision they give."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import pytest
 from scipy import stats
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.report import confidence as probability
+from gpbnb.report import confidence
 from gpbnb.report.confidence import interval, quantile_limit, records_needed
-from gpbnb.report.gravity_probe_b import mission_runs, threshold
-from gpbnb.report.gravity_probe_b.probability import Needed, Share, needed, shares
+from gpbnb.report.gravity_probe_b import mission, threshold
+from gpbnb.report.gravity_probe_b.threshold import Needed, Share, needed, shares
 from gpbnb.sweeps import Table
 
 
@@ -86,7 +86,7 @@ def test_a_precision_qualifies_only_if_all_larger_ones_do():
         needed([few[0], few[0]._replace(form="innovation")])
 
 
-@pytest.mark.parametrize("sweep", [threshold.SWEEP, mission_runs.SWEEP], ids=lambda each: each.name)
+@pytest.mark.parametrize("sweep", [threshold.SWEEP, mission.SWEEP], ids=lambda each: each.name)
 def test_every_answer_is_shown_from_both_sides(sweep):
     groups: dict[tuple[object, ...], list[Share]] = {}
     for share in shares(sweep.load()):
@@ -112,4 +112,4 @@ def test_what_is_stored_answers():
     kind = ("absolute", 2, "hung", "nearest")
     nearest = [s for s in found if (s.states, s.fmt.base, s.form, s.fmt.rounding.value) == kind]
     assert needed(nearest).lognormal == 33
-    assert probability.CONFIDENCE == 0.95
+    assert confidence.CONFIDENCE == 0.95

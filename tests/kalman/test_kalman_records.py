@@ -29,8 +29,8 @@ from gpbnb.report.gravity_probe_b.threshold import (
     rows,
     sample,
 )
-from gpbnb.report.gravity_probe_b.year_cases import MODELS, model
-from gpbnb.report.gravity_probe_b.year_cases import simulation as year_simulation
+from gpbnb.report.gravity_probe_b.year import MODELS, model
+from gpbnb.report.gravity_probe_b.year import simulation as year_simulation
 
 STEPS, COUNT = 300, 5
 

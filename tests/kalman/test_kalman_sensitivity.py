@@ -1,4 +1,4 @@
-"""gpbnb.report.gravity_probe_b.sensitivity: by how many bits a choice moves the answer, for errors that are known."""
+"""gpbnb.report.gravity_probe_b.answers: by how many bits a choice moves the answer, for errors that are known."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from tabulated import by_header
 
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.filters.forms import Form
-from gpbnb.report.gravity_probe_b import answers, tables, year, year_cases
-from gpbnb.report.gravity_probe_b.probability import Share
-from gpbnb.report.gravity_probe_b.sensitivity import Moved, median_precision, sensitivity, single_record
+from gpbnb.report.gravity_probe_b import answers, tables, year
+from gpbnb.report.gravity_probe_b.answers import Moved, median_precision, sensitivity, single_record
+from gpbnb.report.gravity_probe_b.threshold import Share
 
 
 def share(precision, error, setting="simple", states="deviation", form="hung", rounding=Rounding.NEAREST, records=3):
@@ -76,7 +76,7 @@ def test_what_is_stored_of_one_record():
     runs = year.load()
     found = {(each.choice, each.after): each for each in single_record(runs)}
     by = {run.case: run for run in runs}
-    usual = year_cases.Case(year_cases.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
+    usual = year.Case(year.MODELS[0], 2, 24, Rounding.NEAREST, Form.HUNG)
     chopped = answers.largest(by[usual._replace(rounding=Rounding.CHOP)]) / answers.largest(by[usual])
     assert 2 ** found["rounding", "chop"].bits == pytest.approx(chopped)
     assert found["rounding", "chop"].bits > 1 > abs(found["form", "innovation"].bits)

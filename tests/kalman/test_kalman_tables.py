@@ -13,9 +13,9 @@ from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.confidence import interval
 from gpbnb.report.gravity_probe_b import tables as gravity_probe_b_tables
-from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.model import gravity_probe_b
-from gpbnb.report.gravity_probe_b.probability import Share
+from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.kalman import ensembles, independent, printed, report_bounds, smallest, tables
 from gpbnb.wordlength.requirement import Requirement
 
@@ -158,12 +158,12 @@ def test_the_states():
     assert len(rows) == 10
 
 
-USUAL = year_cases.MODELS[0]
+USUAL = year.MODELS[0]
 
 
 def run(**changes):
     values = {
-        "case": year_cases.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG),
+        "case": year.Case(USUAL, 2, 24, Rounding.NEAREST, Form.HUNG),
         "steps": np.array([1, 3]),
         "drift": np.array([[9.0, 9.0], [-2.0, 1.0]]),
         "rate": np.array([[9.0, 9.0], [0.25, -0.5]]),
@@ -194,10 +194,10 @@ def test_year_ends():
     rows = cells(table)
     assert rows[0] == ["24 bits", "Hung (1984)", "2", "0.5", "0.12", r"$1.0\times10^{-6}$", "-0.5"]
     assert rows[1][-1] == "-0.5; first non-positive variance at step 12,345"
-    other = run(case=run().case._replace(model=year_cases.MODELS[1]))
+    other = run(case=run().case._replace(model=year.MODELS[1]))
     table = gravity_probe_b_tables.year_ends([run(), other])
     assert table.header[0] == "model"
-    assert [row[0] for row in cells(table)] == list(year_cases.MODELS[:2])
+    assert [row[0] for row in cells(table)] == list(year.MODELS[:2])
     with pytest.raises(ValueError, match="got the reference"):
         gravity_probe_b_tables.year_ends([run(case=run().case.reference)])
 

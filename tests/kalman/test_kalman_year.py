@@ -14,12 +14,18 @@ from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run, reference
 from gpbnb.filters.simulation import BLOCK
-from gpbnb.report.gravity_probe_b import answers, year, year_cases, year_runs
+from gpbnb.report.gravity_probe_b import answers, year
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
-from gpbnb.report.gravity_probe_b.stored import same_errors
-from gpbnb.report.gravity_probe_b.year import HEADER
-from gpbnb.report.gravity_probe_b.year_cases import BOUNDED_CASES, CASES, MODELS, Case
-from gpbnb.report.gravity_probe_b.year_runs import ResumableRun, run_cases
+from gpbnb.report.gravity_probe_b.year import (
+    BOUNDED_CASES,
+    CASES,
+    HEADER,
+    MODELS,
+    Case,
+    ResumableRun,
+    run_cases,
+    same_errors,
+)
 from gpbnb.sweeps import read
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
@@ -45,9 +51,9 @@ def slices():
 @pytest.mark.parametrize("key", slices())
 def test_a_slice_of_every_year_comes_out_digit_for_digit(key):
     case = Case(key[0], int(key[1]), int(key[2]), Rounding(key[3]), Form[key[4].upper()])
-    checkpoint_steps = tuple(mark for mark in year_cases.checkpoint_steps() if mark <= 464)
-    z = year_cases.simulation(case.model).measurements(checkpoint_steps[-1])
-    given = year_cases.model(case.model, case.base)
+    checkpoint_steps = tuple(mark for mark in year.checkpoint_steps() if mark <= 464)
+    z = year.simulation(case.model).measurements(checkpoint_steps[-1])
+    given = year.model(case.model, case.base)
     again = year.rows(case, emulate(given, z, case.fmt, case.form, checkpoint_steps, true(case.model, case.base)))
     lines = [line for line in stored("year") if line[:5] == key]
     # The last column is an eigenvalue, whose last digits are those of a machine's LAPACK.
@@ -62,9 +68,9 @@ REFERENCES = {}
 def true(name, base):
     """The reference, once for all cases."""
     if (name, base) not in REFERENCES:
-        checkpoint_steps = tuple(mark for mark in year_cases.checkpoint_steps() if mark <= 464)
-        z = year_cases.simulation(name).measurements(464)
-        REFERENCES[name, base] = reference(year_cases.model(name, base), z, checkpoint_steps)
+        checkpoint_steps = tuple(mark for mark in year.checkpoint_steps() if mark <= 464)
+        z = year.simulation(name).measurements(464)
+        REFERENCES[name, base] = reference(year.model(name, base), z, checkpoint_steps)
     return REFERENCES[name, base]
 
 
@@ -84,7 +90,7 @@ def test_every_case_is_stored_to_the_end_of_the_year():
     assert [run.case for run in runs] == list(CASES)
     assert len(set(CASES)) == len(CASES) == 45
     for run in runs:
-        assert run.steps.tolist() == list(year_cases.checkpoint_steps())
+        assert run.steps.tolist() == list(year.checkpoint_steps())
         assert run.steps[-1] == YEAR == 3_153_600
         assert run.stopped is None
         assert run.drift.shape == run.rate.shape == (len(run.steps), 2)
@@ -172,18 +178,18 @@ def test_in_one_base_every_format_holds_the_model_and_the_measurements():
     assert min(case.precision for case in CASES if case.base == 2) == 14
     assert min(case.precision for case in CASES if case.base == 10) == 4
     for name, base in {(case.model, case.base) for case in CASES}:
-        given = year_cases.model(name, base)
+        given = year.model(name, base)
         stored_again = given.rounded(FloatFormat(base, 14 if base == 2 else 4, CHOP))
         for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
             assert (getattr(given, letter) == getattr(stored_again, letter)).all()
-    z = year_cases.simulation(MODELS[0]).measurements(BLOCK)
+    z = year.simulation(MODELS[0]).measurements(BLOCK)
     assert (z == np.rint(z)).all()
     assert np.abs(z).max() < 10**4  # four decimal digits
 
 
 def test_checkpoint_steps_are_at_equal_ratios():
-    assert year_cases.checkpoint_steps()[-1] == YEAR
-    assert year_cases.checkpoint_steps(100) == (1, 2, 5, 10, 22, 46, 100)
+    assert year.checkpoint_steps()[-1] == YEAR
+    assert year.checkpoint_steps(100) == (1, 2, 5, 10, 22, 46, 100)
 
 
 def test_cases_have_names_of_their_own():
@@ -196,18 +202,18 @@ def test_cases_have_names_of_their_own():
 
 def test_the_fingerprint_tells_whatever_changes_a_run(monkeypatch):
     def given(case=SINGLE, steps=500):
-        year_runs.fingerprint.cache_clear()
-        return year_runs.fingerprint(case, steps)
+        year.fingerprint.cache_clear()
+        return year.fingerprint(case, steps)
 
     first = given()
     assert given() == first
     others = {given(steps=501), given(SINGLE._replace(precision=25)), given(SINGLE._replace(rounding=CHOP))}
     others |= {given(SINGLE._replace(form=form)) for form in Form if form is not Form.HUNG}
     others |= {given(SINGLE._replace(model=name)) for name in MODELS[1:]} | {given(SINGLE.reference)}
-    monkeypatch.setattr(year_runs, "TRUTH", tuple(value + 1 for value in TRUTH))
+    monkeypatch.setattr(year, "TRUTH", tuple(value + 1 for value in TRUTH))
     others.add(given())
     monkeypatch.undo()
-    monkeypatch.setattr(year_runs, "BOUNDED_CASES", frozenset([SINGLE]))
+    monkeypatch.setattr(year, "BOUNDED_CASES", frozenset([SINGLE]))
     others.add(given())
     monkeypatch.undo()
     step = Run.take
@@ -216,7 +222,7 @@ def test_the_fingerprint_tells_whatever_changes_a_run(monkeypatch):
     monkeypatch.undo()
     assert first not in others
     assert len(others) == 13
-    year_runs.fingerprint.cache_clear()
+    year.fingerprint.cache_clear()
 
 
 # -- interruption ---------------------------------------------------------------------------------
@@ -225,9 +231,9 @@ STEPS = 2 * BLOCK + 100
 
 
 def results(directory):
-    year_runs.reference_checkpoints.cache_clear()
+    year.reference_checkpoints.cache_clear()
     run = ResumableRun(SINGLE, directory, STEPS).run
-    return year.rows(SINGLE, year_runs.history(SINGLE, directory, STEPS)), run.x.tolist(), run.P.tolist()
+    return year.rows(SINGLE, year.history(SINGLE, directory, STEPS)), run.x.tolist(), run.P.tolist()
 
 
 def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeypatch):
@@ -250,16 +256,16 @@ def test_a_year_that_is_interrupted_goes_on_where_it_was_saved(tmp_path, monkeyp
     assert saved == [(case, steps) for case in (SINGLE.reference, SINGLE) for steps in ends]
     monkeypatch.undo()
     assert results(parts) == results(whole)
-    once = Run(year_cases.model(SINGLE.model, SINGLE.base), SINGLE.fmt, SINGLE.form, ())
-    once.take(year_cases.simulation(SINGLE.model).measurements(STEPS))
+    once = Run(year.model(SINGLE.model, SINGLE.base), SINGLE.fmt, SINGLE.form, ())
+    once.take(year.simulation(SINGLE.model).measurements(STEPS))
     assert results(whole)[1:] == (once.x.tolist(), once.P.tolist())
     assert year.bound_rows(SINGLE.reference, parts, STEPS) == year.bound_rows(SINGLE.reference, whole, STEPS)
-    year_runs.reference_checkpoints.cache_clear()
+    year.reference_checkpoints.cache_clear()
     assert sorted(file.name for file in parts.iterdir()) == [f"{SINGLE.reference.name}.npz", f"{SINGLE.name}.npz"]
     # Finished runs are not taken up again; those of another code are.
     monkeypatch.setattr(ResumableRun, "advance", lambda *_: pytest.fail("a finished run went on"))
     run_cases([SINGLE], parts, STEPS, progress=False)
-    monkeypatch.setattr(year_runs, "fingerprint", lambda case, steps: "other")
+    monkeypatch.setattr(year, "fingerprint", lambda case, steps: "other")
     assert ResumableRun(SINGLE, parts, STEPS).run.steps == 0
 
 
@@ -285,7 +291,7 @@ def test_progress_counts_the_steps_of_a_run(tmp_path):
 def test_the_processor_time_of_a_run_is_that_of_its_blocks(tmp_path, monkeypatch):
     """A clock goes on by 1, 10 and 100 seconds during the blocks, and by 1000 seconds between them."""
     run, readings = ResumableRun(SINGLE, tmp_path, STEPS), iter([5, 6, 1006, 1016, 2016, 2116])
-    monkeypatch.setattr(year_runs, "time", SimpleNamespace(process_time=lambda: next(readings)))
+    monkeypatch.setattr(year, "time", SimpleNamespace(process_time=lambda: next(readings)))
     run.advance(3)
     assert run.seconds == ResumableRun(SINGLE, tmp_path, STEPS).seconds == 111
 
@@ -299,7 +305,7 @@ def test_the_command_writes_what_is_loaded(tmp_path, monkeypatch, capsys):
     assert (origin["command"], origin["seed"]) == ("python -m gpbnb.report.gravity_probe_b.year", "1984")
     runs = year.load(here)
     assert [run.case for run in runs] == list(CASES[:3])
-    assert all(run.steps.tolist() == list(year_cases.checkpoint_steps(100)) for run in runs)
+    assert all(run.steps.tolist() == list(year.checkpoint_steps(100)) for run in runs)
     # As far as it goes, it is the year.
     for run in runs:
         whole = at_end(2, run.case.precision)

@@ -19,7 +19,7 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import log_spaced, reference
 from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import model as gravity_probe_b
-from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.integration.theory import needed_precision
 from gpbnb.report.kalman.report_bounds import coefficients
@@ -93,8 +93,8 @@ def test_printed_precision_is_the_least_that_meets_125(base):
 
 
 def test_growth_answers_for_the_first_steps():
-    model = year_cases.model(year_cases.MODELS[0], 2)
-    z = year_cases.simulation(year_cases.MODELS[0]).measurements(12)
+    model = year.model(year.MODELS[0], 2)
+    z = year.simulation(year.MODELS[0]).measurements(12)
     tolerance = [1] * 4 + [math.inf] * 6
     (found,) = study.required_precision_by_steps(model, z, tolerance, [12], form=Form.UD)
     assert found == required_precision(model, 12, tolerance, form=Form.UD, z=z)
@@ -127,7 +127,7 @@ def test_growth_grows():
 
 
 def test_years_needed_against_each_run():
-    kind = year_cases.Case(year_cases.MODELS[0], 2, 0, Rounding.NEAREST, Form.HUNG)
+    kind = year.Case(year.MODELS[0], 2, 0, Rounding.NEAREST, Form.HUNG)
     runs = [run for run in year.load() if run.case == kind._replace(precision=run.case.precision)]
     found = dict(study.precision_by_step(runs, 1.0))
     for run in runs:

@@ -25,7 +25,7 @@ from gpbnb.report.display.style import (
 )
 from gpbnb.report.display.tables import arithmetic
 from gpbnb.report.gravity_probe_b.answers import Answers, decimal_digits, largest
-from gpbnb.report.gravity_probe_b.probability import Share
+from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.gravity_probe_b.year import Year
 from gpbnb.report.kalman import report_bounds
 from gpbnb.report.kalman.figures import bound_by_digits

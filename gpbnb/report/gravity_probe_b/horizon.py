@@ -36,8 +36,8 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b.model import YEAR
-from gpbnb.report.gravity_probe_b.year_cases import MODELS
-from gpbnb.report.gravity_probe_b.year_cases import model as year_model
+from gpbnb.report.gravity_probe_b.year import MODELS
+from gpbnb.report.gravity_probe_b.year import model as year_model
 from gpbnb.sweeps import Column, machine, read, write
 
 FILE = Path(__file__).with_name("horizon.csv")

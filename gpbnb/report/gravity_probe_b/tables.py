@@ -12,11 +12,11 @@ from gpbnb.bounds.bounded_run import BoundedHistory
 from gpbnb.filters import contraction
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.display.tables import Table, arithmetic, short
-from gpbnb.report.gravity_probe_b import probability, year
+from gpbnb.report.gravity_probe_b import threshold, year
+from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS
 from gpbnb.report.gravity_probe_b.model import STATES
-from gpbnb.report.gravity_probe_b.probability import Share
-from gpbnb.report.gravity_probe_b.sensitivity import Moved
+from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.kalman import report_bounds
 from gpbnb.report.kalman.printed import Terms
 from gpbnb.wordlength.requirement import Requirement
@@ -159,7 +159,7 @@ def needed_precisions(found: Sequence[Share]) -> Table:
         groups.setdefault((each.setting, each.states, each.form, fmt.rounding.value, unit), []).append(each)
     rows = []
     for (setting, states, form, rounding, unit), group in groups.items():
-        answer = probability.needed(group)
+        answer = threshold.needed(group)
         observed, lognormal, shown = ("none" if each is None else f"{each} {unit}" for each in answer)
         at = next((each for each in group if each.fmt.precision == answer.observed), None)
         passed, limits = (f"{at.within} of {at.records}", f"{at.low:.3f} to {at.high:.3f}") if at else ("–", "–")

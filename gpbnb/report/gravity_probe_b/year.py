@@ -1,34 +1,259 @@
 """A year of Gravity Probe B, 3,153,600 steps, in many formats and forms.
 
-The command ``python -m gpbnb.report.gravity_probe_b.year`` resumes where it was interrupted. Its results are stored
-next to this file, in ``year.csv`` and ``bounds.csv``, with their provenance in ``year.json``; :func:`load` and
-:func:`bounds` read them.
+In one base, all formats use the same numbers. The model is stored once, in 14 bits or 4 decimal digits, and
+measurements are whole milliarcseconds. So one reference serves all formats, and errors come only from the arithmetic.
+
+The command ``python -m gpbnb.report.gravity_probe_b.year`` saves its progress and resumes where it was interrupted. Its
+results are stored next to this file, in ``year.csv`` and ``bounds.csv``, with their provenance in ``year.json``;
+:func:`load` and :func:`bounds` read them.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
+import math
+import os
 import platform
 import sys
+import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb import sweeps
-from gpbnb.arithmetic.formats import Rounding
+from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.bounds.bounded_run import BoundedRun
-from gpbnb.filters.emulation import History, relative
+from gpbnb.filters.contraction import Contraction
+from gpbnb.filters.emulation import History, compare_runs, emulate, relative
 from gpbnb.filters.forms import Form
-from gpbnb.report.gravity_probe_b.model import SEED, YEAR
-from gpbnb.report.gravity_probe_b.year_cases import CASES, MODELS, Case
-from gpbnb.report.gravity_probe_b.year_runs import ResumableRun, history, reference_checkpoints, run_cases
-from gpbnb.sweeps import Column
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.run import Checkpoints, Run, log_spaced, reference
+from gpbnb.filters.simulation import BLOCK, Simulation
+from gpbnb.report.gravity_probe_b.model import SEED, TRUTH, YEAR, gravity_probe_b, gravity_probe_b_year
+from gpbnb.sweeps import Column, Sweep, as_computed
+
+#: Format in which the model is stored, by base; every format of this base in :data:`CASES` contains it.
+STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
+
+#: The models, with roll periods of 600 s as in the reports, 77.5 s as flown, and 600 s without process noise.
+MODELS = ("roll 600 s", "roll 77.5 s", "no process noise")
+
+
+class Case(NamedTuple):
+    """One run of the year; a precision of 0 stands for the reference in double-double."""
+
+    model: str
+    base: int
+    precision: int
+    rounding: Rounding
+    form: Form
+
+    @property
+    def fmt(self) -> FloatFormat | None:
+        """The format of the run; None for double-double."""
+        return FloatFormat(self.base, self.precision, self.rounding) if self.precision else None
+
+    @property
+    def reference(self) -> Case:
+        """The case that serves as the reference for this one."""
+        return Case(self.model, self.base, 0, Rounding.NEAREST, Form.INNOVATION)
+
+    @property
+    def name(self) -> str:
+        """Name of the files for this case."""
+        words = f"{self.model} {self.base} {self.precision} {self.rounding.value} {self.form.name.lower()}"
+        return words.replace(" ", "-").replace(".", "_")
+
+
+def _cases() -> tuple[Case, ...]:
+    usual, flown, noiseless = MODELS
+    nearest, chop = Rounding.documented()
+    others = (Form.INNOVATION, Form.JOSEPH, Form.UD)
+    cases = [Case(usual, 2, t, nearest, Form.HUNG) for t in (24, 18, 32, 14, 20, 53)]
+    cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (24, 18, 32)]
+    cases += [Case(usual, 2, 24, nearest, form) for form in others]
+    cases += [Case(usual, 10, 8, nearest, Form.HUNG), Case(usual, 10, 6, nearest, Form.HUNG)]
+    cases += [Case(flown, 2, 24, nearest, Form.HUNG), Case(noiseless, 2, 24, nearest, Form.HUNG)]
+    cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (22, 28)]
+    cases += [Case(usual, 2, 18, nearest, form) for form in others]
+    cases += [Case(usual, 2, 24, nearest, Form.HUNG_SECOND_GAIN), Case(usual, 10, 8, chop, Form.HUNG)]
+    cases += [Case(usual, 10, 8, nearest, Form.UD), Case(usual, 10, 10, nearest, Form.HUNG)]
+    cases += [Case(usual, 2, 24, chop, form) for form in others]
+    cases += [Case(usual, 10, 8, nearest, form) for form in others[:2]]
+    cases += [Case(usual, 10, 4, nearest, Form.HUNG), Case(usual, 10, 16, nearest, Form.HUNG)]
+    cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (16, 26, 40)]
+    cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (14, 20, 28, 53)]
+    cases += [Case(usual, 2, 53, nearest, form) for form in others]
+    # Neighbours of the smallest precisions that meet a milliarcsecond a year, so that these are exact.
+    cases += [Case(usual, 10, 9, nearest, Form.HUNG), *(Case(usual, 2, t, nearest, Form.HUNG) for t in (31, 33))]
+    return tuple(cases)
+
+
+#: All runs, the most informative first.
+CASES = _cases()
+
+#: Runs with their own contraction bound, the references of the first model, from which the other bounds follow.
+BOUNDED_CASES = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.INNOVATION) for base in STORED)
+
+
+@cache
+def model(name: str, base: int) -> LinearModel:
+    """Return one of :data:`MODELS` as stored in a base."""
+    roll = "77.5" if name == MODELS[1] else "600"
+    return gravity_probe_b(roll, process_noise=name != MODELS[2]).rounded(STORED[base])
+
+
+@cache
+def simulation(name: str) -> Simulation:
+    """Return the simulated measurements, the same for both bases; the truth follows the model of base 2."""
+    return gravity_probe_b_year(model(name, 2))
+
+
+def checkpoint_steps(steps: int = YEAR) -> tuple[int, ...]:
+    """Return the steps whose results are saved, three per decade."""
+    return log_spaced(steps, 3)
+
+
+# -- resumable runs ----------------------------------------------------------------------------------
+
+_BLOCKS_PER_SAVE = 64  # blocks
+_FINGERPRINT_STEPS = 200  # steps that show whether the code's results are unchanged
+
+
+class ResumableRun:
+    """A run of one case, saved in a file, with its contraction bound if ``BOUNDED_CASES`` contains the case."""
+
+    def __init__(self, case: Case, directory: Path, steps: int) -> None:
+        self.case, self.steps, self.seconds = case, steps, 0.0
+        self.run = _run(case, steps)
+        self.truth: NDArray[np.float64] = np.array(TRUTH)
+        self.file = directory / f"{case.name}.npz"
+        self.fingerprint = fingerprint(case, steps)
+        if self.file.exists():
+            with np.load(self.file) as saved:
+                if str(saved["fingerprint"]) == self.fingerprint:
+                    for name, array in self._arrays().items():
+                        array[...] = saved[name]
+                    if isinstance(self.run, BoundedRun):
+                        self.run.bound = Contraction(*(saved[f"bound_{name}"][()] for name in Contraction._fields))
+                    self.truth, self.seconds = saved["truth"], float(saved["seconds"])
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        arrays = {name: getattr(self.run, name) for name in ("x", "P", "X", "G", "C", "notes")}
+        if isinstance(self.run, BoundedRun):
+            arrays |= dict(zip(("states", "gains", "covariances"), self.run.bounds, strict=True))
+        return arrays
+
+    @property
+    def finished(self) -> bool:
+        """Whether all steps are done, or the run has stopped."""
+        return self.run.steps >= self.steps or self.run.stopped is not None
+
+    def advance(self, blocks: int, bar: Any = None) -> None:
+        """Take at most `blocks` blocks of measurements, and save the run."""
+        source = simulation(self.case.model)
+        for _ in range(blocks):
+            if self.finished:
+                break
+            before, start = self.run.steps, time.process_time()
+            z, self.truth = source.block(before // BLOCK, self.truth, self.steps - before)
+            self.run.take(z)
+            self.seconds += time.process_time() - start
+            if bar is not None:
+                bar.update(self.run.steps - before)
+        self.save()
+
+    def save(self) -> None:
+        """Save the run, either completely or not at all."""
+        draft = self.file.with_suffix(f".{os.getpid()}.npz")
+        arrays = self._arrays()
+        if isinstance(self.run, BoundedRun):
+            arrays |= {f"bound_{name}": np.asarray(each) for name, each in self.run.bound._asdict().items()}
+        arrays |= {"truth": self.truth, "seconds": np.array(self.seconds), "fingerprint": np.array(self.fingerprint)}
+        np.savez(draft, allow_pickle=False, **arrays)
+        os.replace(draft, self.file)
+
+
+def _run(case: Case, steps: int) -> Run:
+    kind = BoundedRun if case in BOUNDED_CASES else Run
+    return kind(model(case.model, case.base), case.fmt, case.form, checkpoint_steps(steps))
+
+
+@cache
+def fingerprint(case: Case, steps: int) -> str:
+    """Digest the inputs of a run and its results for the first measurements, to the last digit.
+
+    Saved runs are discarded when the code's results change, but not when only its text changes.
+    """
+    given, run = model(case.model, case.base), _run(case, steps)
+    digest = hashlib.sha256(
+        repr((case.name, steps, checkpoint_steps(steps), TRUTH, BLOCK, case in BOUNDED_CASES)).encode()
+    )
+    for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
+        digest.update(" ".join(map(str, getattr(given, letter).flat)).encode())
+    run.take(simulation(case.model).measurements(_FINGERPRINT_STEPS))
+    bound = run.bound if isinstance(run, BoundedRun) else ()
+    for each in (run.x, run.P, run.notes, *bound):
+        digest.update(np.ascontiguousarray(each).tobytes())
+    return digest.hexdigest()
+
+
+def run_cases(
+    cases: Sequence[Case],
+    directory: Path,
+    steps: int = YEAR,
+    progress: bool = True,
+    each: int = _BLOCKS_PER_SAVE,
+) -> None:
+    """Run the cases and their references one after another, each from its saved state.
+
+    Parameters
+    ----------
+    directory : folder in which runs are saved after every 64 blocks of 4096 steps.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    todo = list(dict.fromkeys(part for case in cases for part in (case.reference, case)))
+    with tqdm(total=len(todo) * steps, desc="year", unit="step", unit_scale=True, disable=not progress) as bar:
+        for case in todo:
+            bar.set_postfix_str(case.name)
+            if _is_finished(case, directory, steps):
+                bar.update(steps)
+                continue
+            run = ResumableRun(case, directory, steps)
+            bar.update(run.run.steps)
+            while not run.finished:
+                run.advance(each, bar)
+
+
+def _is_finished(case: Case, directory: Path, steps: int) -> bool:
+    file = directory / f"{case.name}.npz"
+    if not file.exists():
+        return False
+    with np.load(file) as saved:
+        done, _, _, stopped = saved["notes"]
+        return str(saved["fingerprint"]) == fingerprint(case, steps) and (done >= steps or stopped > 0)
+
+
+def history(case: Case, directory: Path, steps: int = YEAR) -> History:
+    """Return the errors of a finished run."""
+    return compare_runs(
+        ResumableRun(case, directory, steps).run, reference_checkpoints(case.reference, directory, steps)
+    )
+
+
+@cache
+def reference_checkpoints(case: Case, directory: Path, steps: int) -> Checkpoints:
+    """Checkpoints of a finished run that serves others as their reference."""
+    return ResumableRun(case, directory, steps).run.checkpoints()
+
 
 _HERE = Path(__file__).parent
 _COLUMNS = ("drift_2", "drift_3", "rate_2", "rate_3", "state", "gain", "covariance", "least_eigenvalue")
@@ -255,6 +480,55 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given.output.mkdir(parents=True, exist_ok=True)
     write(CASES[: given.cases], given.directory, given.steps, given.output)
     return 0
+
+
+# -- the years as a sweep ----------------------------------------------------------------------------
+
+#: Steps of a year that a sample recomputes, about eleven days.
+SAMPLE_STEPS = 100_000
+
+
+def first_steps(case: Case, directory: Path | None = None, steps: int = SAMPLE_STEPS) -> list[tuple[str, ...]]:
+    """Return the rows of a year up to some step."""
+    chosen = tuple(step for step in checkpoint_steps() if step <= steps)
+    z = simulation(case.model).measurements(chosen[-1])
+    fmt = case.fmt
+    if fmt is None:
+        raise ValueError(f"got {case}, a reference; needed a case with a format")
+    given = model(case.model, case.base)
+    return rows(case, emulate(given, z, fmt, case.form, chosen, _true(case.model, case.base, chosen)))
+
+
+@cache
+def _true(name: str, base: int, chosen: tuple[int, ...]) -> Checkpoints:
+    return reference(model(name, base), simulation(name).measurements(chosen[-1]), chosen)
+
+
+def sample_of_year(case: Case, rng: np.random.Generator) -> list[tuple[str, ...]]:
+    """Return the rows of the first eleven days."""
+    return first_steps(case)
+
+
+def same_errors(stored: tuple[str, ...], computed: tuple[str, ...]) -> bool:
+    """Whether two rows of a year agree, apart from the last digits of an eigenvalue, which depend on LAPACK."""
+    return stored[:-1] == computed[:-1] and math.isclose(
+        float(stored[-1]), float(computed[-1]), rel_tol=1e-4, abs_tol=1e-12
+    )
+
+
+SWEEP: Sweep[Case] = Sweep(
+    name="kalman/year",
+    file=_HERE / "year.csv",
+    columns=COLUMNS,
+    key=6,
+    cells=lambda: CASES,
+    compute=first_steps,
+    rows=as_computed,
+    command="python -m gpbnb.report.gravity_probe_b.year",
+    seed=1984,
+    sample=sample_of_year,
+    same=same_errors,
+)
 
 
 if __name__ == "__main__":

@@ -5,19 +5,12 @@ The command of :mod:`gpbnb.report.kalman.ensembles` writes it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from gpbnb.report.kalman import ensembles
-from gpbnb.sweeps import Sweep
+from gpbnb.sweeps import Sweep, as_computed
 
 HERE = Path(__file__).parent
-
-
-def rows(cell: Any, result: Sequence[Any]) -> list[tuple[str, ...]]:
-    """Return rows as computed; a saved result has lists in place of tuples."""
-    return [tuple(row) for row in result]
 
 
 def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
@@ -33,7 +26,7 @@ ENSEMBLES: Sweep[int] = Sweep(
     key=3,
     cells=lambda: range(ensembles.REPEATS),
     compute=trials_of_seed,
-    rows=rows,
+    rows=as_computed,
     command=ensembles.COMMAND,
     seed=0,
 )

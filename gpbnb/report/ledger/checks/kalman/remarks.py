@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat, Rounding
 from gpbnb.arithmetic.rational import exact
 from gpbnb.filters import contraction, emulation, forms
-from gpbnb.report.gravity_probe_b import year, year_cases
+from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.kalman import derivation, exact_step, report_bounds, smallest
 from gpbnb.report.ledger.checks.kalman.example import GOAL, SIGNAL, STEP, YEAR, M, N, coefficients
 from gpbnb.report.ledger.checks.kalman.registry import CHAPTER, CHECKS, FOUR
@@ -94,8 +94,8 @@ def year_again() -> bool:
     if case.fmt is None:
         raise ValueError(f"got {case.name} as the first run in year.csv; needed a run in a floating-point format")
     steps = tuple(int(step) for step in stored.steps if step <= 10)
-    z = year_cases.simulation(case.model).measurements(max(steps))
-    found = emulation.emulate(year_cases.model(case.model, case.base), z, case.fmt, case.form, steps)
+    z = year.simulation(case.model).measurements(max(steps))
+    found = emulation.emulate(year.model(case.model, case.base), z, case.fmt, case.form, steps)
     again = np.array([[float(f"{number:.6g}") for number in line] for line in found.state[:, 2:4]])
     return bool(np.array_equal(again, stored.rate[: len(steps)]))
 
@@ -105,8 +105,8 @@ def needed_precision(base: int) -> int | None:
     """Return the fewest stored digits from which on the drift rates meet the tolerance at all checkpoints."""
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
-        comparable = found.case._replace(precision=0) == year_cases.Case(
-            year_cases.MODELS[0], base, 0, Rounding.NEAREST, forms.Form.HUNG
+        comparable = found.case._replace(precision=0) == year.Case(
+            year.MODELS[0], base, 0, Rounding.NEAREST, forms.Form.HUNG
         )
         if comparable:
             if found.steps[-1] != YEAR // STEP or np.abs(found.rate).max() > GOAL:
