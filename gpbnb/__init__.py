@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from gpbnb.arithmetic.array import FloatArray
     from gpbnb.arithmetic.exits import peek
     from gpbnb.arithmetic.fixed import FixedFormat
-    from gpbnb.arithmetic.formats import FloatFormat, Rounding
+    from gpbnb.arithmetic.formats import FloatFormat
     from gpbnb.arithmetic.named import (
         BFLOAT16,
         BINARY16,
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         IBM_HEX64,
         TF32,
     )
+    from gpbnb.arithmetic.rounding import Rounding
     from gpbnb.filters.model import LinearModel
     from gpbnb.wordlength.models import read_model
     from gpbnb.wordlength.precision import required_precision
@@ -71,7 +72,7 @@ _HOME = {
     "FloatFormat": "gpbnb.arithmetic.formats",
     "LinearModel": "gpbnb.filters.model",
     "LinearSystem": "gpbnb.wordlength.system",
-    "Rounding": "gpbnb.arithmetic.formats",
+    "Rounding": "gpbnb.arithmetic.rounding",
     "peek": "gpbnb.arithmetic.exits",
     "read_model": "gpbnb.wordlength.models",
     "required_precision": "gpbnb.wordlength.precision",

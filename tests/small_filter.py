@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 

@@ -22,8 +22,9 @@ import pytest
 import sympy as sp
 from scipy.integrate import quad
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import doubledouble
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.budget import theory as budget
 from gpbnb.report.gravity_probe_b import year

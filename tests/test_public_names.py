@@ -9,7 +9,8 @@ import pytest
 import gpbnb
 
 HOMES = {
-    "arithmetic.formats": "FloatFormat Rounding",
+    "arithmetic.formats": "FloatFormat",
+    "arithmetic.rounding": "Rounding",
     "arithmetic.fixed": "FixedFormat",
     "arithmetic.array": "FloatArray",
     "arithmetic.exits": "peek",

@@ -30,7 +30,7 @@ from gpbnb.arithmetic.kernels.limited_backends import (
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding, Rules, rounding_named
 
-__all__ = ["FloatFormat", "Rounding", "prints_as"]
+__all__ = ["FloatFormat", "prints_as"]
 
 LARGEST_EXPONENT = 2**20
 """Largest size of an exponent of a range, in base 2; that of binary128 is 16383."""

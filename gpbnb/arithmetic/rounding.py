@@ -71,7 +71,7 @@ class Limits(NamedTuple):
     #: The largest number and the most negative one.
     largest: Fraction
     lowest: Fraction
-    #: What happens to results beyond these: "raise", "saturate" or "wrap".
+    #: "raise", "saturate" or "wrap", which is what happens to results beyond these.
     overflow: str = "raise"
     #: Whether all numbers have the same spacing, as in fixed point.
     fixed: bool = False

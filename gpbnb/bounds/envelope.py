@@ -38,8 +38,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.program import MULTIPLY, effects, functionals
 
 _U = 2.0**-53

@@ -32,9 +32,10 @@ import numpy as np
 from gpbnb.arithmetic import linalg, search
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounds import column_sum, gamma, gamma_probabilistic
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import LU
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+from gpbnb.arithmetic.rounding import Rounding
 
 # -- a priori: from the count of roundings --------------------------------------------------------
 

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.covariance import (
     REPAIR_TOLERANCE,
     Repair,

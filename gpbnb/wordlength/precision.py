@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import CHECKED, Search, largest_compiled
 from gpbnb.bounds.bounded_run import BoundedRun
 from gpbnb.bounds.envelope import Limits

@@ -10,8 +10,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.array_forms import AnyForm
 
 ANY_BINARY = FloatFormat(2, 2)

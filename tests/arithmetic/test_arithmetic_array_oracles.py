@@ -16,7 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 
 # Many pairs of numbers in each format: drawing one costs more than computing with it.
 PAIRS = 10

@@ -14,7 +14,8 @@ import pytest
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 D4 = FloatFormat(10, 4)

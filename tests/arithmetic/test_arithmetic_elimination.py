@@ -10,10 +10,11 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import elimination
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.tags import Double, DoubleDouble
+from gpbnb.arithmetic.rounding import Rounding
 
 FORMATS = [
     FloatFormat(base, precision, rounding)

@@ -20,8 +20,9 @@ from hypothesis import strategies as st
 
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.fixed import FixedFormat, scaling
-from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 
 seeded = settings(derandomize=True, deadline=None, database=None, max_examples=400)
 

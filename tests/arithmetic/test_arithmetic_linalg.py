@@ -12,7 +12,8 @@ import pytest
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP
 FORMATS = [FloatFormat(b, t, r) for b, t in ((2, 6), (3, 4), (10, 3)) for r in Rounding.documented()]

@@ -17,9 +17,10 @@ import pytest
 
 from gpbnb.arithmetic import linalg, named
 from gpbnb.arithmetic.fixed import FixedFormat, scaling
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact
 from gpbnb.arithmetic.kernels.limited_backends import LimitedFloats, LimitedPairs
+from gpbnb.arithmetic.rounding import Rounding
 
 TRUEDIV = operator.truediv
 BINARY = [operator.add, operator.sub, operator.mul, TRUEDIV]

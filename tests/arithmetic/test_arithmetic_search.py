@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import Search, smallest_precision
 
 

@@ -8,8 +8,9 @@ from fractions import Fraction
 import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BINARY32, IBM_HEX32
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import Table, arithmetic, digits, one_line, scientific, short
 
 

@@ -11,7 +11,8 @@ from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, at, look, named, 
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, Circle, FancyArrowPatch, Rectangle
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.integration import experiment, figures, theory
 from gpbnb.report.integration.experiment import Accuracy, Sweep
 

@@ -11,7 +11,8 @@ from drawn import GREY, named
 from matplotlib.patches import Circle, Rectangle
 from tabulated import by_header
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display import style
 from gpbnb.report.integration import experiment, figures, tables, theory
 

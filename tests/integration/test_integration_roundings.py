@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.integration import theory
 
 CHOP = Rounding.CHOP

@@ -12,7 +12,8 @@ import pytest
 
 from gpbnb import required_precision
 from gpbnb.arithmetic import linalg, search
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

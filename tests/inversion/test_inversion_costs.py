@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import costs, experiment
 
 

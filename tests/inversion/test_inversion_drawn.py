@@ -10,7 +10,8 @@ from drawn import BLACK, BLUE, GREEN, GREY, ORANGE, at, labelled, look, named, n
 from matplotlib.colors import to_hex
 from matplotlib.patches import ArrowStyle, FancyArrowPatch
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import figures
 from gpbnb.report.inversion.example import Column, Wordlength
 from gpbnb.report.inversion.experiment import Frozen, Trial

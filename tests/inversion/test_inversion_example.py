@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import inverse_of
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import example, existence, procedure
 from gpbnb.report.inversion.example import PLACES, PRINTED, Wordlength
 from gpbnb.report.inversion.procedure import Reading

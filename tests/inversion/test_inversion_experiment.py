@@ -9,7 +9,8 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import __main__ as command
 from gpbnb.report.inversion import experiment, procedure, theory

@@ -9,7 +9,8 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic import linalg
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import procedure
 from gpbnb.report.inversion.procedure import FORMS, NORMS, Reading
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import pytest
 from tabulated import by_header
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import costs, example, existence, experiment, tables
 from gpbnb.report.inversion.experiment import Frozen
 

@@ -10,8 +10,9 @@ import oracles
 import pytest
 
 from gpbnb.arithmetic.bounds import gamma
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, row_sum_norm
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import theory
 from gpbnb.report.inversion.theory import Perturbation, Reduction
 

@@ -9,7 +9,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display import style
 from gpbnb.report.gravity_probe_b import answers, year
 from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures

@@ -12,9 +12,10 @@ import pytest
 from exact_terms import Distance, fractions, same
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import load
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import bounded_run, gains
 from gpbnb.bounds import guarantee as bound
 from gpbnb.bounds.bounded_run import BoundedRun

@@ -28,7 +28,8 @@ from drawn import (
 )
 from matplotlib.colors import to_hex
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.gravity_probe_b import figures as gravity_probe_b_figures
 from gpbnb.report.gravity_probe_b import year

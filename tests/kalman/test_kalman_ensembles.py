@@ -14,7 +14,8 @@ import pytest
 from distributed import Client, KilledWorker
 from executors import Failing, local_cluster
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form

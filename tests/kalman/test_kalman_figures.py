@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from drawn import colour, legend_of
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel

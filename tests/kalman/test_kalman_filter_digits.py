@@ -9,7 +9,8 @@ import oracles
 import pytest
 from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, model, run
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run

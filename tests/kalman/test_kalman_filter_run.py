@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from small_filter import FORMATS, FORMATS_OF_ALL_FORMS, STEPS, measurements, model, run
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import BoundedRun, emulate_with_bound
 from gpbnb.filters.emulation import compare_runs, emulate
 from gpbnb.filters.forms import Form

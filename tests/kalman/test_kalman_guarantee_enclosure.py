@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from flint import arb
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.enclosure import FORMS, Enclosed, enclose, gain, predicted, updated
 from gpbnb.bounds.guarantee import Guarantee, Limits, guarantee, limits
 from gpbnb.filters.forms import Form

@@ -15,7 +15,8 @@ import pytest
 from exact_terms import UNIT, UP, fractions, plain, same
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import enclosure, envelope, reach
 from gpbnb.bounds.envelope import Limits, units
 from gpbnb.filters.program import (

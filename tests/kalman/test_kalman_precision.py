@@ -10,8 +10,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import emulate_with_bound
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.emulation import emulate

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.adversary import attack
 from gpbnb.bounds.envelope import ROUNDING, units
 from gpbnb.bounds.guarantee import guarantee, limits

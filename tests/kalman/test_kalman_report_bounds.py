@@ -7,8 +7,9 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding, prints_as
+from gpbnb.arithmetic.formats import FloatFormat, prints_as
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.kalman import derivation, report_bounds
 
 # -- counts ---------------------------------------------------------------------------------------

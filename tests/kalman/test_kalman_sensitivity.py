@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from tabulated import by_header
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.gravity_probe_b import answers, tables, year
 from gpbnb.report.gravity_probe_b.answers import Moved, median_precision, sensitivity, single_record

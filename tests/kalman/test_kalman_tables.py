@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from tabulated import by_header
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.confidence import interval
 from gpbnb.report.gravity_probe_b import tables as gravity_probe_b_tables

@@ -12,7 +12,8 @@ import pytest
 import sympy as sp
 from mpmath import mp
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.calculators import forms
 from gpbnb.report.calculators.page import show
 

@@ -10,7 +10,8 @@ import numpy as np
 import oracles
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rolling import experiment, rotations, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from tabulated import by_header
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import experiment, tables, theory
 

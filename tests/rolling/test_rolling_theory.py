@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy import integrate, signal, special
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rolling import derivation, theory
 from gpbnb.report.rolling.theory import DRIFTS, LEVEL, YEAR
 

@@ -11,7 +11,8 @@ import pytest
 from drawn import BLUE, GREEN, ORANGE, PINK, PURPLE, at, look, named, near, pictured
 from matplotlib.colors import to_hex
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import figures
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -11,8 +11,9 @@ import pytest
 import sympy as sp
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import derivation, experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

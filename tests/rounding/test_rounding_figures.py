@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from drawn import colour, names_of
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display import style
 from gpbnb.report.rounding import experiment, figures, theory
 

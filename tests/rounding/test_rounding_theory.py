@@ -13,8 +13,9 @@ import pytest
 from flint import fmpq_mat
 
 from gpbnb.arithmetic.bounds import gamma
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -10,7 +10,8 @@ from functools import cache
 import oracles
 import pytest
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import experiment, theory
 
 NEAREST, CHOP = Rounding.NEAREST, Rounding.CHOP

@@ -12,8 +12,9 @@ import pytest
 from tabulated import by_header
 
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY32, IBM_HEX32
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.linear import biquad
 from gpbnb.report.guarantees import table as guarantees
 from gpbnb.report.guarantees.published import fixif_longitudinal

@@ -11,8 +11,9 @@ import pytest
 
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.named import BFLOAT16, BINARY16, BINARY32
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
 from gpbnb.report.processors import experiment as processors

@@ -11,7 +11,8 @@ import pytest
 import small_filter
 from tabulated import by_header
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.inverse import smallest_precision
 from gpbnb.filters.emulation import emulate
 from gpbnb.filters.forms import Form

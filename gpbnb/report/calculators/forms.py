@@ -9,7 +9,8 @@ from fractions import Fraction
 from typing import Any
 
 from gpbnb.arithmetic.bounds import gamma
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.calculators import derivation
 from gpbnb.report.calculators.javascript import Definition
 from gpbnb.report.calculators.page import form

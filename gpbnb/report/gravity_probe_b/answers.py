@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.threshold import Share

@@ -29,7 +29,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb import sweeps
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import BoundedRun
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.emulation import History, compare_runs, emulate, relative

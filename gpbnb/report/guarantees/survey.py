@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.adversary import responses, run_against
 from gpbnb.bounds.guarantee import closed_loops, from_schedule, limits
 from gpbnb.bounds.linear import state_space

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.guarantee import BUDGET, Guarantee, from_schedule, guarantee, limits

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import add, load, multiply, round_, store
 from gpbnb.arithmetic.kernels.tags import Double
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.integration import theory
 from gpbnb.report.integration.arguments import positive_number
 from gpbnb.report.integration.theory import Process, Rule, Step

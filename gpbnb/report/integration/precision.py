@@ -15,8 +15,8 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
-from gpbnb.arithmetic.rounding import rounding_named
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding, rounding_named
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.report.integration.arguments import Floats, bandwidth_ratio, positive_array, positive_number
 from gpbnb.report.integration.walk import discretize, error_variance

@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, inverse_of
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import procedure
 from gpbnb.report.inversion.procedure import NORMS
 

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.formats import Rounding
 from gpbnb.arithmetic.rational import inverse_of
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion.example import (
     KINDS,
     MATRIX,

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounded import BoundedError
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import procedure, theory
 from gpbnb.sweeps import Column, read

@@ -24,7 +24,8 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb import sweeps
 from gpbnb.arithmetic.bounds import column_sum
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel

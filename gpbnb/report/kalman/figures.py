@@ -37,7 +37,7 @@ def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[
 
 
 def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
-    """Return bound (125) in one format after some steps, in mas, for :func:`lines`."""
+    """Return bound (125) in one format after some steps, in mas, for the lines of a figure."""
     return [report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), **faults) for k in steps]
 
 

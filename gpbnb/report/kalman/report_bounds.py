@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import Rounding, prints_as
+from gpbnb.arithmetic.formats import prints_as
 from gpbnb.arithmetic.rational import column_sum_norm, exact, max_norm
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 
 # -- the counts of the report -----------------------------------------------------------------------------------------

@@ -8,7 +8,8 @@ from typing import Any
 
 import sympy as sp
 
-from gpbnb.arithmetic.formats import Rounding, prints_as
+from gpbnb.arithmetic.formats import prints_as
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.ledger.formula import OPERATORS, Link, Relation
 
 DIGITS = 50

@@ -4,9 +4,8 @@ The rule, for a statement that disagrees with its recomputation:
 
 1. A form repeats what the scan shows. Where the scan is damaged, ``scan`` quotes its characters, and the form follows
    the context or the other report.
-2. The scan is charged (:attr:`~gpbnb.report.ledger.finding.Verdict.OCR`) if it is damaged at the judged place, or
-confuses
-   similar characters there, and if a `witness` shows what was printed: a statement of the documents with the same
+2. The scan is charged, with the verdict OCR, if it is damaged at the judged place, or confuses similar characters
+   there, and if a `witness` shows what was printed: a statement of the documents with the same
    formula, name or number, legible and right; it may be the rest of the same statement.
 3. In all other cases the author is charged, even if the scan is damaged; the entry then shows the characters.
 4. That the other report has the right text is not enough where this scan is legible: the report of 1984 corrects some

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.bounded import BoundedError
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, integers
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.rounding import theory
 from gpbnb.report.rounding.paths import best_path, partial_sums, product_table
 

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from gpbnb.arithmetic.formats import Rounding
 from gpbnb.arithmetic.rational import column_sum_norm
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.style import OBSERVED, REFUTED, VALID, label, line_styles, loglog, name, name_ends
 from gpbnb.report.display.tables import digits
 from gpbnb.report.rounding import theory

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic import search
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds.bounded_run import BoundedRun
 from gpbnb.bounds.inverse import check_relative, smallest_precision
 from gpbnb.filters.contraction import companion_bound

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.tables import Table, arithmetic, digits, short
 from gpbnb.report.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.report.wordlengths.study import InversePrecision, UpdateStagnation

@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, Exact, Floats, Pairs, backend
 from gpbnb.arithmetic.named import BINARY16, BINARY32, BINARY64
+from gpbnb.arithmetic.rounding import Rounding
 
 OPERATIONS = [operator.add, operator.sub, operator.mul, operator.truediv]
 COMPILED = [(2, 1), (2, 24), (2, 26), (2, 53), (10, 1), (10, 9), (10, 10), (10, 18), (16, 1), (16, 13)]

@@ -16,7 +16,7 @@ from numba import njit
 from gpbnb.arithmetic import linalg
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels import scalar
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled
@@ -38,6 +38,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     zero,
 )
 from gpbnb.arithmetic.kernels.tags import Binary, Decimal, Double, DoubleDouble, Hexadecimal
+from gpbnb.arithmetic.rounding import Rounding
 
 FORMATS = [
     FloatFormat(base, precision, rounding)

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from faults import all_of, breaks, finding, replace, times
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report import ledger
 from gpbnb.report.ledger.checks import rounding as checks
 from gpbnb.report.ledger.checks.rounding import (

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import derivation
 from gpbnb.report.ledger.checks.inversion.first_order import EPSILON, FirstOrder, joined, matrix, quantity
 from gpbnb.report.ledger.checks.inversion.judging import Names

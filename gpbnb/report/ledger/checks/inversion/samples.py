@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import example, procedure
 from gpbnb.report.inversion.theory import Reduction
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters import contraction, emulation, forms
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.kalman import derivation, exact_step, report_bounds, smallest

@@ -5,7 +5,8 @@ signal: what they state is judged for one signal. All other statements are about
 pair of signals, (5) to (8). There, strength and signal-to-noise ratio mean those of each signal in its own channel.
 """
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.registry import Checks
 

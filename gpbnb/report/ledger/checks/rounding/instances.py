@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.formats import FloatFormat, Rounding
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.ledger.formula import Link, Relation
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.rounding import experiment
