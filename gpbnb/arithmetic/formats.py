@@ -46,7 +46,8 @@ class FloatFormat:
     ----------
     base : b, an int of at least 2.
     precision : t, digits of the significand, an int of at least 1.
-    rounding : applied to every stored number and every result; a :class:`Rounding`, or its name, such as "chop".
+    rounding : applied to every stored number and every result; a :class:`~gpbnb.arithmetic.rounding.Rounding`, or its
+        name, such as "chop".
     emin, emax : exponents of the least normal and of the largest number, as IEEE 754 counts them:
         :math:`b^{\text{emin}}` and :math:`d.dd\dots\times b^{\text{emax}}`. Give both or neither.
     subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Otherwise
