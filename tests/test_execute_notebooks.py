@@ -16,7 +16,7 @@ from gpbnb import caching
 
 ROOT = Path(__file__).resolve().parents[1]
 CODE = {
-    "kernels": "from gpbnb.arithmetic.kernels import exact\n\nprint(exact.__name__)",
+    "kernels": "from gpbnb.arithmetic.kernels import doubledouble\n\nprint(doubledouble.__name__)",
     "data": "from gpbnb.report.budget import theory\n\nprint(theory.__name__)",
 }
 
@@ -77,7 +77,7 @@ def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     change(book / "data.ipynb", "Prose.", "Other prose.")
     assert copy() == "0 notebooks changed\n"
     assert "Other prose." in (book / "data.ipynb").read_text()
-    with (package / "arithmetic" / "kernels" / "exact.py").open("a") as source:
+    with (package / "arithmetic" / "kernels" / "doubledouble.py").open("a") as source:
         source.write("__name__ = 'another kernel'\n")
     wrong = copy("--check", status=1)
     assert executed(wrong) == {"kernels"}
@@ -86,7 +86,7 @@ def test_exactly_the_notebooks_that_depend_on_a_change_are_executed_again(copy):
     # One notebook depends on the new data, the other has new code.
     with next((package / "report" / "budget").glob("*.csv")).open("a") as data:
         data.write("\n")
-    change(book / "kernels.ipynb", "print(exact.__name__)", "print(6 * 7)")
+    change(book / "kernels.ipynb", "print(doubledouble.__name__)", "print(6 * 7)")
     assert executed(copy()) == {"kernels", "data"}
     assert '"42\\n"' in (book / "kernels.ipynb").read_text()
     # Neither damaged outputs are believed, nor any that another user could have written.

@@ -387,10 +387,6 @@ def _bounded(system: LinearSystem, fmt: FloatFormat, largest: NDArray[np.float64
     found = from_schedule(given.schedule(fmt), within, 1)
     if not found.for_ever:
         raise ValueError(found.why)
-    if not np.isfinite(found.bound).all():
-        raise ValueError(
-            "no bound was found: in so few digits, errors may grow by their own roundings; use more digits"
-        )
     rounding = found.bound if basis != "probable" else 3 * probable_error(found)
     # sums of m products in float64, with an error below 2**-40
     return np.asarray((rounding[n:] + difference @ largest + inputs @ storing) * (1 + 2.0**-40))

@@ -297,7 +297,7 @@ def test_below_the_answer_a_system_that_is_unstable_as_stored_is_named_with_the_
     assert at_12.cause == ""
     found = required_precision(system, **asked)
     assert found.why.startswith(
-        "in 14 digits no bound was found: in so few digits, errors may grow by their own roundings"
+        "in 14 digits no bound was found: in this precision, an error causes rounding errors as large as itself"
     )
     assert found.precision == 18
     assert system.unstable(found.fmt) == ""

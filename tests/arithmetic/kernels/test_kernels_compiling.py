@@ -241,6 +241,7 @@ def test_a_file_planted_where_others_write_is_not_loaded(copy, tmp_path, variabl
     marker = tmp_path / "marker"
     copy.environment |= {"GPBNB_CACHE_DIR": "", "XDG_CACHE_HOME": "", "HOME": str(tmp_path / "home")}
     copy.environment[variable] = str(kept)
+    copy.environment["TMPDIR"] = str(tmp_path)  # the last folder that is tried is in it
     first = "import numba; numba.config.reload_config()" if variable == "NUMBA_CACHE_DIR" else ""
     assert copy.run(first)["compiled"] == ["outer", "alone"]
     paths = sorted(kept.rglob("*.compiled"))
