@@ -189,7 +189,7 @@ def usefulness(printed: Statement) -> Finding:
         ),
         (
             f"with 17 digits, the error of a filter with one state is {times:.2g} times what (125) allows "
-            "in the first step"
+            "in the first step, for a measurement of zero"
         ),
         otherwise_note="the number of digits that a formula requires is useful only if the formula is a bound",
         root=SIGNS,

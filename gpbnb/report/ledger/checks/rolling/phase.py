@@ -26,8 +26,8 @@ def no_direct_error(printed: Statement) -> Finding:
         == ("does not directly introduce any error" if harmless else "directly introduces an error"),
         f"in two dimensions, a phase error of one degree turns {cost[1]:.1f} mas a year of the "
         "geodetic drift into apparent frame dragging and changes the geodetic drift by "
-        f"{cost[0]:.2f}; for an error of one milliarcsecond a year, the roll angle must be known to "
-        f"{limit:.0f} arcseconds",
+        f"{cost[0]:.2f}; for an error of one milliarcsecond a year, a constant error of the roll "
+        f"angle must stay below {limit:.0f} arcseconds",
         otherwise_note="the claim would be true if there were one signal. The experiment has a pair, which a phase "
         "error mixes: $\\hat s_x=s_x\\cos\\theta-s_y\\sin\\theta$ and $\\hat s_y=s_y\\cos\\theta+s_x\\sin\\theta$",
         root=ONE_DIMENSION,
@@ -113,6 +113,7 @@ def less_than(printed: Statement) -> Finding:
 def synchronisation() -> Finding:
     limit = math.degrees(theory.largest_phase(DRIFTS, 1.0)) * 3600
     return unverifiable(
-        f"one degree is not enough: an error below one milliarcsecond a year requires {limit:.0f} arcseconds",
+        "one degree is not enough: an error below one milliarcsecond a year requires a constant error of the roll "
+        f"angle below {limit:.0f} arcseconds",
         "the documents do not give the accuracy of the star sensor",
     )
