@@ -144,12 +144,14 @@ def test_unsound_markup_is_noticed(printed):
 
 @pytest.mark.parametrize(("document", "chapter"), [("hung1984", "II"), ("hung1982", "III")])
 def test_each_numbered_equation_has_its_entry(document, chapter):
-    """Some entries of section 11 of 1982 hold several equations, as in ``eq53-54``; the others hold one each."""
+    """No entry holds several of them; (89) of 1982 has one for each of its two forms."""
     places = [entry.id.removeprefix(f"{document}.{chapter}.") for entry in INVENTORY]
-    numbers = {int(place[2:]): place for place in places if re.fullmatch(r"eq\d+", place)}
-    ranges = [tuple(map(int, place[2:].split("-"))) for place in places if re.fullmatch(r"eq\d+-\d+", place)]
-    within = {n for first, last in ranges for n in range(first, last + 1)}
-    assert not within & set(numbers)
-    inside = within | set(numbers) | {int(place[2:4]) for place in places if place.startswith("eq89-")}
-    ends = {115, 116, 117} if "eq114-117-and-rounded-x-3" in places else set()
-    assert inside | ends | ({114} if ends else set()) == set(range(1, 126))
+    numbers = [int(place[2:]) for place in places if re.fullmatch(r"eq\d+", place)]
+    forms_of_89 = [89] * ("eq89-first-form" in places and "eq89-factored-form" in places)
+    assert sorted(numbers + forms_of_89) == list(range(1, 126))
+
+
+def test_no_entry_names_several_equations_or_examples():
+    named = re.compile(r"\beqs |\b[Ee]xamples |, ?[ab]\d|,.*,")
+    kinds = ("equation", "example")
+    assert [entry.id for entry in INVENTORY if entry.kind in kinds and named.search(entry.item)] == []

@@ -29,10 +29,7 @@ def system(printed: Statement) -> Finding:
     return given("states the system and names its unknowns")
 
 
-@CHECKS.add(
-    *(f"hung1984.II.s11-1.{name}-definition" for name in ("a-1", "b-1", "a-2", "b-2")),
-    "hung1982.III.s11-1.blocks",
-)
+@CHECKS.add(*(key for name in ("a-1", "b-1", "a-2", "b-2") for key in both(f"s11-1.{name}-definition")))
 def blocks(printed: Statement) -> Finding:
     return compare(
         holds(printed, eliminations(3)),
@@ -54,9 +51,9 @@ def stages(printed: Statement) -> Finding:
 @CHECKS.add(
     *both("eq46"),
     *both("s11-1.a-22-1-definition"),
-    "hung1984.II.eq50",
+    *both("eq50"),
     *both("s11-1.a-33-2-definition"),
-    "hung1984.II.s11-1.b-3-2-definition",
+    *both("s11-1.b-3-2-definition"),
 )
 def exact_steps(printed: Statement) -> Finding:
     agrees = holds(printed, eliminations(3))
@@ -70,12 +67,10 @@ def exact_steps(printed: Statement) -> Finding:
 
 
 @CHECKS.add(
-    "hung1984.II.s11-1.unnumbered-a22-1",
-    "hung1982.III.s11-1.a22-1",
-    "hung1984.II.s11-1.unnumbered-a23-a32-a33-1",
-    "hung1984.II.s11-1.a-33-2",
-    "hung1982.III.eq50",
+    *(key for name in ("a22", "a23", "a32", "a33") for key in both(f"s11-1.unnumbered-{name}-1")),
+    *both("s11-1.a-33-2"),
     "hung1982.III.s11-1.b-i-1",
+    "hung1982.III.s11-1.b-3-2",
 )
 def rounded_steps(printed: Statement) -> Finding:
     return compare(

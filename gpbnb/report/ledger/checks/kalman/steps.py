@@ -179,7 +179,7 @@ def rounded_input_1982(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq114")
+@CHECKS.add(*both("eq114"))
 def rounded_state(printed: Statement) -> Finding:
     return _loop(
         printed,
@@ -187,7 +187,7 @@ def rounded_state(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq115", "hung1984.II.eq116")
+@CHECKS.add(*both("eq115"), *both("eq116"))
 def defined_again(printed: Statement) -> Finding:
     loop, entered = (derivation.transition_error().coeff(derivation.FK), derivation.input_error().coeff(derivation.U))
     return compare(
@@ -200,7 +200,7 @@ def defined_again(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.eq117")
+@CHECKS.add(*both("eq117"))
 def rewritten(printed: Statement) -> Finding:
     return compare(
         algebra.holds(printed, algebra.restated()),
@@ -209,7 +209,7 @@ def rewritten(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s12.unnumbered-x-3", "hung1982.III.eq114-117-and-rounded-x-3")
+@CHECKS.add(*both("s12.unnumbered-x-3"))
 def counted_twice(printed: Statement) -> Finding:
     more = tuple(sp.expand(again - once) for again, once in zip(derivation.TWICE, derivation.ONCE, strict=True))
     return compare(

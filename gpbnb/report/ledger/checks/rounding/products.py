@@ -447,7 +447,7 @@ def joint_use(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1984.II.s9-2.example-1", "hung1984.II.s9-2.example-2", "hung1982.III.s9-2.examples-1-2")
+@CHECKS.add(*both("s9-2.example-1"), *both("s9-2.example-2"))
 def examples(printed: Statement) -> Finding:
     found = judge(relations(printed), example_instances("example-2" in printed.id), first_order=True)
     return compare(
