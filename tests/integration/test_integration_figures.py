@@ -299,10 +299,10 @@ def test_least_errors_table():
     table = tables.least_errors([1, 1000], [0.5, 8.0])
     assert table.title == "2 lengths"
     # For one cycle the best weights are those of the trapezoidal rule, by symmetry.
-    assert by_header(table)[0] == {"cycles $n$": "1", r"$\mu = 0.5$": "1.000", r"$\mu = 8$": "1.000"}
+    assert by_header(table)[0] == {"cycles $n$": "1", r"at $\mu = 0.5$": "1.000", r"at $\mu = 8$": "1.000"}
     ratio = [math.sqrt(theory.error_variance(1000, mu) / theory.least_variance(1000, mu)) for mu in (0.5, 8.0)]
     assert by_header(table)[1] == {
         "cycles $n$": "1,000",
-        r"$\mu = 0.5$": f"{ratio[0]:.3f}",
-        r"$\mu = 8$": f"{ratio[1]:.3f}",
+        r"at $\mu = 0.5$": f"{ratio[0]:.3f}",
+        r"at $\mu = 8$": f"{ratio[1]:.3f}",
     }

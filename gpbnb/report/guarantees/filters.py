@@ -383,7 +383,7 @@ def counts(rows: Sequence[Row], name: str) -> tuple[Count, ...]:
 
 def table(rows: Sequence[Row]) -> Table:
     """Tabulate the counts by form, base, rounding, kind of model, range and limits."""
-    header = ("", "filters", "for ever", "some steps", "no answer", "runs", *(f"{kind} inputs" for kind in INPUTS))
+    header = ("group", "filters", "for ever", "some steps", "no answer", "runs", *(f"{kind} inputs" for kind in INPUTS))
     body = []
     for name in ("form", "base", "rounding", "kind", "range", "limited"):
         for each in counts(rows, name):

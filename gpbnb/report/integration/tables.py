@@ -138,5 +138,5 @@ def least_errors(cycles: Sequence[int], ratios: Sequence[float]) -> Table:
         )
         for n in cycles
     ]
-    header = ("cycles $n$", *(f"$\\mu = {mu:g}$" for mu in ratios))
+    header = ("cycles $n$", *(f"at $\\mu = {mu:g}$" for mu in ratios))
     return Table(f"{len(body)} lengths", header, tuple(body))

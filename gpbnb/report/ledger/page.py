@@ -52,11 +52,16 @@ PAGES = (
     LedgerPage("ledger-1984-2", "Ledger: report of 1984, inversion by elimination", "hung1984", r"II\.11.*"),
     LedgerPage("ledger-1984-3", "Ledger: report of 1984, Kalman filter", "hung1984", r"II\.1[234]"),
     LedgerPage("ledger-1984-4", "Ledger: report of 1984, roll and deroll", "hung1984", r"III.*"),
+    LedgerPage("ledger-1982-1", "Ledger: report of 1982, error budget", "hung1982", r"I|II"),
     LedgerPage(
-        "ledger-1982-1", "Ledger: report of 1982, budget and rounding", "hung1982", r"I|II|III\.([1-9]|9\..*|10)"
+        "ledger-1982-2",
+        "Ledger: report of 1982, rounding and inversion in general",
+        "hung1982",
+        r"III\.([1-9]|9\..*|10)",
     ),
-    LedgerPage("ledger-1982-2", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11.*"),
-    LedgerPage("ledger-1982-3", "Ledger: report of 1982, Kalman filter and geometry", "hung1982", r"III\.1[23]|IV"),
+    LedgerPage("ledger-1982-3", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11.*"),
+    LedgerPage("ledger-1982-4", "Ledger: report of 1982, Kalman filter", "hung1982", r"III\.1[23]"),
+    LedgerPage("ledger-1982-5", "Ledger: report of 1982, measurement geometry", "hung1982", r"IV"),
     LedgerPage("ledger-2016", "Ledger: note of 2016, digital integration", "savage2016", r".*"),
 )
 """The pages of the complete ledger; each statement is on exactly one of them."""
