@@ -1,4 +1,4 @@
-"""Estimate how likely a year stays within a tolerance: shares of records, confidence, and the precision needed."""
+"""Limits of a probability from counted trials, and of a quantile from a sample."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measure what determines a wordlength: the number of steps, the range of the numbers, losses in additions."""
+"""Ranges of the numbers that a filter stores and computes, as powers of two."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figures of the chapter on the Kalman filter: results in, artists out."""
+"""Figures of the chapters on the year of Gravity Probe B: results in, artists out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of the chapter on the Kalman bound."""
+"""Tables of the chapters on the year of Gravity Probe B."""
 
 from __future__ import annotations
 
