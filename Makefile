@@ -1,11 +1,11 @@
 # `make help` lists what there is. All that is made stays inside this checkout.
 .DEFAULT_GOAL := help
-.PHONY: help book test test-pages test-portable verify-sweeps notebooks lint format exactness bench mutants environment screenshots pdf serve clean
+.PHONY: help address book test certificates proof test-pages test-portable verify-sweeps notebooks lint format exactness bench mutants environment screenshots pdf serve clean
 
 HERE := $(CURDIR)
 PY := .venv/bin/python
 HTML := _build/html
-UV_COMPILE := uv --no-config pip compile pyproject.toml --universal --python-version 3.11 --fork-strategy fewest \
+UV_COMPILE := uv --no-config pip compile pyproject.toml --extra report --universal --python-version 3.11 --fork-strategy fewest \
 	--only-binary :all: --generate-hashes --no-emit-index-url --custom-compile-command "make environment" --quiet
 
 # Caches and settings that would else go to the home folder, or come from it and change a result.
@@ -59,6 +59,13 @@ test: .venv/made-for ## unit and property tests, the examples in docstrings, and
 	$(PY) scripts/execute_notebooks.py --check
 	$(PY) -m pytest -n 2 --dist loadgroup --no-loadscope-reorder --ignore=tests/pages tests
 
+certificates: .venv/made-for ## write a certificate of every guarantee in the book and check it; WORDS="tracker Nile" picks filters
+	$(PY) -m gpbnb.report.guarantees.certificates $(WORDS)
+
+proof: ## check proof/guarantee.v, the theorem behind a certificate; needs Coq (apt-get install coq)
+	@mkdir -p .cache/proof
+	cp proof/guarantee.v .cache/proof/ && cd .cache/proof && coqc guarantee.v
+
 test-pages: .venv/made-for ## the built book in a real Chromium without a network
 	@test -f $(HTML)/index.html || $(MAKE) book
 	@$(PY) -m tests.pages.browser
@@ -73,18 +80,22 @@ verify-sweeps: .venv/made-for ## a sample of every stored sweep computed again o
 notebooks: .venv/made-for ## execute the notebooks in place
 	$(PY) scripts/execute_notebooks.py
 
-lint: .venv/made-for ## ruff and mypy
+lint: .venv/made-for ## ruff and mypy, and warnings of replaced words
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
+	$(PY) scripts/vocabulary.py
 	$(PY) -m mypy
 
 format: .venv/made-for ## let ruff lay out the code and mend what it can
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit; it resumes
+exactness: .venv/made-for ## billions of operations compared with independent arithmetic, digit for digit, and more altered statements; it resumes
+	GPBNB_ALTERATIONS=more $(PY) -m pytest -q -n 2 --dist loadgroup --no-loadscope-reorder tests/ledger/test_alterations.py
 	$(PY) -m benchmarks.exactness
 	$(PY) -m benchmarks.processors
+	$(PY) -m benchmarks.paths
+	$(PY) -m benchmarks.code
 
 # pychop has no wheel.
 bench: .venv/made-for ## timings against peers, side by side
@@ -96,6 +107,9 @@ bench: .venv/made-for ## timings against peers, side by side
 mutants: .venv/made-for ## seed faults and list those that no test catches; FILES="gpbnb/report/budget/theory.py" or SINCE=HEAD~3 picks files, OPTIONS=--measure finds the tests of each line first
 	$(PY) -m pip install --quiet --require-hashes --no-build-isolation -r tests/mutants/environment.txt
 	$(PY) -m tests.mutants $(FILES) $(if $(SINCE),--since $(SINCE)) $(OPTIONS)
+
+address: .venv/made-for ## write the address of the project, set in pyproject.toml, into README, citation and guide
+	$(PY) scripts/address.py
 
 # filterpy has no wheel; scripts/make-venv.sh builds it.
 environment: .venv/made-for ## compile every environment.txt from pyproject.toml; UPGRADE=1 takes newer versions

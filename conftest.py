@@ -16,16 +16,19 @@ os.environ.setdefault("GPBNB_QUIET", "1")
 
 # What takes longest, longest first: with several processes none of it is left over at the end.
 LONGEST = (
-    "tests/kalman/test_kalman_filter_run.py",
     "alterations of hung1984.II",
-    "tests/ledger/checks/test_kalman_checks.py",
-    "tests/kalman/test_kalman_guarantee.py",
-    "tests/kalman/test_kalman_compensated.py",
-    "tests/wordlength/test_wordlength.py",
-    "tests/ledger/test_ledger_cache.py",
-    "tests/ledger/checks/test_rounding_checks.py",
-    "tests/ledger/checks/test_inversion_checks.py",
+    "tests/test_types.py",
+    "tests/wordlength/test_precision.py",
+    "tests/arithmetic/kernels/test_kernels_compiling.py",
+    "tests/bounds/test_certificates.py",
+    "tests/filters/test_structures.py",
+    "tests/sweeps/test_sweeps_sweep.py",
+    "tests/bounds/test_guarantee.py",
+    "tests/filters/test_inputs.py",
     "tests/test_execute_notebooks.py",
+    "tests/arithmetic/kernels/test_kernels_scalar.py",
+    "tests/wordlength/test_wordlength_command.py",
+    "tests/ledger/checks/test_rounding_checks.py",
     "tests/ledger/test_ledger_command.py",
 )
 

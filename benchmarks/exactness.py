@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gpbnb.arithmetic.kernels import backends
+from gpbnb.arithmetic.rounding import Rounding, Rules
 from gpbnb.report.display.tables import Table
 
 PRECISIONS = {2: range(1, 54), 10: range(1, 19), 16: range(1, 14)}
@@ -49,6 +50,10 @@ class Job(NamedTuple):
     operation: str
     count: int
     seed: tuple[int, ...]
+
+    @property
+    def rules(self) -> Rules:
+        return Rules(self.base, self.precision, Rounding.NEAREST if self.nearest else Rounding.CHOP)
 
 
 class Outcome(NamedTuple):
@@ -303,7 +308,7 @@ def binary_oracle(job: Job) -> Callable[..., list[float]]:
 
 def compare(job: Job) -> Outcome:
     """Run a batch through the kernel and the oracle."""
-    backend = backends.backend(job.base, job.precision, job.nearest)
+    backend = backends.backend(job.rules)
     if job.operation == "round":
         operands: list[tuple[Integers, Integers]] = [(long_numbers(job), np.zeros(job.count, object))]
     elif job.operation == "sqrt":

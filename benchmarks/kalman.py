@@ -118,11 +118,11 @@ def compiled(fmt: FloatFormat) -> tuple[Callable[[int], Any], Any]:
         raise TypeError(f"got {fmt}; needed a format with compiled loops")
     given, x0, P0 = model()
     arrays = [fmt.array(a) for a in (*given, x0, P0)]
-    packed = [backend.pack(a.components) for a in arrays]
+    packed = [backend.pack(a.components, backend.matrix_tag) for a in arrays]
     x, P = np.empty_like(packed[-2]), np.empty_like(packed[-1])
 
     def run(steps: int) -> Any:
-        compiled_steps(backend.tag, tuple(packed[:-2]), packed[-2], packed[-1], x, P, steps)
+        compiled_steps(backend.matrix_tag, tuple(packed[:-2]), packed[-2], packed[-1], x, P, steps)
         return tuple(FloatArray.from_components(backend, backend.unpack(p), fmt).to_fractions() for p in (x, P))
 
     return run, [a.to_fractions().tolist() for a in arrays]

@@ -43,6 +43,7 @@ from numba import njit
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from benchmarks.journal import Journal
 from gpbnb.arithmetic import named
 from gpbnb.arithmetic import rounding as rules
 from gpbnb.arithmetic.formats import FloatFormat
@@ -75,25 +76,6 @@ class Count(NamedTuple):
     operation: str
     compared: int
     different: int
-
-
-class Journal:
-    """Finished parts of the comparison, one a line, for the code as it is now."""
-
-    def __init__(self, file: Path) -> None:
-        self.file, self.code = file, code_digest()
-        self.parts: dict[str, Count] = {}
-        if file.exists():
-            with file.open(encoding="utf-8", newline="") as stream:
-                for code, part, fmt, operation, compared, different in csv.reader(stream):
-                    if code == self.code:
-                        self.parts[part] = Count(fmt, operation, int(compared), int(different))
-
-    def add(self, part: str, count: Count) -> None:
-        self.parts[part] = count
-        self.file.parent.mkdir(parents=True, exist_ok=True)
-        with self.file.open("a", encoding="utf-8", newline="") as stream:
-            csv.writer(stream, lineterminator="\n").writerow((self.code, part, *count))
 
 
 def code_digest() -> str:
@@ -185,7 +167,8 @@ def pairs(name: str, share: float, rng: np.random.Generator, journal: Journal | 
                 if journal is not None:
                     journal.add(part, count)
             else:
-                count = journal.parts[part]
+                fmt_name, kind, *counts = journal.parts[part]
+                count = Count(fmt_name, kind, *map(int, counts))
             compared, different = compared + count.compared, different + count.different
         yield Count(name, operation, compared, different)
 
@@ -263,7 +246,7 @@ def main() -> int:
     options = parser.parse_args()
     start = time.perf_counter()
     counts = []
-    for count in run(options.share, options.seed, Journal(JOURNAL) if options.share == 1 else None):
+    for count in run(options.share, options.seed, Journal(JOURNAL, code_digest()) if options.share == 1 else None):
         counts.append(count)
         print(f"{count.fmt:<10} {count.operation:<11} {count.compared:>15,} {count.different:>10,}", flush=True)
     total, different = sum(c.compared for c in counts), sum(c.different for c in counts)

@@ -19,7 +19,6 @@ from benchmarks.kalman import numpy_step
 from benchmarks.timing import machine
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
-from gpbnb.filters.parallel import Records
 from gpbnb.filters.run import Run
 from gpbnb.filters.simulation import BLOCK
 from gpbnb.report.display.tables import Table
@@ -92,7 +91,7 @@ def measure(steps: int = gravity_probe_b.YEAR) -> list[Timed]:
 def many_records(steps: int) -> float:
     """A year of many records through one gain; the time of every twentieth block is scaled."""
     given = year.model(year.MODELS[0], 2)
-    run = Records(given, FloatFormat(2, 24), Form.INNOVATION, RECORDS)
+    run = Run(given, FloatFormat(2, 24), Form.INNOVATION, (), records=RECORDS)
     one = year.simulation(year.MODELS[0]).measurements(BLOCK)
     z = np.ascontiguousarray(np.repeat(one[:, :, np.newaxis], RECORDS, axis=2))
     run.carry(z[:1], 1)  # compiles
@@ -104,7 +103,7 @@ def many_records(steps: int) -> float:
 def mission_year(steps: int) -> float:
     """A year of the mission model for one record, its measurement matrices included; scaled as above."""
     mission = Mission()
-    run = Records(mission.model(2), FloatFormat(2, 24), Form.INNOVATION, 1)
+    run = Run(mission.model(2), FloatFormat(2, 24), Form.INNOVATION, ())
     z = np.zeros((BLOCK, 2, 1))
     run.carry(z[:1], 1)  # compiles
 

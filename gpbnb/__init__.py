@@ -5,12 +5,24 @@ The public interface::
     FloatFormat, Rounding      a number format: base, precision, rounding, range
     FixedFormat                fixed point: integer bits, fraction bits, overflow
     BINARY32, BFLOAT16, ...    the formats of processors; NAMED_FORMATS lists them
-    linalg                     dot, matmul, lu, solve, inv with every operation rounded
+    linalg                     dot, matmul, lu, solve, inv, det, cholesky with every operation rounded
+    flags                      how often results overflow, underflow or are inexact, in a format with infinity and NaN
+    MicroscalingFormat         blocks of FP8, FP6 or FP4 numbers with one scale; microscaling_dot: their inner product
+    ComplexArray, fft          complex numbers as pairs, and the fast Fourier transform
     LinearModel                a linear dynamic model for a Kalman filter
-    LinearSystem               a linear filter, controller or observer with known inputs
+    NonlinearModel             functions of a state for an extended or unscented Kalman filter
+    LinearSystem               a digital filter in any structure, a controller or an observer
     required_precision         the smallest precision that keeps a filter, or your own function, within a tolerance
+    required_block_precisions  the same for each block of a Kalman filter; BlockFormats: a format for each block
+    required_fraction_bits     the same in fixed point; WordFormats: separate formats for coefficients, data, sums
+    limit_cycles               how a filter in fixed point ends with a constant input
+    limits, guarantee          limits on a filter, and a bound for every measurement within them, for ever
+    emulate, Form              one run of a filter with every operation rounded, in one of the forms of its update
+    FixedIntervalSmoother      a Rauch-Tung-Striebel smoother of a record, as a function of a format
     survey_records             many measurement records in many formats at once
-    peek                       look at numbers of a function while its precision is searched
+    write_code                 the filter as C99, with results that agree with the emulation digit for digit
+    TracedFunction             your own function of arrays, run in compiled code
+    peek                       show intermediate values of a function whose precision is being searched
     read_model                 a model from a TOML file, SciPy, python-control or FilterPy
 
 Each chapter of the book has a sub-package: rounding, inversion, kalman, rolling, integration, budget, geometry and
@@ -18,77 +30,31 @@ wordlength. ``gpbnb.ledger`` judges every statement printed in the three documen
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpbnb import clock as clock  # before all other modules, because it notes the time
-
-if TYPE_CHECKING:
-    from gpbnb.arithmetic import linalg
-    from gpbnb.arithmetic.array import FloatArray
-    from gpbnb.arithmetic.exits import peek
-    from gpbnb.arithmetic.fixed import FixedFormat
-    from gpbnb.arithmetic.formats import FloatFormat
-    from gpbnb.arithmetic.named import (
-        BFLOAT16,
-        BINARY16,
-        BINARY32,
-        BINARY64,
-        BINARY128,
-        DECIMAL32,
-        DECIMAL64,
-        DECIMAL128,
-        FP8_E4M3,
-        FP8_E5M2,
-        IBM_704,
-        IBM_HEX32,
-        IBM_HEX64,
-        TF32,
-    )
-    from gpbnb.arithmetic.rounding import Rounding
-    from gpbnb.filters.model import LinearModel
-    from gpbnb.wordlength.models import read_model
-    from gpbnb.wordlength.precision import required_precision
-    from gpbnb.wordlength.records import survey_records
-    from gpbnb.wordlength.system import LinearSystem
+from gpbnb.names import HOMES, NAMED_FORMATS
 
 __version__ = "0.2.0"
 # fmt: off
-NAMED_FORMATS = (
-    "BINARY16", "BINARY32", "BINARY64", "BINARY128", "BFLOAT16", "TF32", "FP8_E4M3", "FP8_E5M2",
-    "DECIMAL32", "DECIMAL64", "DECIMAL128", "IBM_HEX32", "IBM_HEX64", "IBM_704",
-)
-
 __all__ = [
-    "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP8_E4M3",
-    "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32", "FixedFormat", "FloatArray",
-    "FloatFormat", "LinearModel", "LinearSystem", "Rounding", "linalg", "peek", "read_model",
-    "required_precision", "survey_records",
+    "BFLOAT16", "BINARY16", "BINARY32", "BINARY64", "BINARY128", "DECIMAL32", "DECIMAL64", "DECIMAL128", "FP4_E2M1",
+    "FP6_E2M3", "FP6_E3M2", "FP8_E4M3", "FP8_E5M2", "IBM_704", "IBM_HEX32", "IBM_HEX64", "NAMED_FORMATS", "TF32",
+    "BlockFormats", "ComplexArray", "FixedFormat", "FixedIntervalSmoother", "FloatArray", "FloatFormat", "Form",
+    "LinearModel", "LinearSystem", "MicroscalingFormat", "NonlinearModel", "Rounding", "TracedFunction",
+    "WordFormats", "emulate", "fft", "flags", "guarantee", "limit_cycles", "limits", "linalg", "microscaling_dot",
+    "peek", "read_model", "required_block_precisions", "required_fraction_bits", "required_precision",
+    "survey_records", "write_code",
 ]
 # fmt: on
-
-_HOME = {
-    "FixedFormat": "gpbnb.arithmetic.fixed",
-    "FloatArray": "gpbnb.arithmetic.array",
-    "FloatFormat": "gpbnb.arithmetic.formats",
-    "LinearModel": "gpbnb.filters.model",
-    "LinearSystem": "gpbnb.wordlength.system",
-    "Rounding": "gpbnb.arithmetic.rounding",
-    "peek": "gpbnb.arithmetic.exits",
-    "read_model": "gpbnb.wordlength.models",
-    "required_precision": "gpbnb.wordlength.precision",
-    "survey_records": "gpbnb.wordlength.records",
-}
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used, so that ``import gpbnb`` stays fast."""
-    if name == "linalg":
-        return import_module("gpbnb.arithmetic.linalg")
-    if name in NAMED_FORMATS:
-        return getattr(import_module("gpbnb.arithmetic.named"), name)
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
-    raise AttributeError(f"module 'gpbnb' has no attribute {name!r}; the public names are {', '.join(__all__)}")
+    if name not in HOMES:
+        raise AttributeError(f"module 'gpbnb' has no attribute {name!r}; the public names are {', '.join(__all__)}")
+    module = import_module(HOMES[name])
+    return module if name == "linalg" else getattr(module, name)
 
 
 def __dir__() -> list[str]:

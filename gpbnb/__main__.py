@@ -7,34 +7,29 @@ import runpy
 import sys
 from collections.abc import Sequence
 
+import gpbnb
+
 COMMANDS = {
     "wordlength": "how many digits your own filter needs, with a report",
+    "warm": "compile all that wordlength needs, so that later runs start at once",
     "ledger": "every printed equation, number and claim, with its verdict",
-    "report.stored": "list the stored sweeps, or verify a sample of them",
-    "report.rolling": "compute the stored drift rates again",
-    "report.inversion": "compute the stored sweeps over inverses again",
-    "report.gravity_probe_b.year": "compute the emulated years again",
-    "report.kalman.ensembles": "compute the random filters again",
-    "report.gravity_probe_b.threshold": "compute the years of hundreds of records again",
-    "report.gravity_probe_b.mission": "compute the years of the mission model again",
-    "report.gravity_probe_b.horizon": "compute the bounds for a year of Gravity Probe B again",
-    "report.guarantees.survey": "compute the survey of guarantees again",
-    "report.guarantees.filters": "compute random Kalman filters against their guarantees again",
-    "report.guarantees.scalar": "compute the worst errors of scalar filters again",
-    "report.guarantees.table": "compute the table of guarantees again",
+    "bounds.check": "prove the claim of a certificate, without the rest of the package",
+    "report.guarantees.certificates": "write and check certificates of the book's guarantees",
+    "report.stored": "list the stored sweeps, verify a sample of them, or compute them again",
 }
 """Commands, each also available as ``python -m gpbnb.<command>``."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit status."""
-    lines = "\n".join(f"  {name:<34} {help_}" for name, help_ in COMMANDS.items())
+    lines = "\n".join(f"  {name:<30} {help_}" for name, help_ in COMMANDS.items())
     parser = argparse.ArgumentParser(
         prog="python -m gpbnb",
         description="Rounding errors in recursive filters, integrators and matrix computations.",
         epilog=f"commands:\n{lines}\n\npython -m gpbnb COMMAND --help explains a command.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action="version", version=f"gpbnb {gpbnb.__version__}")
     parser.add_argument("command", nargs="?", help="one of the commands below")
     parser.add_argument(
         "arguments", nargs=argparse.REMAINDER, help="arguments of the command; COMMAND --help lists them"
@@ -46,7 +41,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.command not in COMMANDS:
         parser.error(f"got {given.command!r}; needed one of {', '.join(COMMANDS)}")
     sys.argv = [given.command, *given.arguments]
-    runpy.run_module(f"gpbnb.{given.command}", run_name="__main__", alter_sys=False)
+    try:
+        runpy.run_module(f"gpbnb.{given.command}", run_name="__main__", alter_sys=False)
+    except ImportError as error:
+        if "gpbnb[report]" not in str(error):
+            raise
+        print(error, file=sys.stderr)
+        return 2
     return 0
 
 

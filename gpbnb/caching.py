@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO
 
 from gpbnb.clock import IMPORTED
+from gpbnb.names import HOMES
 
 try:
     import fcntl
@@ -47,6 +48,7 @@ _WARNING = (
     "remove it, or set GPBNB_CACHE_DIR to another folder\n"
 )
 
+_PACKAGE = re.compile(r"[\w.-]+")
 _IMPORT = re.compile(
     rb"""^[ \t]*(?: from [ \t]+ (?P<module>[\w.]+) [ \t]+ import [ \t]* (?P<names>\([^)]*\)|[^\n]*)
                  | import [ \t]+ (?P<plain>[^\n]*) )""",
@@ -186,6 +188,22 @@ def write(path: Path, content: bytes) -> None:
             os.unlink(draft)
 
 
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file as a whole or not at all: on a full disk, what it held stays.
+
+    Raises
+    ------
+    OSError : the file cannot be written.
+    """
+    path = path.resolve()
+    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        draft.write_bytes(content)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
 def _seal(path: Path, content: bytes) -> bytes:
     """Digest the name and the content of a file, so that a damaged or a renamed one is recognised."""
     return hashlib.sha256(path.name.encode() + b"\0" + content).digest()
@@ -291,19 +309,63 @@ def digest(paths: Iterable[Path]) -> str:
     return found.hexdigest()
 
 
+def environment(sources: Iterable[Path], code: str = "", also: Iterable[str] = ()) -> tuple[str, ...]:
+    """Describe what a result may depend on besides sources and data: Python, the processor, and packages.
+
+    The packages are those that the sources import, and those that these need. Another package that is installed or
+    upgraded changes nothing.
+
+    Parameters
+    ----------
+    sources : source files that the result depends on.
+    code : further code that it depends on, such as that of a notebook.
+    also : names of packages that it depends on without an import, such as one that runs the code.
+    """
+    imports = frozenset[str]().union(*map(_foreign, (*map(_content, set(sources)), code.encode())))
+    wanted = {name for module in imports for name in _providers().get(module, ())}
+    return *_machine(), *_versions(frozenset((*wanted, *also)))
+
+
 @cache
-def environment() -> tuple[str, ...]:
-    """Describe what a result may depend on besides sources and data: Python, the installed packages, the processor."""
-    # These imports take longer than all others of this module.
-    from importlib.metadata import distributions
+def _machine() -> tuple[str, ...]:
+    import llvmlite.binding as llvm  # takes longer than all imports of this module
 
-    import llvmlite.binding as llvm
-
-    packages = sorted({f"{each.name}=={each.version}" for each in distributions()})
     features = sorted(name for name, there in llvm.get_host_cpu_features().items() if there)
     settings = [f"{name}={os.environ.get(name, '')}" for name in _SETTINGS]
-    machine = (platform.system(), platform.machine(), llvm.get_host_cpu_name(), *features)
-    return platform.python_version(), *machine, *settings, *packages
+    processor = (platform.system(), platform.machine(), llvm.get_host_cpu_name())
+    return platform.python_version(), *processor, *features, *settings
+
+
+@cache
+def _providers() -> dict[str, list[str]]:
+    """Names of the installed packages that provide each module."""
+    from importlib.metadata import packages_distributions
+
+    return dict(packages_distributions())
+
+
+@cache
+def _versions(packages: frozenset[str]) -> tuple[str, ...]:
+    """Name and version of packages and of all that they need; of optional needs, those that are installed."""
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    found: dict[str, str] = {}
+    waiting = [_canonical(name) for name in packages]
+    while waiting:
+        if (name := waiting.pop()) in found:
+            continue
+        try:
+            package = distribution(name)
+        except PackageNotFoundError:
+            continue
+        found[name] = package.version
+        needs = [need for need in package.requires or () if "extra ==" not in need]
+        waiting += [_canonical(match[0]) for need in needs if (match := _PACKAGE.match(need))]
+    return tuple(f"{name}=={version}" for name, version in sorted(found.items()))
+
+
+def _canonical(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def changed_since_import(paths: Iterable[Path]) -> bool:
@@ -356,18 +418,35 @@ def _content(path: Path) -> bytes:
 
 
 @cache
-def _named(code: bytes) -> frozenset[Path]:
-    """List the files of the package that some code names in its import statements."""
+def _imports(code: bytes) -> frozenset[str]:
+    """List all names in the import statements of some code that may be modules."""
     names: set[str] = set()
     for match in _IMPORT.finditer(code):
         if match["module"]:
-            module = match["module"].decode()
+            module, given = match["module"].decode(), match["names"].decode()
             names.add(module)
-            names |= {f"{module}.{name}" for name in re.findall(r"\w+", match["names"].decode())}
+            names |= {f"{module}.{name}" for name in re.findall(r"\w+", given)}
+            whole = module == PACKAGE.name and given.strip() == "*"
         else:
-            names |= set(re.findall(r"[\w.]+", match["plain"].decode()))
+            plain = set(re.findall(r"[\w.]+", match["plain"].decode()))
+            names |= plain
+            whole = PACKAGE.name in plain
+        if whole:  # any public name may be used
+            names |= set(HOMES.values())
+    return frozenset(names)
+
+
+def _foreign(code: bytes) -> frozenset[str]:
+    """List the modules outside the package that some code imports, without what is below them."""
+    return frozenset(name.partition(".")[0] for name in _imports(code)) - {PACKAGE.name}
+
+
+@cache
+def _named(code: bytes) -> frozenset[Path]:
+    """List the files of the package that some code names in its import statements."""
     files: set[Path] = set()
-    for name in names:
+    for name in _imports(code):
+        name = HOMES.get(name.removeprefix(f"{PACKAGE.name}."), name)
         parts = name.split(".")
         if parts[0] == PACKAGE.name:
             below = PACKAGE.joinpath(*parts[1:])

@@ -1,6 +1,17 @@
-"""``python -m gpbnb.ledger``: the command of :mod:`gpbnb.report.ledger`."""
+"""``python -m gpbnb.ledger``: the command of ``gpbnb.report.ledger``."""
 
-from gpbnb.report.ledger.command import main
+from collections.abc import Sequence
+
+from gpbnb.report.ledger_options import ledger_parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit status."""
+    ledger_parser().parse_args(arguments)  # help and wrong options are answered before the checks are imported
+    from gpbnb.report.ledger.command import main as run
+
+    return run(arguments)
+
 
 if __name__ == "__main__":
     raise SystemExit(main())

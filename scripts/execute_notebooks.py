@@ -12,6 +12,7 @@ import difflib
 import hashlib
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -28,6 +29,7 @@ from gpbnb import caching
 
 ROOT = Path(__file__).resolve().parents[1]
 BOOK = ROOT / "book"
+OUTSIDE = re.compile(r"""["'](\.\./[^"'\n]+)["']""")
 KERNEL = {"display_name": "Python 3", "language": "python", "name": "python3"}
 # The longest first, so that none is left over at the end; others follow.
 LONGEST = (
@@ -45,6 +47,7 @@ LONGEST = (
 )
 LEDGER = "the ledger"
 LEDGER_COMMAND = [sys.executable, "-m", "gpbnb.ledger"]
+RUNNERS = ("ipykernel", "ipython", "matplotlib-inline", "nbclient", "nbformat")  # packages that write the outputs
 TIMEOUT = 900  # seconds a cell
 _FAILED = 1
 
@@ -58,11 +61,20 @@ def code_of(notebook: Any) -> list[str]:
     return [cell.source for cell in notebook.cells if cell.cell_type == "code"]
 
 
+def named_files(text: str) -> list[Path]:
+    """The files outside the book that the code of a notebook names."""
+    paths = [(BOOK / name).resolve() for name in OUTSIDE.findall(text)]
+    return [path for path in paths if path.is_file()]
+
+
 def key_of(notebook: Any) -> str:
     """A digest of all that the outputs of a notebook depend on."""
     code = code_of(notebook)
-    files = caching.with_data(caching.imported_by("\n".join(code)))
-    return hashlib.sha256(repr((code, caching.digest(files), caching.environment())).encode()).hexdigest()[:24]
+    text = "\n".join(code)
+    sources = caching.imported_by(text)
+    digest = caching.digest([*caching.with_data(sources), *named_files(text)])
+    key = repr((code, digest, caching.environment(sources, text, RUNNERS)))
+    return hashlib.sha256(key.encode()).hexdigest()[:24]
 
 
 def executed(
@@ -217,7 +229,7 @@ def _compared(cell: Any) -> list[str]:
             lines.append(f"{output.ename}: {output.evalue}")
         else:
             for kind in sorted(output.data):
-                if not kind.endswith(("image/png", "image/jpeg")):
+                if "image/" not in kind:
                     content = output.data[kind]
                     lines += f"{kind}: {content if isinstance(content, str) else json.dumps(content)}".splitlines()
     return lines

@@ -31,7 +31,7 @@ Install a newer one, or name it: make PYTHON=/path/to/python3"
 Install it (Debian, Ubuntu: apt install python3 python3-venv), or name it: make PYTHON=/path/to/python3"
 fi
 
-echo "Making .venv with $python ($version). The first time this downloads about 200 MB."
+echo "Making .venv with $python ($version). The first time this downloads about 280 MB."
 # pip asks rustc for its version, which makes rustup write into the home folder.
 export RUSTUP_HOME="$PWD/.cache/rustup"
 rm -rf .venv

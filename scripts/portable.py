@@ -26,7 +26,14 @@ ROOT = Path(__file__).resolve().parents[1]
 NOT_NUMERICAL = ("pages", "test_environment.py", "test_prose.py", "test_book_extensions.py", "test_single_page.py")
 # What BLAS, LAPACK, libm and SIMD sums could change most. The chapters left out emulate arithmetic and compile long.
 QUICK_NOTEBOOKS = ("rolling", "integration", "geometry", "inversion", "budget")
-QUICK_TESTS = ("tests/arithmetic", "tests/geometry", "tests/integration", "tests/rolling", "tests/inversion")
+QUICK_TESTS = (
+    "tests/arithmetic",
+    "tests/geometry",
+    "tests/integration",
+    "tests/rolling",
+    "tests/inversion",
+    "tests/bounds/test_inverse.py",
+)
 NEHALEM = {"64bit", "cmov", "crc32", "cx16", "cx8", "fxsr", "mmx", "popcnt", "sahf"}
 NEHALEM |= {"sse", "sse2", "sse3", "ssse3", "sse4.1", "sse4.2"}
 NOT_HASWELL = ("avx512", "amx", "avxvnni", "avxifma", "avxneconvert", "avx10", "evex512")

@@ -8,6 +8,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = ROOT / "book" / "api"
+# Programs that a reader copies and reads whole; a listing of one this dense would weigh more than any page.
+COPIED = ("gpbnb.bounds.check",)
 
 
 def public_modules() -> dict[str, str]:
@@ -24,7 +26,11 @@ def public_modules() -> dict[str, str]:
 
 def page(module: str) -> str:
     title = module.removeprefix("gpbnb.")
-    return f"# `{title}`\n\n```{{eval-rst}}\n.. automodule:: {module}\n   :members:\n```\n"
+    described = f"# `{title}`\n\n```{{eval-rst}}\n.. automodule:: {module}\n"
+    if module in COPIED:
+        path = f"{module.replace('.', '/')}.py"
+        return f"{described}```\n\nThe whole program: {{download}}`{Path(path).name} <../../{path}>`.\n"
+    return f"{described}   :members:\n```\n"
 
 
 def main() -> None:

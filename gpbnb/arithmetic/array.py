@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.conversion import entries, exact_ratio
+from gpbnb.arithmetic.assignment import At
+from gpbnb.arithmetic.conversion import entries, exact_ratio, special_number
 from gpbnb.arithmetic.exits import check_exit, entering
-from gpbnb.arithmetic.functions import kept, lines, power
+from gpbnb.arithmetic.functions import floor_divide, kept, lines, power, remainder
 from gpbnb.arithmetic.kernels.backends import Backend, Components
 from gpbnb.arithmetic.protocols import NumPyProtocols, broadcast
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.text import at_entry, decimal_text, in_columns, place
+from gpbnb.arithmetic.words import Layout, in_words
 
-if TYPE_CHECKING:
-    from typing import Self
-
-    from gpbnb.arithmetic.fixed import FixedFormat
-    from gpbnb.arithmetic.formats import FloatFormat
-
+_WIDTH = 120  # characters of a line of text
+_PLAIN = (int, float)  # not bool, which is no number here
 
 MANY = 100
 """In arrays with more entries than this, equal entries are converted once; for fewer, remembering takes longer."""
@@ -32,24 +31,75 @@ class NegativeRootError(ValueError):
     """The square root of a negative number."""
 
 
-class FloatArray(NumPyProtocols):
-    """An immutable n-dimensional array of numbers of one format; make one with ``fmt.array``.
+class NumberFormat(Protocol):
+    """What an array needs of its format, floating or fixed point."""
 
-    ``+ - * / @``, ``-x``, ``abs(x)``, ``np.sqrt(x)`` and the sums and products round after each
-    single operation, in the order that each documents. Shapes broadcast as in NumPy. The other operand
-    may be a plain number or array if each entry is a number of the format, so that nothing is rounded
-    silently. Indexing follows NumPy's rules and gives a FloatArray. Comparisons are exact and give booleans.
+    # Three properties have the type Any, because pyright accepts no cached property where a protocol types a property.
+
+    @property
+    def base(self) -> int:
+        """The number base."""
+
+    @property
+    def precision(self) -> int:
+        """Digits of the significand, or bits of the word without its sign."""
+
+    @property
+    def rounding(self) -> Rounding:
+        """Applied to every result."""
+
+    @property
+    def kernel(self) -> Any:
+        """The scalar operations, an ExactKernel."""
+
+    @property
+    def unit_roundoff(self) -> Fraction:
+        """Bound of the relative error of one rounding; fixed point has none."""
+
+    @property
+    def backend(self) -> Any:
+        """The Backend that stores the numbers of an array."""
+
+    @property
+    def exact_backend(self) -> Any:
+        """The slow backend, Exact, that can store every number."""
+
+    @property
+    def layout(self) -> Layout:
+        """How a word stores the numbers."""
+
+    @property
+    def algebra(self) -> Mapping[str, Callable[..., Any]]:
+        """What functions of ``np.linalg`` do for arrays of the format."""
+
+    def check_compiled(self) -> None:
+        """Reject a format without compiled loops."""
+
+    def round(self, value: Any) -> Fraction:
+        """Round one number."""
+
+    def array(self, values: Any) -> Any:
+        """Round numbers into an array."""
+
+
+class FloatArray(NumPyProtocols):
+    """An immutable n-dimensional array of numbers of one format. Create it with ``fmt.array``.
+
+    ``+ - * / @``, ``-x``, ``abs(x)``, ``np.sqrt(x)``, sums and products are rounded after every single operation. The
+    documentation of each function states the order of its operations. Shapes broadcast as in NumPy. The other operand
+    may be a plain number or array if the format holds each of its entries exactly. Nothing is rounded silently.
+    Indexing follows NumPy's rules and gives a FloatArray. Comparisons are exact and give booleans.
 
     Conversion to other number types is explicit. ``x.to_float()`` gives the nearest float64, ``x.to_fractions()`` the
-    exact value. Whatever asks for an array or a float by itself, as ``np.asarray(x)``, ``float(x[0])``,
-    ``math.sqrt(x[0])``, ``np.save`` or ``scipy.linalg.solve``, gets float64 if that is exact, or else an error.
-    While the precision of a function is searched, all of these are errors; see :mod:`gpbnb.arithmetic.exits`.
+    exact value. A function that converts on its own, such as ``np.asarray``, ``float``, ``math.sqrt``, ``np.save`` or
+    ``scipy.linalg.solve``, receives float64 numbers if the conversion is exact. Otherwise it raises an error. While the
+    precision of a function is searched, all of these conversions raise an error; see :mod:`gpbnb.arithmetic.exits`.
 
     Raises
     ------
     ValueError : the operands have different formats, or shapes that do not broadcast; a plain
         operand is not a number of the format; the square root of a negative number.
-    ZeroDivisionError : a divisor is zero; the message gives the place.
+    ZeroDivisionError : a divisor is zero; the message names the entry.
     TypeError : an operand is not a number; an entry is assigned to.
 
     Examples
@@ -67,7 +117,7 @@ class FloatArray(NumPyProtocols):
     __slots__ = ("_format", "backend", "components")
     __hash__ = None  # type: ignore[assignment]
 
-    _format: FloatFormat
+    _format: NumberFormat
     #: The backend, which computes with the entries.
     backend: Backend
     #: The entries, in the representation of the backend.
@@ -101,13 +151,16 @@ class FloatArray(NumPyProtocols):
         return self.from_components(self.format.exact_backend, self.backend.to_exact(self.components), self.format)
 
     def to_pairs(self) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return significands and exponents as Python integers; each entry is ``m * base**e``, normalized."""
+        """Return significands and exponents as Python integers; each entry is ``m * base**e``, normalized.
+
+        The significand of infinity, NaN or a negative zero, in a format that has them, is a float.
+        """
         check_exit(self, "to_pairs()")
         m, e = self.on_exact_backend().components
         return m, e
 
     @classmethod
-    def from_values(cls, values: Any, fmt: FloatFormat | FixedFormat) -> Self:
+    def from_values(cls, values: Any, fmt: Any) -> Self:
         """See :meth:`gpbnb.arithmetic.formats.FloatFormat.array`."""
         return cls._read(values, fmt, exactly=False)
 
@@ -116,21 +169,31 @@ class FloatArray(NumPyProtocols):
         if isinstance(values, FloatArray):
             if values.format == fmt and isinstance(values, cls):
                 return values
-            if values.format.base == fmt.base:
+            if (components := cls._converted(values, fmt)) is not None:
+                return cls.from_components(fmt.backend, components, fmt)
+            if values.backend.special:
+                with entering(fmt):
+                    check_exit(values, "to_pairs()")
+                values = values.to_numbers()
+            elif values.format.base == fmt.base:
                 with entering(fmt):
                     pairs = values.to_pairs()
                 m, e = np.frompyfunc(fmt.kernel.from_ratio, 3, 2)(pairs[0], 1, pairs[1])
                 return cls.from_pairs(m, e, fmt)
-        if type(values) is np.ndarray and (components := fmt.backend.from_numbers(values, exactly)) is not None:
+        random = fmt.rounding is Rounding.STOCHASTIC
+        given = np.asarray(values) if type(values) in _PLAIN and not random else values
+        if type(given) is np.ndarray and (components := fmt.backend.from_numbers(given, exactly)) is not None:
             return cls.from_components(fmt.backend, components, fmt)
         with entering(fmt):
             given = entries(values)
         read = []
         # Large cycles of matrices have few different entries. Random roundings differ for equal ones, too.
         known: dict[Any, Any] = {}
-        random = fmt.rounding is Rounding.STOCHASTIC
         for i, value in enumerate(given.ravel().tolist()):
             try:
+                if fmt.backend.special and (special := special_number(value)) is not None:
+                    read.append(cls._special(special, fmt, exactly))
+                    continue
                 ratio = exact_ratio(value)
                 if random or ratio not in known:
                     known[ratio] = cls._rounded(value, ratio, fmt, exactly)
@@ -142,6 +205,16 @@ class FloatArray(NumPyProtocols):
         return cls.from_pairs(m, e, fmt)
 
     @staticmethod
+    def _converted(values: FloatArray, fmt: Any) -> Components | None:
+        """Round the numbers of another format on the backend of this one; None if it cannot."""
+        if fmt.rounding is Rounding.STOCHASTIC:
+            return None
+        with entering(fmt):
+            check_exit(values, "to_pairs()")
+        components: Components | None = fmt.backend.from_backend(values.backend, values.components)
+        return components
+
+    @staticmethod
     def _rounded(value: Any, ratio: tuple[int, int, int], fmt: Any, exactly: bool) -> tuple[int, int]:
         pair: tuple[int, int] = fmt.kernel.from_decimal(*ratio)
         if exactly and not fmt.kernel.is_exactly(pair, *ratio):
@@ -150,6 +223,19 @@ class FloatArray(NumPyProtocols):
             )
         return pair
 
+    @staticmethod
+    def _special(value: float, fmt: Any, exactly: bool) -> tuple[Any, int]:
+        pair: tuple[Any, int] = fmt.kernel.special(value)
+        if exactly and pair[0] != pair[0] and value == value:
+            raise ValueError(f"got the operand {value!r}; needed a number of {fmt}, which has NaN and no infinity")
+        return pair
+
+    def to_numbers(self) -> NDArray[Any]:
+        """Return Fractions, and floats for infinity, NaN and negative zero, in an object array."""
+        kernel = self.format.kernel
+        convert = np.frompyfunc(lambda m, e: m if type(m) is float else kernel.to_fraction(m, e), 2, 1)
+        return np.asarray(convert(*self.on_exact_backend().components), dtype=object)
+
     def __reduce__(self) -> tuple[Any, ...]:
         check_exit(self, "pickle")
         return type(self).from_pairs, (*self.on_exact_backend().components, self.format)
@@ -157,7 +243,7 @@ class FloatArray(NumPyProtocols):
     # -- shape ---------------------------------------------------------------------------------
 
     @property
-    def format(self) -> FloatFormat:
+    def format(self) -> NumberFormat:
         """The format of every entry."""
         return self._format
 
@@ -198,9 +284,22 @@ class FloatArray(NumPyProtocols):
 
     def __delitem__(self, index: Any) -> None:
         raise TypeError(
-            "got an assignment to an entry; a FloatArray cannot be changed; build a new one with "
-            "fmt.array, np.where or np.concatenate"
+            f"got an assignment to an entry of a {type(self).__name__}, which cannot be changed; needed a copy with "
+            "other entries: x = x.at[i].set(value), or np.where(condition, value, x)"
         )
+
+    @property
+    def at(self) -> At:
+        """Copies of the array with other entries, as in JAX; see :class:`gpbnb.arithmetic.assignment.At`.
+
+        Examples
+        --------
+        >>> from gpbnb import BINARY32
+        >>> x = BINARY32.array([1, 2, 3])
+        >>> x.at[0].set(5).to_float(), x.at[1:].add([10, 20]).to_float(), x.to_float()
+        (array([5., 2., 3.]), array([ 1., 12., 23.]), array([1., 2., 3.]))
+        """
+        return At(self)
 
     def __iter__(self) -> Iterator[FloatArray]:
         return (self[i] for i in range(len(self)))
@@ -209,11 +308,11 @@ class FloatArray(NumPyProtocols):
         return bool(np.any(self == value))
 
     def moved(self, move: Callable[[NDArray[Any]], Any]) -> FloatArray:
-        """Apply to each component a function that only moves entries."""
+        """Apply to each component a function that only moves entries, such as a transposition."""
         return self.from_components(self.backend, map(move, self.components), self.format)
 
     def joined(self, join: Callable[[Sequence[Any]], Any], arrays: Sequence[FloatArray]) -> FloatArray:
-        """Apply to each component of several arrays a function that only moves entries."""
+        """Join arrays with a function that only moves entries, such as a concatenation."""
         backend, arrays = _common(arrays)
         components = zip(*(array.components for array in arrays), strict=True)
         return self.from_components(backend, map(join, components), self.format)
@@ -221,7 +320,7 @@ class FloatArray(NumPyProtocols):
     # -- arithmetic ----------------------------------------------------------------------------
 
     def operand(self, other: Any) -> FloatArray:
-        """Return the other operand, a FloatArray of this format or numbers that are exact in the format."""
+        """Return the other operand as a FloatArray of this format, in which it must be exact."""
         if isinstance(other, FloatArray):
             if other.format != self.format:
                 raise ValueError(
@@ -232,9 +331,12 @@ class FloatArray(NumPyProtocols):
         return self._read(other, self.format, exactly=True)
 
     def _binary(self, name: str, left: Any, right: Any) -> FloatArray:
+        other = right if left is self else left
+        if not isinstance(other, FloatArray) and getattr(other, "__array_ufunc__", self) is None:
+            return cast(FloatArray, NotImplemented)  # to the other operand, as NumPy's arrays do
         a, b = self.operand(left), self.operand(right)
         broadcast(name, a.shape, b.shape)
-        if name == "divide" and (zero := _first(b.components[0] == 0)) is not None:
+        if name == "divide" and not a.backend.special and (zero := _first(b.components[0] == 0)) is not None:
             at = f" at {place(zero)} of the divisor" if zero else ""
             raise ZeroDivisionError(
                 f"got a division by zero{at}; needed a divisor other than zero; test x == 0 before dividing"
@@ -260,7 +362,7 @@ class FloatArray(NumPyProtocols):
         return self.from_components(backend, components, self.format)
 
     def _unary(self, name: str) -> FloatArray:
-        if name == "sqrt" and (negative := _first(self.components[0] < 0)) is not None:
+        if name == "sqrt" and not self.backend.special and (negative := _first(self.components[0] < 0)) is not None:
             at = f" at {place(negative)}" if negative else ""
             raise NegativeRootError(
                 f"got the square root of a negative number{at}; needed x >= 0; test x < 0 before, or take abs(x)"
@@ -306,7 +408,19 @@ class FloatArray(NumPyProtocols):
         return power(self, other)
 
     def __rpow__(self, other: Any) -> FloatArray:
-        raise TypeError("got a FloatArray as the exponent of x ** y; needed a whole number; see np.exp and np.log")
+        return power(self.operand(other), self)
+
+    def __mod__(self, other: Any) -> FloatArray:
+        return remainder(self, self.operand(other))
+
+    def __rmod__(self, other: Any) -> FloatArray:
+        return remainder(self.operand(other), self)
+
+    def __floordiv__(self, other: Any) -> FloatArray:
+        return floor_divide(self, self.operand(other))
+
+    def __rfloordiv__(self, other: Any) -> FloatArray:
+        return floor_divide(self.operand(other), self)
 
     def __neg__(self) -> FloatArray:
         return self._unary("negative")
@@ -322,12 +436,12 @@ class FloatArray(NumPyProtocols):
         return self._unary("sqrt")
 
     def sum(self, axis: int | None = None, keepdims: bool = False) -> FloatArray:
-        """Add up from left to right, ``((x1 + x2) + x3) + ...``; the sum of no entries is zero.
+        """Add the entries from left to right, ``((x1 + x2) + x3) + ...``; the sum of no entries is zero.
 
         Parameters
         ----------
-        axis : along which to add; all entries, row after row, if None.
-        keepdims : whether the result keeps each axis that is added up, with length 1.
+        axis : the axis along which to add; if None, all entries are added, row after row.
+        keepdims : whether the axes that are added up stay in the result, with length 1.
 
         References
         ----------
@@ -336,7 +450,7 @@ class FloatArray(NumPyProtocols):
         return kept(self, self._reduce("add", axis, 0), axis, keepdims)
 
     def prod(self, axis: int | None = None, keepdims: bool = False) -> FloatArray:
-        """Multiply from left to right; the product of no entries is one.
+        """Multiply the entries from left to right; the product of no entries is one.
 
         Parameters
         ----------
@@ -420,13 +534,40 @@ class FloatArray(NumPyProtocols):
         convert = np.frompyfunc(cache(to_fraction) if self.size > MANY else to_fraction, 2, 1)
         return np.asarray(convert(*self.on_exact_backend().components), dtype=object)[()]
 
+    def to_bits(self) -> Any:
+        """Return the words in which a processor stores the entries, as unsigned integers, or as an int for one number.
+
+        Formats of base 2 use the layout of IEEE 754, formats without subnormal numbers use the layout of IBM's
+        machines, and fixed-point formats use two's complement.
+
+        Raises
+        ------
+        ValueError : the format has no range, or has base 10.
+
+        Examples
+        --------
+        >>> from gpbnb import BINARY32
+        >>> hex(BINARY32.array("0.1").to_bits())
+        '0x3dcccccd'
+        """
+        check_exit(self, "to_bits()")
+        layout = self.format.layout
+        return in_words(np.frompyfunc(layout.bits, 2, 1)(*self.on_exact_backend().components), layout.width)
+
     # -- text ----------------------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        """Return code that makes the same array, with ``...`` if there are more entries than NumPy prints."""
-        start = f"{self.format}.array("
+        """Return code that makes the same array, with ``...`` if there are more entries than NumPy prints.
+
+        The format stands in the first line, and the entries follow below it if rows behind it would be wrapped.
+        """
+        start, end = f"{self.format}.array(", ")"
+        entries = self._text(quote=chr(39), separator=", ", prefix=start)
+        below = self._text(quote=chr(39), separator=", ", prefix="    ")
+        if below.count("\n") < entries.count("\n") or max(map(len, f"{start}{entries})".split("\n"))) > _WIDTH:
+            start, entries, end = f"{start}\n    ", below, "\n)"
         shape = "" if self.size or self.shape == (0,) else f".reshape{self.shape}"
-        return f"{start}{self._text(quote=chr(39), separator=', ', prefix=start)}){shape}"
+        return f"{start}{entries}{end}{shape}"
 
     def __str__(self) -> str:
         return self._text(quote="", separator=" ", prefix="")

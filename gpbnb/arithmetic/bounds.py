@@ -71,3 +71,16 @@ def gamma_probabilistic(n: int, unit_roundoff: Fraction, failure: float = 1e-2) 
         raise ValueError(f"got n = {n}, unit roundoff {u}; needed n >= 0 and 0 <= u < 1; use more digits")
     spread = math.sqrt(2 * math.log(2 / failure)) / (1 - u)
     return math.expm1(spread * math.sqrt(n) * u + n * u * u / (1 - u))
+
+
+def above(value: Fraction) -> float:
+    """Return the least float64 that is not below a number.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> above(Fraction(1, 10)) >= Fraction(1, 10), above(Fraction(1, 4))
+    (True, 0.25)
+    """
+    near = float(value)
+    return near if Fraction(near) >= value else math.nextafter(near, math.inf)

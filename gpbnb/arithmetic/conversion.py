@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
+import math
 import re
 import reprlib
 from collections.abc import Iterator, Mapping, Sequence, Set
 from decimal import Decimal
 from fractions import Fraction
 from numbers import Rational
-from typing import Any
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, integer_text
+
+
+class Ratio(Protocol):
+    """A number that converts exactly: a float, Decimal or Fraction, or one of NumPy or gmpy2."""
+
+    def as_integer_ratio(self) -> tuple[Any, Any]:
+        """Return numerator and denominator."""
+
+
+class AnyArray(Protocol):
+    """An array of NumPy, of a format, or of another library."""
+
+    def __array__(self) -> NDArray[Any]: ...
+
+
+Number: TypeAlias = str | int | np.integer | Ratio
+"""One number, as the package reads it."""
+
+Numbers: TypeAlias = "Number | AnyArray | Sequence[Numbers]"
+"""Numbers of any shape, from one number to an array or nested lists."""
+
+MaybeNone: TypeAlias = Any
+"""None, in the type of a value that is None only where there is no answer; type checkers ask for no test of it."""
 
 LARGEST_TEXT = 100_000
 """Largest number of characters of a number that is read, and largest power of ten of a Fraction."""
@@ -21,6 +45,7 @@ LARGEST_TEXT = 100_000
 _SHOWN = reprlib.Repr()
 _SHOWN.maxstring = 60
 _DECIMAL = re.compile(r"\s*([+-]?)(\d+(?:\.\d*)?|\.\d+)(?:[eE]([+-]?\d+))?\s*", re.ASCII)
+_NOT_FINITE = re.compile(r"\s*[+-]?(nan|inf|infinity)\s*", re.IGNORECASE)
 _RATIO = re.compile(r"\s*([+-]?\d+)\s*/\s*(\d+)\s*", re.ASCII)
 _ACCEPTED = "a str, int, float, Decimal or Fraction"
 
@@ -68,6 +93,22 @@ def exact_ratio(value: Any) -> tuple[int, int, int]:
             raise ValueError(_not_finite(value)) from None
         return int(p), int(q), 0
     raise TypeError(f"got {value!r} of type {type(value).__name__}; needed {_ACCEPTED}")
+
+
+def special_number(value: Any) -> float | None:
+    """Read infinity, NaN or a negative zero, as a number or in text; None for everything else."""
+    if isinstance(value, str):
+        if _NOT_FINITE.fullmatch(value):
+            return float(value)
+        zero = _DECIMAL.fullmatch(value)
+        return -0.0 if zero and zero[1] == "-" and not zero[2].strip("0.") else None
+    if isinstance(value, Decimal):
+        found = math.nan if value.is_nan() else float(value) if value.is_infinite() or not value else 0.0
+    elif hasattr(value, "as_integer_ratio") and not isinstance(value, (Rational, np.integer)):
+        found = float(value) if value != value or value in (math.inf, -math.inf) or value == 0 else 0.0
+    else:
+        return None
+    return found if found != 0 or math.copysign(1, found) < 0 else None
 
 
 def _of_mpmath_or_flint(value: Any) -> tuple[int, int, int] | None:
@@ -142,7 +183,7 @@ def _read(text: str) -> tuple[int, int, int]:
         if q == 0:
             raise ValueError(f"got {shown(text)}; needed a denominator other than zero; correct it")
         return p, q, 0
-    if re.fullmatch(r"\s*[+-]?(nan|inf|infinity)\s*", text, re.IGNORECASE):
+    if _NOT_FINITE.fullmatch(text):
         raise ValueError(_not_finite(repr(text)))
     raise ValueError(
         f"got {shown(text)}; needed a number such as '765.4567', '1e-3' or '1/3', "
@@ -168,6 +209,8 @@ def entries(values: Any) -> NDArray[Any]:
     if isinstance(values, (str, bytes, bytearray, np.generic)):
         return single(values)
     if hasattr(values, "__array__"):
+        if type(values).__module__.partition(".")[0] == "pandas":  # whose arrays would make whole numbers float64
+            values = values.to_numpy(dtype=object)
         values = np.asarray(values)
         if values.dtype.kind not in "iufUTO":
             raise TypeError(

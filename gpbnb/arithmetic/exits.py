@@ -63,9 +63,9 @@ _running: dict[int, _Run] = {}
 
 @contextmanager
 def kept_in(fmt: Any) -> Iterator[Any]:
-    """Refuse all exits of numbers while a function runs; gives a format equal to `fmt`, for this run only.
+    """Refuse to convert numbers while a function runs; yield a format equal to `fmt`, for this run only.
 
-    Runs may be nested, and runs of other threads do not matter.
+    Runs may be nested, and other threads are not affected.
     """
     outer, own = _state.get(), replace(fmt)
     run = _Run(own, [])
@@ -84,6 +84,17 @@ def kept_in(fmt: Any) -> Iterator[Any]:
 
 
 @contextmanager
+def unseen(fmt: Any) -> Iterator[list[Any]]:
+    """Refuse all conversions, and show nothing; yield a list of what the function wanted to show."""
+    shown: list[Any] = []
+    token = _state.set(_State(_Run(fmt, shown)))
+    try:
+        yield shown
+    finally:
+        _state.reset(token)
+
+
+@contextmanager
 def entering(fmt: Any) -> Iterator[None]:
     """Allow arrays of `fmt`, and no others, to be read into `fmt`."""
     token = _state.set(_state.get()._replace(into=fmt))
@@ -95,7 +106,7 @@ def entering(fmt: Any) -> Iterator[None]:
 
 @contextmanager
 def lifted() -> Iterator[None]:
-    """Open all exits, for code whose results are numbers of the format, truth values or indices."""
+    """Allow all conversions, for code whose results are numbers of the format, truth values or indices."""
     token = _state.set(_state.get()._replace(lifted=True))
     try:
         yield
@@ -115,11 +126,12 @@ def stays(function: Callable[P, Result]) -> Callable[P, Result]:
 
 
 def check_exit(x: Any, exit: str) -> None:
-    """Refuse an exit of the array `x` while the precision of a function is searched.
+    """Refuse to convert the array `x` while the precision of a function is searched.
 
     Raises
     ------
-    TypeError : it is searched; the message names the exit, a key of :data:`INSTEAD`, and says what to write instead.
+    TypeError : the precision is being searched; the message names the conversion, a key of :data:`INSTEAD`, and says
+        what to write instead.
     """
     fmt, state = x.format, _state.get()
     run = state.run or _running.get(id(fmt))
@@ -139,16 +151,16 @@ def check_exit(x: Any, exit: str) -> None:
 
 
 def peek(what: Any, see: Callable[[Any], Any]) -> None:
-    """Look at numbers of a function whose precision is searched; none of them can return into its results.
+    """Show intermediate values of a function whose precision is being searched, without changing its results.
 
-    While the function runs, its numbers cannot be converted or printed. ``peek(x, see)`` calls ``see(x)`` as soon as
-    the run has ended, with no restrictions. A function whose precision is not searched calls it at once.
+    While the function runs, its values cannot be converted or printed. ``peek(x, see)`` calls ``see(x)`` as soon as the
+    run has ended, with no restrictions. Outside a search, ``see(x)`` is called at once.
 
     Parameters
     ----------
     what : an array, or any other object, such as a tuple of arrays.
-    see : function of one argument, such as ``print`` or the ``append`` of a list. The function is run once in each
-        precision, so a list collects the values of all these runs.
+    see : a function of one argument, such as ``print`` or the ``append`` of a list. The searched function runs once in
+        each precision, so a list collects the values of all these runs.
 
     Examples
     --------
@@ -156,7 +168,7 @@ def peek(what: Any, see: Callable[[Any], Any]) -> None:
     >>> def halved(fmt, z):
     ...     peek(z[0] / 3, lambda x: seen.append((x.format.precision, float(x.to_float()))))
     ...     return z / 2
-    >>> seen = []
+    >>> seen: list[tuple[int, float]] = []
     >>> required_precision(halved, 3, 0.01, z=[1, 2, 3]).precision
     2
     >>> min(seen)

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from gpbnb.arithmetic import rational
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_ratio
-from gpbnb.arithmetic.kernels.backends import Backend
-from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel
-from gpbnb.arithmetic.kernels.limited import limited_kernel
-from gpbnb.arithmetic.kernels.limited_backends import (
-    Accumulator,
-    LimitedExact,
-    check_compiled,
-    limited_backend,
-    limited_exact,
-    mixed_tag,
-    restart,
-    run_tag,
-)
+from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
+from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
+from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
 from gpbnb.arithmetic.kernels.tags import Tag
-from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.making import Makes
 from gpbnb.arithmetic.rounding import Limits, Order, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.words import FixedLayout
 
 _POLICIES = ("raise", "saturate", "wrap")
 
@@ -42,23 +33,23 @@ class FixedArray(FloatArray):
     __slots__ = ()
 
 
-@dataclass(frozen=True)
-class FixedFormat:
+@dataclass(frozen=True, init=False)
+class FixedFormat(Makes[FixedArray]):
     r"""Two's complement fixed point: multiples of :math:`2^{-f}` from :math:`-2^i` to :math:`2^i - 2^{-f}`.
 
     Parameters
     ----------
-    integer_bits : i, bits before the binary point, without the sign.
-    fraction_bits : f, bits after it; the word has 1 + i + f bits.
-    rounding : applied to every stored number and every result; a ``Rounding``, or its name, such as "chop".
-    overflow : "raise" an OverflowError that names the operation and the entry, "saturate" at the nearest limit, or
-        "wrap" around as two's complement does.
-    seed : seed for stochastic rounding.
+    integer_bits : i, the number of bits before the binary point, without the sign bit.
+    fraction_bits : f, the number of bits after the binary point. The word has 1 + i + f bits.
+    rounding : how every stored number and every result is rounded; a ``Rounding``, or its name, such as "chop".
+    overflow : what happens to a result beyond the limits. "raise" raises an OverflowError that names the operation and
+        the entry, "saturate" takes the nearest limit, and "wrap" wraps around as two's complement does.
+    seed : seed of the random numbers for stochastic rounding.
 
     Raises
     ------
-    TypeError : a parameter is not of its type.
-    ValueError : no bits at all, or an unknown rounding or overflow.
+    TypeError : a parameter has the wrong type.
+    ValueError : the word has no bits at all, or the rounding or the overflow is unknown.
 
     Examples
     --------
@@ -69,11 +60,24 @@ class FixedFormat:
 
     integer_bits: int
     fraction_bits: int
-    rounding: Rounding = Rounding.NEAREST
-    overflow: str = "raise"
-    seed: int = 0
+    rounding: Rounding
+    overflow: str
+    seed: int
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        integer_bits: int,
+        fraction_bits: int,
+        rounding: Rounding | str = Rounding.NEAREST,
+        overflow: str = "raise",
+        seed: int = 0,
+    ) -> None:
+        given = (integer_bits, fraction_bits, rounding, overflow, seed)
+        for field, value in zip(fields(self), given, strict=True):
+            object.__setattr__(self, field.name, value)
+        self._check()
+
+    def _check(self) -> None:
         for name in ("integer_bits", "fraction_bits", "seed"):
             value = getattr(self, name)
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
@@ -100,12 +104,12 @@ class FixedFormat:
 
     @property
     def precision(self) -> int:
-        """Bits of the word without its sign."""
+        """Number of bits in the word, without the sign bit."""
         return self.integer_bits + self.fraction_bits
 
     @property
     def unit(self) -> Fraction:
-        """The exact distance between neighbouring numbers. Rounding to nearest has an error of at most half of it."""
+        """The exact distance between neighbouring numbers. Rounding to nearest errs by at most half this distance."""
         return Fraction(1, 2) ** self.fraction_bits
 
     @property
@@ -119,44 +123,55 @@ class FixedFormat:
         return -(Fraction(2) ** self.integer_bits)
 
     @property
+    def smallest(self) -> Fraction:
+        """The smallest positive number, the unit."""
+        return self.unit
+
+    @property
+    def layout(self) -> FixedLayout:
+        """How a word stores a number of this format, in two's complement."""
+        return FixedLayout(1 + self.precision, -self.fraction_bits)
+
+    @property
     def limits(self) -> Limits:
         """The limits of the range."""
         return Limits(self.integer_bits - 1, True, self.largest, self.lowest, self.overflow, fixed=True)
 
     @cached_property
-    def _rules(self) -> Rules:
+    def rules(self) -> Rules:
+        """All settings that determine the digits of a result."""
         return Rules(2, self.precision, self.rounding, self.limits, self.seed)
 
-    @property
+    @cached_property
     def kernel(self) -> ExactKernel:
         """The scalar operations of this format."""
-        return limited_kernel(self._rules)
+        return kernel(self.rules)
 
-    @property
+    @cached_property
     def backend(self) -> Backend:
         """The backend that stores the numbers of an array of this format."""
-        return limited_backend(self._rules)
+        return backend(self.rules)
 
-    @property
-    def exact_backend(self) -> LimitedExact:
+    @cached_property
+    def exact_backend(self) -> Exact:
         """The slow backend that can store every number of this format."""
-        return limited_exact(self._rules)
+        return exact(self.rules)
 
     def run_tag(
         self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
     ) -> Tag:
-        """Return the arithmetic for one compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
+        """Return the tag for a compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
         if sums is not None:
             return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
-        return run_tag(self.backend, self._rules, fused, order, block)
+        return run_tag(self.rules, fused, order, block)
 
     def check_compiled(self) -> None:
         """Reject a format without compiled loops; see :meth:`gpbnb.arithmetic.formats.FloatFormat.check_compiled`."""
-        check_compiled(self.backend, self._rules)
+        check_compiled(self.rules)
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""
-        restart(self.kernel, self.backend)
+        self.backend.restart()
 
     def round(self, value: Any) -> Fraction:
         """Round one number into the format; see :meth:`gpbnb.arithmetic.formats.FloatFormat.round`."""
@@ -182,10 +197,10 @@ def scaling(values: Any, bits: int, rounding: Rounding = Rounding.NEAREST, overf
     """
     if bits < 2:
         raise ValueError(f"bits: got {bits}; needed at least 2, one of them the sign")
-    largest = max(abs(exact(values)).ravel(), default=Fraction(0))
+    largest = max(map(abs, rational.exact(values).ravel().tolist()), default=Fraction(0))
     if not largest:
         raise ValueError("got values that are all zero; needed at least one nonzero value; omit the variable")
-    integer_bits = math.frexp(float(largest))[1]  # largest < 2**integer_bits, apart from the last rounding
+    integer_bits = largest.numerator.bit_length() - largest.denominator.bit_length()  # or one or two more
     while True:
         fmt = FixedFormat(integer_bits, bits - 1 - integer_bits, rounding, overflow)
         if largest <= fmt.largest:

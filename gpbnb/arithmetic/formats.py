@@ -6,7 +6,7 @@ Source: hung1984, ch. II, sections 2-4; the same in hung1982, ch. III.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -17,56 +17,65 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.conversion import exact_fraction, exact_ratio
 from gpbnb.arithmetic.kernels.backends import Backend, Exact, backend, exact
 from gpbnb.arithmetic.kernels.exact import LARGEST_BITS, ExactKernel, kernel
-from gpbnb.arithmetic.kernels.limited import limited_kernel
-from gpbnb.arithmetic.kernels.limited_backends import (
-    Accumulator,
-    check_compiled,
-    limited_backend,
-    limited_exact,
-    mixed_tag,
-    restart,
-    run_tag,
-)
+from gpbnb.arithmetic.kernels.selection import Accumulator, check_compiled, mixed_tag, run_tag
 from gpbnb.arithmetic.kernels.tags import Tag
-from gpbnb.arithmetic.rounding import Limits, Order, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.making import Makes
+from gpbnb.arithmetic.rounding import FLOAT_OVERFLOWS, Limits, Order, Rounding, Rules, rounding_named
+from gpbnb.arithmetic.words import FloatLayout
 
 __all__ = ["FloatFormat", "prints_as"]
+
+_WORDS = ((2, True), (2, False), (16, False))  # base, and whether there are subnormal numbers, of layouts
 
 LARGEST_EXPONENT = 2**20
 """Largest size of an exponent of a range, in base 2; that of binary128 is 16383."""
 
 
-@dataclass(frozen=True)
-class FloatFormat:
-    r"""Floating-point numbers :math:`\pm.d_1 d_2 \dots d_t \times b^e`, of any exponent unless a range is given.
+@dataclass(frozen=True, init=False, repr=False)
+class FloatFormat(Makes[FloatArray]):
+    r"""Floating-point numbers :math:`\pm.d_1 d_2 \dots d_t \times b^e`, with any exponent unless a range is given.
 
-    Zero is a number of every format; there is no negative zero, infinity or NaN.
+    Zero is a number of every format. Infinity, NaN and negative zero are numbers of a format with
+    ``overflow="infinity"``, and of no other.
 
     Parameters
     ----------
     base : b, an int of at least 2.
-    precision : t, digits of the significand, an int of at least 1.
-    rounding : applied to every stored number and every result; a :class:`~gpbnb.arithmetic.rounding.Rounding`, or its
-        name, such as "chop".
+    precision : t, the number of digits of the significand, an int of at least 1.
+    rounding : how every stored number and every result is rounded; a :class:`~gpbnb.arithmetic.rounding.Rounding`, or
+        its name, such as "chop".
     emin, emax : exponents of the least normal and of the largest number, as IEEE 754 counts them:
         :math:`b^{\text{emin}}` and :math:`d.dd\dots\times b^{\text{emax}}`. Give both or neither.
-    subnormal : with a range, whether numbers below the least normal one keep its spacing (gradual underflow). Otherwise
-        results that are below it after rounding become zero.
-    largest : the largest number, if it is not the one whose t digits are all b - 1.
-    seed : seed for stochastic rounding. Each run of a filter restarts the random numbers from the seed, those of arrays
-        included; operations on arrays continue one sequence, which :meth:`restart` restarts.
+    subnormal : whether numbers below the least normal number have the same spacing as those just above it (gradual
+        underflow). If not, results that are below the least normal number after rounding become zero. It matters only
+        for a format with a range.
+    largest : the largest number. By default, all its t digits are b - 1.
+    seed : seed of the random numbers for stochastic rounding. Each run of a filter restarts the random numbers from the
+        seed. Operations on arrays draw from one sequence, until :meth:`restart` or a run of a filter restarts it.
+    overflow : what happens to a result that is beyond the largest number after rounding. "raise" raises an
+        OverflowError that names the operation and the entry. "saturate" takes the largest number, with the sign of the
+        result. "infinity" computes as IEEE 754 does by default, with infinity, NaN and a sign of zero; see the notes.
 
     Raises
     ------
-    TypeError : a parameter is not of its type.
-    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; no rounding of this name; one of
-        `emin` and `emax` without the other, ``emin > emax``, or exponents too large to compute with; a largest number
-        that is not in the format.
+    TypeError : a parameter has the wrong type.
+    ValueError : ``base < 2`` or ``precision < 1``, or numbers too long for memory; an unknown rounding; `emin` or
+        `emax` without the other, ``emin > emax``, or exponents too large to compute with; a largest number that is not
+        in the format; an unknown `overflow`, one without a range, or "infinity" in a format whose words all store
+        numbers, such as FP6.
 
     Notes
     -----
-    A result beyond the largest number is an OverflowError that names the operation and the entry. A range is applied
-    after rounding, as in IEEE 754.
+    A range is applied after rounding, as in IEEE 754. With "raise" and "saturate", a division by zero and the root of a
+    negative number raise an error.
+
+    With ``overflow="infinity"``, the operations ``+ - * /``, square root and fused multiply-add give what IEEE 754
+    requires for every operand: a result that overflows becomes infinite, or the largest number if the rounding is
+    directed toward it; there is one NaN. E4M3, which has NaN and no infinity, gives NaN in its place. Elementary
+    functions, remainders and sorting need finite entries, and take a negative zero for zero.
+    :func:`~gpbnb.arithmetic.flags.flags` counts the exceptions of IEEE 754. Such a format computes on Python integers,
+    about a thousand times slower than compiled loops, which filters need; "saturate" has compiled loops in base 2 up to
+    52 bits, and in base 16.
 
     References
     ----------
@@ -80,14 +89,35 @@ class FloatFormat:
 
     base: int
     precision: int
-    rounding: Rounding = Rounding.NEAREST
-    emin: int | None = None
-    emax: int | None = None
-    subnormal: bool = True
-    largest: Fraction | None = None
-    seed: int = 0
+    rounding: Rounding
+    emin: int | None
+    emax: int | None
+    subnormal: bool
+    #: The largest number, if it was given.
+    given_largest: Fraction | None
+    seed: int
+    overflow: str
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        base: int,
+        precision: int,
+        rounding: Rounding | str = Rounding.NEAREST,
+        emin: int | None = None,
+        emax: int | None = None,
+        subnormal: bool = True,
+        largest: Any = None,
+        seed: int = 0,
+        given_largest: Any = None,
+        overflow: str = "raise",
+    ) -> None:
+        stated = given_largest if largest is None else largest
+        given = (base, precision, rounding, emin, emax, subnormal, stated, seed, overflow)
+        for field, value in zip(fields(self), given, strict=True):
+            object.__setattr__(self, field.name, value)
+        self._check()
+
+    def _check(self) -> None:
         for name, least in (("base", 2), ("precision", 1)):
             value = getattr(self, name)
             if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
@@ -112,16 +142,20 @@ class FloatFormat:
         self._check_range()
 
     def _check_range(self) -> None:
+        if not isinstance(self.subnormal, (bool, np.bool_)):
+            raise TypeError(f"subnormal: got {self.subnormal!r}; needed True or False")
         for name in ("emin", "emax", "seed"):
             value = getattr(self, name)
             if value is not None and (isinstance(value, bool) or not isinstance(value, (int, np.integer))):
                 raise TypeError(f"{name}: got {value!r} of type {type(value).__name__}; needed an int")
+        if self.overflow not in FLOAT_OVERFLOWS:
+            raise ValueError(f"overflow: got {self.overflow!r}; needed one of {', '.join(map(repr, FLOAT_OVERFLOWS))}")
         if (self.emin is None) != (self.emax is None):
             raise ValueError(f"got emin={self.emin}, emax={self.emax}; needed both, or neither for an unlimited range")
         if self.emin is None or self.emax is None:
-            if self.largest is not None or not self.subnormal:
+            if self.given_largest is not None or not self.subnormal or self.overflow != "raise":
                 raise ValueError(
-                    "got a largest number or subnormal=False without a range; needed emin and emax as well"
+                    "got a largest number, subnormal=False or overflow without a range; needed emin and emax as well"
                 )
             return
         object.__setattr__(self, "emin", int(self.emin))
@@ -133,16 +167,20 @@ class FloatFormat:
                 f"got emin={self.emin}, emax={self.emax}; needed exponents of at most "
                 f"{int(LARGEST_EXPONENT / math.log2(self.base))} in size, or the limits are too long to compute with"
             )
-        last = Fraction(self.base) ** (self.emax - self.precision + 1)
-        nines = (self.base**self.precision - 1) * last
-        if self.largest is None:
-            return
-        object.__setattr__(self, "largest", exact_fraction(self.largest))
-        if (
-            not self.base ** (self.precision - 1) * last <= self.largest <= nines
-            or (self.largest / last).denominator != 1
-        ):
-            raise ValueError(f"largest: got {self.largest}; needed a number of the format with the exponent emax")
+        if self.given_largest is not None:
+            object.__setattr__(self, "given_largest", exact_fraction(self.given_largest))
+            last = Fraction(self.base) ** (self.emax - self.precision + 1)
+            if (
+                not self.base ** (self.precision - 1) * last <= self.given_largest <= self._nines
+                or (self.given_largest / last).denominator != 1
+            ):
+                raise ValueError(
+                    f"largest: got {self.given_largest}; needed a number of the format with the exponent emax"
+                )
+        if self.overflow == "infinity" and not self._special:
+            raise ValueError(
+                f"got {self}, in which every word stores a finite number; needed overflow 'raise' or 'saturate'"
+            )
 
     def __repr__(self) -> str:
         text = f"base={self.base}, precision={self.precision}, rounding={self.rounding}"
@@ -150,10 +188,12 @@ class FloatFormat:
             text += f", emin={self.emin}, emax={self.emax}"
         if not self.subnormal:
             text += ", subnormal=False"
-        if self.largest is not None:
-            text += f", largest={self.largest}"
+        if self.given_largest is not None:
+            text += f", largest={self.given_largest}"
         if self.seed:
             text += f", seed={self.seed}"
+        if self.overflow != "raise":
+            text += f", overflow={self.overflow!r}"
         return f"FloatFormat({text})"
 
     @property
@@ -161,80 +201,153 @@ class FloatFormat:
         """The limits of the range; None if exponents are unlimited."""
         if self.emin is None or self.emax is None:
             return None
-        nines = (self.base**self.precision - 1) * Fraction(self.base) ** (self.emax - self.precision + 1)
-        largest = nines if self.largest is None else self.largest
-        return Limits(self.emin, self.subnormal, largest, -largest)
-
-    @cached_property
-    def _rules(self) -> Rules | None:
-        """The rules of the format; None for the reports' two roundings with unlimited range."""
-        if self.emin is None and self.rounding in Rounding.documented():
-            return None
-        return Rules(self.base, self.precision, self.rounding, self.limits, self.seed)
+        overflow = self._special if self.overflow == "infinity" else self.overflow
+        return Limits(self.emin, self.subnormal, self.largest, -self.largest, overflow)
 
     @property
+    def _special(self) -> str:
+        """What words that store no finite number mean: "infinity" and NaN, only "NaN", or "" if there are none."""
+        low, high = self._range
+        if (self.base, self.subnormal) not in _WORDS:
+            return "infinity"
+        layout = FloatLayout.of(self.base, self.precision, low, high, self.subnormal)
+        if layout.field(high) < (1 << layout.exponent_bits) - 1 and layout.stored_bits:
+            return "infinity"
+        return "NaN" if self.largest < self._nines else ""
+
+    @property
+    def _nines(self) -> Fraction:
+        """The number with the exponent emax whose digits are all b - 1."""
+        return (self.base**self.precision - 1) * Fraction(self.base) ** (self._range[1] - self.precision + 1)
+
+    @cached_property
+    def largest(self) -> Fraction:
+        """The largest number, exact.
+
+        Raises
+        ------
+        ValueError : exponents are unlimited.
+
+        Examples
+        --------
+        >>> from gpbnb import BINARY32
+        >>> float(BINARY32.largest), float(BINARY32.smallest_normal), float(BINARY32.smallest)
+        (3.4028234663852886e+38, 1.1754943508222875e-38, 1.401298464324817e-45)
+        """
+        if self.given_largest is not None:
+            return self.given_largest
+        return self._nines
+
+    @property
+    def smallest_normal(self) -> Fraction:
+        """The smallest positive number that keeps all t digits, as an exact Fraction.
+
+        Raises
+        ------
+        ValueError : exponents are unlimited.
+        """
+        return Fraction(self.base) ** self._range[0]
+
+    @property
+    def smallest(self) -> Fraction:
+        """The smallest positive number, as an exact Fraction; it is subnormal if the format has subnormal numbers.
+
+        Raises
+        ------
+        ValueError : exponents are unlimited.
+        """
+        return self.smallest_normal / (self.base ** (self.precision - 1) if self.subnormal else 1)
+
+    @property
+    def _range(self) -> tuple[int, int]:
+        if self.emin is None or self.emax is None:
+            raise ValueError(
+                f"got {self}, whose exponents are unlimited, so that it has no largest or smallest number; needed a "
+                "format with emin and emax, such as BINARY32"
+            )
+        return self.emin, self.emax
+
+    @property
+    def layout(self) -> FloatLayout:
+        """How a word stores a number of this format.
+
+        Raises
+        ------
+        ValueError : the format has base 10 or an unlimited range, so no layout is defined.
+        """
+        if self.emin is None or self.emax is None or (self.base, self.subnormal) not in _WORDS:
+            raise ValueError(
+                f"got {self}, which has no bits; needed a range emin, emax, and base 2, or base 16 with subnormal=False"
+            )
+        made = FloatLayout.of(self.base, self.precision, self.emin, self.emax, self.subnormal)
+        if self.overflow != "infinity":
+            return made
+        largest = self.kernel.from_ratio(self.largest.numerator, self.largest.denominator)
+        return made._replace(special=self._special, largest=made.bits(*largest))
+
+    @cached_property
+    def rules(self) -> Rules:
+        """All settings that determine the digits of a result."""
+        return Rules(self.base, self.precision, self.rounding, self.limits, self.seed)
+
+    @cached_property
     def kernel(self) -> ExactKernel:
         """The scalar operations of this format."""
-        if self._rules is not None:
-            return limited_kernel(self._rules)
-        return kernel(self.base, self.precision, self.rounding is Rounding.NEAREST)
+        return kernel(self.rules)
 
     def run_tag(
         self, fused: bool = False, sums: Accumulator | None = None, order: Order = "left", block: int = 32
     ) -> Tag:
-        """Return the arithmetic for one compiled loop; random roundings start with the first number of the seed.
+        """Return the tag that selects this format's arithmetic in a compiled loop.
+
+        Stochastic rounding restarts its random numbers from the seed.
 
         Parameters
         ----------
         fused : whether sums of products use fused multiply-add.
-        sums : the format that keeps sums of products until they are stored; by default this one.
-        order, block : of the additions in sums of products, as of :func:`gpbnb.arithmetic.linalg.matmul`.
+        sums : the format in which sums of products are computed before they are stored; by default this format.
+        order, block : order of the additions in sums of products, as in :func:`gpbnb.arithmetic.linalg.matmul`.
 
         Raises
         ------
-        ValueError : the format has no compiled loops, or none with fused multiply-add, with sums in `sums`, or in this
-            order; an unknown order.
+        ValueError : the format has no compiled loops, or these do not support the given `fused`, `sums` or `order`; an
+            unknown order.
         """
         if sums is not None:
             return mixed_tag(self.run_tag(), sums.run_tag(fused, order=order, block=block))
-        return run_tag(
-            self.backend, self._rules or Rules(self.base, self.precision, self.rounding), fused, order, block
-        )
+        return run_tag(self.rules, fused, order, block)
 
     def check_compiled(self) -> None:
         """Reject a format without compiled loops.
 
         Raises
         ------
-        ValueError : it has none; the message names the setting that prevents them, and what to set instead.
+        ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
+            instead.
         """
-        check_compiled(self.backend, self._rules or Rules(self.base, self.precision, self.rounding))
+        check_compiled(self.rules)
 
     def restart(self) -> None:
         """Restart the random numbers of stochastic rounding."""
-        restart(self.kernel, self.backend)
+        self.backend.restart()
 
-    @property
+    @cached_property
     def backend(self) -> Backend:
         """The backend that stores the numbers of an array of this format, compiled if the format allows it."""
-        if self._rules is not None:
-            return limited_backend(self._rules)
-        return backend(self.base, self.precision, self.rounding is Rounding.NEAREST)
+        return backend(self.rules)
 
-    @property
+    @cached_property
     def exact_backend(self) -> Exact:
         """The slow backend that can store every number of this format."""
-        if self._rules is not None:
-            return limited_exact(self._rules)
-        return exact(self.base, self.precision, self.rounding is Rounding.NEAREST)
+        return exact(self.rules)
 
     @property
     def unit_roundoff(self) -> Fraction:
-        r"""Bound of the relative error of one rounding, exact.
+        r"""Bound on the relative error of one rounding, as an exact Fraction.
 
         .. math:: \beta = \tfrac12 b^{1-t} \text{ (to nearest)}, \qquad \beta_c = b^{1-t} \text{ (otherwise)}
 
-        If the range is limited, it holds for results that are not below the smallest normal number.
+        If the range is limited, the bound holds for results that are not below the smallest normal number.
 
         References
         ----------
@@ -253,7 +366,7 @@ class FloatFormat:
 
         Returns
         -------
-        The rounded value, exact.
+        The rounded value, as an exact Fraction.
 
         Raises
         ------
@@ -273,13 +386,13 @@ class FloatFormat:
 
         Raises
         ------
-        TypeError, ValueError, OverflowError : as :meth:`round`.
+        TypeError, ValueError, OverflowError : as for :meth:`round`.
 
         References
         ----------
         hung1984, ch. II, (2).
         """
-        chop = kernel(self.base, self.precision, False)
+        chop = kernel(Rules(self.base, self.precision, Rounding.CHOP))
         p, q, k = exact_ratio(value)
         m, exponent = chop.from_decimal(p, q, k)
         if m == 0:
@@ -299,8 +412,8 @@ class FloatFormat:
 
         Raises
         ------
-        TypeError, ValueError, OverflowError : as :meth:`round`, naming the entry; nested lists
-            of unequal lengths.
+        TypeError, ValueError, OverflowError : as for :meth:`round`, with the entry in the message; or nested lists of
+            unequal lengths.
         """
         return FloatArray.from_values(values, self)
 

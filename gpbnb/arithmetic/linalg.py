@@ -1,27 +1,28 @@
 """Linear algebra in t-digit arithmetic, with a documented order of operations for each result.
 
-The order matters, because another order gives other digits. It is the order of hung1984, ch. II.
-Operands are FloatArrays of one format, and so are results. If their backend has compiled loops, elimination runs in
-:mod:`gpbnb.arithmetic.kernels.elimination`; the loops here work for every format and exponent and give the same digits.
+The order matters, because another order gives other digits. This module uses the order of hung1984, ch. II. All
+operands and results are FloatArrays of one format. If the backend of the operands has compiled loops, elimination runs
+in :mod:`gpbnb.arithmetic.kernels.elimination`; the loops here work for every format and exponent and give the same
+digits.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.array import FloatArray, NumberFormat
 from gpbnb.arithmetic.exits import lifted
 from gpbnb.arithmetic.kernels.backends import Compiled
-from gpbnb.arithmetic.kernels.limited_backends import check_order
-from gpbnb.arithmetic.rounding import Order
+from gpbnb.arithmetic.kernels.selection import check_order
+from gpbnb.arithmetic.rounding import Order, Rounding
 
-if TYPE_CHECKING:
-    from gpbnb.arithmetic.fixed import FixedFormat
-    from gpbnb.arithmetic.formats import FloatFormat
+_MOST_PRODUCTS = 1_000_000  # that pairwise and blocked sums form at once
 
 
 class LU(NamedTuple):
@@ -38,7 +39,7 @@ def dot(
     order: Order = "left",
     fused: bool = False,
     block: int = 32,
-    sums: FloatFormat | FixedFormat | None = None,
+    sums: NumberFormat | None = None,
 ) -> FloatArray:
     r"""Inner product, summed from left to right unless `order` says otherwise.
 
@@ -55,8 +56,8 @@ def dot(
 
     Raises
     ------
-    TypeError : not FloatArrays.
-    ValueError : not two vectors of one length and format.
+    TypeError : an operand is not a FloatArray.
+    ValueError : the operands are not two vectors of the same length and format.
 
     References
     ----------
@@ -73,28 +74,28 @@ def matmul(
     order: Order = "left",
     fused: bool = False,
     block: int = 32,
-    sums: FloatFormat | FixedFormat | None = None,
+    sums: NumberFormat | None = None,
 ) -> FloatArray:
     """Matrix product, by default the same as ``a @ b``; each entry is :func:`dot` of a row and a column.
 
     Parameters
     ----------
     a, b : (..., m, n) and (..., n, p), or a vector (n,) on either side.
-    order : of the additions. "left": from left to right. "pairwise": the sum of the first half plus
-        that of the second, each formed in the same way; the first half is the shorter one. "blocked": sums of `block`
+    order : order of the additions. "left": from left to right. "pairwise": the sum of the first half plus the sum of
+        the second half, each formed in the same way; the first half is the shorter one. "blocked": sums of `block`
         products from left to right, then these sums from left to right, as in the inner loops of optimized BLAS.
     fused : whether each product is added by a fused multiply-add, which rounds once; not with "pairwise", where
         products are not added to sums.
     block : number of products in a block.
     sums : the format in which products and sums are computed; each entry is then rounded once into the format of the
-        operands. Tensor cores keep sums of bfloat16 products in binary32, signal processors keep them in a long
+        operands. Tensor cores, for example, sum bfloat16 products in binary32, and signal processors use a long
         accumulator.
 
     Raises
     ------
-    TypeError : not FloatArrays, or sums that are no format.
-    ValueError : interface dimensions or formats differ; an unknown order, a block below 1, or pairwise and fused; sums
-        of another base or with fewer digits than the operands.
+    TypeError : an operand is not a FloatArray, or `sums` is not a format.
+    ValueError : inner dimensions or formats differ; an unknown order; a block below 1; "pairwise" together with
+        `fused`; `sums` of another base or with fewer digits than the operands.
 
     References
     ----------
@@ -126,6 +127,15 @@ def matmul(
 
 
 def _sum_of_products(rows: FloatArray, columns: FloatArray, order: Order, fused: bool, block: int) -> FloatArray:
+    size = math.prod(np.broadcast_shapes(rows.shape[:-2], columns.shape[:-2])) * rows.shape[-2] * columns.shape[-1]
+    # Random roundings come in the order of the loops below.
+    if rows.shape[-1] * size <= _MOST_PRODUCTS and order != "left" and rows.format.rounding is not Rounding.STOCHASTIC:
+        axes = max(rows.ndim, columns.ndim)
+        left, right = (x.reshape((1,) * (axes - x.ndim) + x.shape) for x in (rows, columns))
+        left = left[..., np.newaxis].moved(lambda a: np.moveaxis(a, -2, 0))
+        right = right[..., np.newaxis, :, :].moved(lambda a: np.moveaxis(a, -2, 0))
+        return _pairwise(left * right) if order == "pairwise" else _blocked(left, right, fused, block)
+
     def factors(k: int) -> tuple[FloatArray, FloatArray]:
         return rows[..., :, k, np.newaxis], columns[..., np.newaxis, k, :]
 
@@ -156,6 +166,34 @@ def _sum_of_products(rows: FloatArray, columns: FloatArray, order: Order, fused:
     return total
 
 
+def _pairwise(terms: FloatArray) -> FloatArray:
+    """Sum along the first axis, the first half plus the second, each formed in the same way; all of a depth at once."""
+    depths = [np.array([len(terms)])]  # lengths of the parts
+    while depths[-1].max() > 1:
+        halves = np.stack([depths[-1] // 2, depths[-1] - depths[-1] // 2], axis=1).ravel()
+        depths.append(halves[halves > 0])
+    for lengths in reversed(depths[:-1]):
+        first = np.cumsum(np.minimum(lengths, 2)) - np.minimum(lengths, 2)  # place of a part's first half
+        whole, split = first[lengths == 1], first[lengths > 1]
+        found = terms[split] + terms[split + 1]
+        if len(whole):
+            order = np.argsort(np.concatenate([split, whole]), kind="stable")
+            found = _joined(found, terms[whole])[order]
+        terms = found
+    return terms[0]
+
+
+def _blocked(left: FloatArray, right: FloatArray, fused: bool, block: int) -> FloatArray:
+    """Sum products along the first axis, from left to right within blocks, of which all take a step at once."""
+    sums = left[::block] * right[::block]
+    for k in range(1, min(block, len(left))):
+        x, y = left[k::block], right[k::block]  # of the blocks that have this product: all, or all but the last
+        shorter = sums[: len(x)]
+        shorter = x.multiply_add(y, shorter) if fused else shorter + x * y
+        sums = shorter if len(x) == len(sums) else _joined(shorter, sums[len(x) :])
+    return sums.sum(0)
+
+
 def lu(a: FloatArray, pivot: bool = False) -> LU:
     r"""Gaussian elimination, one column after the other.
 
@@ -166,8 +204,8 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
     Parameters
     ----------
     a : (n, n).
-    pivot : whether to use partial pivoting: among rows k and below, the row with the largest
-        :math:`|a_{ik}|`, the first of equals, is swapped into row k.
+    pivot : whether to use partial pivoting: among rows k and below, the row with the largest :math:`|a_{ik}|`, or the
+        first of several equal ones, is swapped into row k.
 
     Returns
     -------
@@ -176,7 +214,7 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
 
     Raises
     ------
-    TypeError : not a FloatArray.
+    TypeError : `a` is not a FloatArray.
     ValueError : `a` is not a square matrix.
     numpy.linalg.LinAlgError : a pivot is zero.
 
@@ -199,7 +237,9 @@ def lu(a: FloatArray, pivot: bool = False) -> LU:
             work, order, multipliers = _swap_largest(work, order, multipliers, k)
         head = work[0]
         uppers.append(head)
-        if head[0] == 0:
+        if head.backend.records:
+            _ = 0 / head[0]  # so that a run of the tape stops at a pivot of zero
+        elif head[0] == 0:
             raise np.linalg.LinAlgError(_zero_pivot(k, n, pivot))
         if k == n - 1:
             break
@@ -232,7 +272,7 @@ def solve(a: FloatArray, b: FloatArray, pivot: bool = False) -> FloatArray:
 
     Raises
     ------
-    TypeError : not FloatArrays.
+    TypeError : `a` or `b` is not a FloatArray.
     ValueError : shapes do not fit, or formats differ.
     numpy.linalg.LinAlgError : a pivot is zero.
 
@@ -273,7 +313,7 @@ def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
 
     Raises
     ------
-    TypeError : not a FloatArray.
+    TypeError : `a` is not a FloatArray.
     ValueError : `a` is not a square matrix.
     numpy.linalg.LinAlgError : a pivot is zero.
 
@@ -284,14 +324,103 @@ def inv(a: FloatArray, pivot: bool = False) -> FloatArray:
     return solve(a, a.format.array(np.eye(_square(a), dtype=int)), pivot)
 
 
+def det(a: FloatArray) -> FloatArray:
+    r"""Determinant: the pivots of ``lu(a, pivot=True)``, multiplied from left to right, with the sign of the row order.
+
+    A column without a pivot gives zero.
+
+    Parameters
+    ----------
+    a : (n, n).
+
+    Returns
+    -------
+    A single number.
+
+    Raises
+    ------
+    TypeError : `a` is not a FloatArray.
+    ValueError : `a` is not a square matrix.
+
+    Examples
+    --------
+    >>> from gpbnb import BINARY32, linalg
+    >>> float(linalg.det(BINARY32.array([[1, 2], [4, 4]])))
+    -4.0
+    """
+    n = _square(a)
+    try:
+        _, upper, order = lu(a, pivot=True)
+    except np.linalg.LinAlgError:
+        return cast(FloatArray, np.zeros_like(cast(Any, a[0, 0])))
+    found = cast(FloatArray, np.diagonal(cast(Any, upper))).prod()
+    swaps = sum(int((order[:i] > order[i]).sum()) for i in range(n))
+    return -found if swaps % 2 else found
+
+
+def cholesky(a: FloatArray) -> FloatArray:
+    r"""Cholesky's lower triangular L of a symmetric A = L Lᵀ, one column after the other.
+
+    For k = 1 … n: :math:`l_{kk} = \mathrm{fl}(\sqrt{s_{kk}})` and :math:`l_{ik} = \mathrm{fl}(s_{ik}/l_{kk})` for
+    i > k, where
+    :math:`s_{ik} = (a_{ik} - l_{i1} l_{k1}) - l_{i2} l_{k2} - \dots - l_{i,k-1} l_{k,k-1}` from left to right,
+    each operation rounded. Entries above the diagonal are not read.
+
+    Parameters
+    ----------
+    a : (n, n).
+
+    Raises
+    ------
+    TypeError : `a` is not a FloatArray.
+    ValueError : `a` is not a square matrix.
+    numpy.linalg.LinAlgError : the matrix is not positive definite in this format.
+
+    References
+    ----------
+    Golub & Van Loan 2013, algorithm 4.2.1.
+
+    Examples
+    --------
+    >>> from gpbnb import BINARY32, linalg
+    >>> linalg.cholesky(BINARY32.array([[4, 2], [2, 5]])).to_float()
+    array([[2., 0.],
+           [1., 2.]])
+    """
+    n = _square(a)
+    zeros = a.format.array([0] * n)
+    rest, columns = a, []
+    for k in range(n):
+        pivot = rest[0, 0]
+        if not pivot > 0:
+            raise np.linalg.LinAlgError(
+                f"got a pivot {pivot} in column {k + 1} of {n}; needed one above zero: the matrix is not positive "
+                "definite in this format; use more digits, or another matrix"
+            )
+        root = pivot.sqrt()
+        below = rest[1:, 0] / root
+        columns.append(_joined(zeros[:k], root.reshape(1), below))
+        rest = rest[1:, 1:] - below[:, np.newaxis] * below[np.newaxis, :]
+    return _rows(columns).T
+
+
+NUMPY: dict[str, Callable[..., Any]] = {
+    "cholesky": lambda x, a: cholesky(x.operand(a)),
+    "det": lambda x, a: det(x.operand(a)),
+    "inv": lambda x, a: inv(x.operand(a), pivot=True),
+    "solve": lambda x, a, b: solve(x.operand(a), x.operand(b), pivot=True),
+}
+"""Functions of ``np.linalg`` for arrays of a format, with partial pivoting where LAPACK has it."""
+
+
 def _factored(a: FloatArray, pivot: bool) -> tuple[FloatArray, NDArray[np.intp]] | None:
     """Return both factors in one array and the order of the rows; None if the backend cannot compute them."""
     backend = a.backend
     if not isinstance(backend, Compiled):
         return None
-    factors, order = backend.pack(a.components), np.arange(len(a))
+    factors, order = backend.pack(a.components, backend.matrix_tag), np.arange(len(a))
     try:
-        column = _loops().lu(backend.tag, factors, order, pivot)
+        column = _loops().lu(backend.matrix_tag, factors, order, pivot)
     except OverflowError:
         return None
     if column >= 0:
@@ -306,11 +435,11 @@ def _solved(a: FloatArray, b: FloatArray, pivot: bool) -> FloatArray | None:
         return None
     if (compiled := _factored(a, pivot)) is None:
         return None
-    factors, order = backend.pack(compiled[0].components), compiled[1]
-    columns = backend.pack(b[order].components)
+    tag, order = backend.matrix_tag, compiled[1]
+    factors, columns = backend.pack(compiled[0].components, tag), backend.pack(b[order].components, tag)
     try:
-        _loops().reduce(backend.tag, factors, columns)
-        _loops().substitute(backend.tag, factors, columns)
+        _loops().reduce(tag, factors, columns)
+        _loops().substitute(tag, factors, columns)
     except OverflowError:
         return None
     return type(a).from_components(backend, backend.unpack(columns), a.format)

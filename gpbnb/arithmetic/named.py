@@ -1,21 +1,29 @@
-"""The formats of processors, by name: IEEE 754, accelerators, IBM's hexadecimal floating point and the IBM 704.
+"""The formats of processors by name, and any format in words.
+
+The named formats are those of IEEE 754, accelerators, IBM's hexadecimal floating point and the IBM 704.
 
 All IEEE and accelerator formats round to nearest, ties to even, with gradual underflow; use
-``dataclasses.replace(BINARY32, rounding=Rounding.UP)`` for another rounding. There is no infinity, NaN or negative
-zero: overflow is an error. IBM's machines chop, and a result below their smallest number becomes zero.
+``dataclasses.replace(BINARY32, rounding=Rounding.UP)`` for another rounding. Overflow is an error, and there is no
+infinity, NaN or negative zero; ``replace(BINARY32, overflow="infinity")`` has them, and ``replace(FP8_E4M3,
+overflow="saturate")`` takes the largest number. IBM's machines chop, and a result below their smallest number becomes
+zero.
 
 References
 ----------
 IEEE Std 754-2019, table 3.5. OCP 8-bit floating point specification (OFP8), revision 1.0 (2023). IBM System/360
-Principles of Operation, A22-6821. IBM 704 Manual of Operation, 24-6661.
+Principles of Operation, A22-6821. OCP Microscaling Formats (MX) specification, version 1.0 (2023). IBM 704 Manual of
+Operation, 24-6661.
 """
 
 from __future__ import annotations
 
 from fractions import Fraction
 
+from gpbnb.arithmetic.array import NumberFormat
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.names import format_parts
 
 
 def _ieee(base: int, precision: int, emax: int) -> FloatFormat:
@@ -34,6 +42,11 @@ TF32 = _ieee(2, 11, 127)
 FP8_E5M2 = _ieee(2, 3, 15)
 #: Its largest number is 1.75 * 2**8, since the significand of all ones means NaN there.
 FP8_E4M3 = FloatFormat(2, 4, Rounding.EVEN, emin=-6, emax=8, largest=Fraction(448))
+
+#: Elements of the microscaling formats, at most 28, 7.5 and 6; they have no infinity and no NaN.
+FP6_E3M2 = FloatFormat(2, 3, Rounding.EVEN, emin=-2, emax=4)
+FP6_E2M3 = FloatFormat(2, 4, Rounding.EVEN, emin=0, emax=2)
+FP4_E2M1 = FloatFormat(2, 2, Rounding.EVEN, emin=0, emax=2)
 
 DECIMAL32 = _ieee(10, 7, 96)
 DECIMAL64 = _ieee(10, 16, 384)
@@ -55,6 +68,9 @@ NAMED = {
     "TF32": TF32,
     "FP8_E4M3": FP8_E4M3,
     "FP8_E5M2": FP8_E5M2,
+    "FP6_E3M2": FP6_E3M2,
+    "FP6_E2M3": FP6_E2M3,
+    "FP4_E2M1": FP4_E2M1,
     "DECIMAL32": DECIMAL32,
     "DECIMAL64": DECIMAL64,
     "DECIMAL128": DECIMAL128,
@@ -62,3 +78,69 @@ NAMED = {
     "IBM_HEX64": IBM_HEX64,
     "IBM_704": IBM_704,
 }
+
+
+def digits(fmt: NumberFormat | FixedFormat) -> str:
+    """Name the precision of a format, as in "4 decimal digits" or "24 bits"."""
+    unit = {2: "bit", 10: "decimal digit"}.get(fmt.base, f"base-{fmt.base} digit")
+    return f"{fmt.precision} {unit}{'s' if fmt.precision > 1 else ''}"
+
+
+_ROUNDINGS = {
+    Rounding.NEAREST: "rounded to nearest",
+    Rounding.CHOP: "chopped",
+    Rounding.EVEN: "ties to even",
+    Rounding.UP: "rounded up",
+    Rounding.DOWN: "rounded down",
+    Rounding.ODD: "rounded to odd",
+    Rounding.STOCHASTIC: "stochastically rounded",
+}
+
+
+def rounding_text(rounding: Rounding) -> str:
+    """Describe a rounding in words that need no code, such as "chopped" or "ties to even"."""
+    return _ROUNDINGS[rounding]
+
+
+def arithmetic(fmt: NumberFormat | FixedFormat) -> str:
+    """Name digits, rounding and range of a format, as in "24 bits, ties to even, exponents -126 to 127"."""
+    rounding = "" if fmt.rounding is Rounding.NEAREST else f", {rounding_text(fmt.rounding)}"
+    fraction = getattr(fmt, "fraction_bits", None)
+    if fraction is not None:
+        overflow = {"saturate": ", saturated", "wrap": ", wrapped around"}.get(getattr(fmt, "overflow", ""), "")
+        return f"fixed point of {1 + fmt.precision} bits, {fraction} of them fraction{rounding}{overflow}"
+    least, largest = getattr(fmt, "emin", None), getattr(fmt, "emax", None)
+    if least is None:
+        return digits(fmt) + rounding
+    flushed = "" if getattr(fmt, "subnormal", True) else ", no subnormal numbers"
+    overflow = {"saturate": ", saturated", "infinity": ", with infinity and NaN"}.get(getattr(fmt, "overflow", ""), "")
+    return f"{digits(fmt)}{rounding}, exponents {least} to {largest}{flushed}{overflow}"
+
+
+def format_text(fmt: FloatFormat | FixedFormat) -> str:
+    """Describe a format in a few words: the name of a processor's format, or what :func:`arithmetic` says.
+
+    Examples
+    --------
+    >>> from gpbnb import FloatFormat
+    >>> format_text(BINARY32), format_text(FloatFormat(10, 7, "chop"))
+    ('BINARY32', '7 decimal digits, chopped')
+    """
+    return next((name for name, each in NAMED.items() if fmt == each), arithmetic(fmt))
+
+
+def format_named(name: str) -> FloatFormat | FixedFormat:
+    """Return the format with a name: that of a processor, "Q15", "Q4.12" or "fixed 4.12"; case is ignored.
+
+    Raises
+    ------
+    ValueError : no such format; see :func:`gpbnb.names.format_parts`.
+
+    Examples
+    --------
+    >>> from gpbnb import FixedFormat
+    >>> format_named("bfloat16") == BFLOAT16, format_named("fixed 4.12") == FixedFormat(4, 12)
+    (True, True)
+    """
+    found = format_parts(name)
+    return NAMED[found] if isinstance(found, str) else FixedFormat(*found)

@@ -8,7 +8,7 @@ import operator
 from abc import abstractmethod
 from collections.abc import Callable, Container, Sequence
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from typing import Any, cast
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic import functions
 from gpbnb.arithmetic.conversion import single
-from gpbnb.arithmetic.exits import check_exit, lifted
+from gpbnb.arithmetic.exits import check_exit
 
 _EXACT = {2: 53, 16: 13}  # digits of float64
 _LEAST_NORMAL = 2.0**-1022
@@ -29,6 +29,9 @@ _MOVERS = frozenset((
     "repeat", "reshape", "roll", "squeeze", "swapaxes", "take", "tile", "transpose", "tril", "triu",
 ))
 # fmt: on
+
+
+_ASSIGNMENTS = frozenset(("copyto", "fill_diagonal", "place", "put", "put_along_axis", "putmask"))
 
 
 class NumPyProtocols:
@@ -107,11 +110,11 @@ class NumPyProtocols:
         return self
 
     def ravel(self) -> Any:
-        """Return the entries in one row."""
+        """Return the entries as a one-dimensional array, row after row."""
         return self.moved(np.ravel)
 
     def flatten(self) -> Any:
-        """Return the entries in one row."""
+        """Return the entries as a one-dimensional array, row after row."""
         return self.moved(np.ravel)
 
     def transpose(self, *axes: Any) -> Any:
@@ -141,11 +144,11 @@ class NumPyProtocols:
 
     @abstractmethod
     def moved(self, move: Callable[[Any], Any]) -> Any:
-        """Apply to each component a function that only moves entries."""
+        """Apply to each component a function that only moves entries, such as a transposition."""
 
     @abstractmethod
     def joined(self, join: Callable[[Sequence[Any]], Any], arrays: Sequence[Any]) -> Any:
-        """Apply to each component of several arrays a function that only moves entries."""
+        """Join arrays with a function that only moves entries, such as a concatenation."""
 
     # -- leaving the format --------------------------------------------------------------------------------
 
@@ -199,7 +202,7 @@ class NumPyProtocols:
         Raises
         ------
         TypeError : another dtype.
-        OverflowError : as ``to_float``.
+        OverflowError : as for ``to_float``.
         """
         check_exit(self, "astype()")
         dtype = np.dtype(dtype)
@@ -248,17 +251,26 @@ class NumPyProtocols:
         name, called = func.__name__, f"{func.__module__.replace('numpy', 'np', 1)}.{func.__name__}"
         if name in _JOINERS or name in _MOVERS:
             return self._rearrange(func, args, kwargs)
-        if name in _FUNCTIONS:
-            signature = inspect.signature(_FUNCTIONS[name])
+        of_linalg = func.__module__ == "numpy.linalg"
+        algebra = cast(Any, self).format.algebra if of_linalg else {}
+        function = algebra.get(name) or _FUNCTIONS.get(name)
+        if function is not None:
+            signature = _signature(function)
             try:
                 signature.bind(self, *args, **kwargs)
             except TypeError as error:
                 taken = ", ".join(list(signature.parameters)[1:])
                 raise TypeError(f"{called} of a {type(self).__name__}: {error}; needed {called}({taken})") from None
-            return _FUNCTIONS[name](self, *args, **kwargs)
-        known = sorted((*_JOINERS, *_MOVERS, *_FUNCTIONS))
+            return function(self, *args, **kwargs)
+        if name in _ASSIGNMENTS:
+            raise TypeError(
+                f"got {called} of a {type(self).__name__}, which cannot be changed; needed a copy with other entries: "
+                "x = x.at[i].set(value), or np.where(condition, value, x)"
+            )
+        known = sorted((*algebra, "norm") if of_linalg else (*_JOINERS, *_MOVERS, *_FUNCTIONS))
+        shown = ", ".join(f"np.linalg.{each}" for each in known) if of_linalg else ", ".join(known)
         raise TypeError(
-            f"got {called} of a {type(self).__name__}; needed one of {', '.join(known)}{_nearest(name, known)}; for "
+            f"got {called} of a {type(self).__name__}; needed one of {shown}{_nearest(name, known)}; for "
             "linear algebra see gpbnb.linalg; or convert: x.to_float()"
         )
 
@@ -281,11 +293,10 @@ class NumPyProtocols:
 
 
 _OTHER_NAMES = {
-    "std": "mean", "var": "mean", "average": "mean", "exp2": "exp", "log2": "log", "log10": "log",
-    "float_power": "power", "cumprod": "prod", "inner": "dot", "vdot": "dot", "tensordot": "einsum", "hypot": "sqrt",
-    "conjugate": "copy", "conj": "copy", "real": "copy", "fmax": "maximum", "fmin": "minimum",
+    "std": "mean", "var": "mean", "average": "mean", "cumprod": "prod", "inner": "dot", "vdot": "dot",
+    "tensordot": "einsum", "conjugate": "copy", "conj": "copy", "real": "copy",
     "array_equiv": "array_equal", "ediff1d": "diff", "lexsort": "argsort", "full": "full_like",
-    "flat": "ravel", "nbytes": "size", "dtype": "format",
+    "flat": "ravel", "nbytes": "size", "dtype": "format", "put": "at", "fill": "at", "itemset": "at",
 }  # fmt: skip
 
 
@@ -340,11 +351,18 @@ _UFUNCS: dict[str, Callable[..., Any]] = {
     "maximum": functions.maximum,
     "minimum": functions.minimum,
     "sign": functions.sign,
-    "isfinite": lambda a: _everywhere(a, True),
-    "isinf": lambda a: _everywhere(a, False),
-    "isnan": lambda a: _everywhere(a, False),
-    "power": lambda a, b: functions.power(a, _exponent(b)),
-    **{name: partial(functions.elementary, name) for name in functions.ELEMENTARY},
+    **{name: partial(functions.special, name) for name in ("isfinite", "isinf", "isnan", "signbit")},
+    "fmax": functions.fmax,
+    "fmin": functions.fmin,
+    "copysign": functions.copysign,
+    "remainder": functions.remainder,
+    "fmod": functions.fmod,
+    "floor_divide": functions.floor_divide,
+    "power": functions.power,
+    "radians": partial(functions.elementary, "deg2rad"),
+    "degrees": partial(functions.elementary, "rad2deg"),
+    **{name: partial(functions.elementary, name) for name in functions.ELEMENTARY + functions.ELEMENTARY_PAIRS},
+    **{name: partial(functions.elementary, name) for name in ("floor", "ceil", "trunc", "rint")},
 }
 
 _REDUCTIONS: dict[str, Callable[..., Any]] = {
@@ -355,9 +373,9 @@ _REDUCTIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _everywhere(x: Any, answer: bool) -> Any:
-    """Return one answer for each entry, as no number of a format is infinite or NaN."""
-    return np.full(x.shape, answer)[()]
+@cache
+def _signature(function: Callable[..., Any]) -> inspect.Signature:
+    return inspect.signature(function)
 
 
 def _dot(x: NumPyProtocols, a: Any, b: Any) -> Any:
@@ -391,14 +409,6 @@ def _append(x: NumPyProtocols, a: Any, values: Any, axis: int | None) -> Any:
     return np.concatenate(arrays, axis=axis or 0)
 
 
-def _exponent(value: Any) -> Any:
-    """Return a plain exponent, which NumPy passes as an array of a format."""
-    with lifted():
-        if not value.ndim and (exact := value.to_fractions()).denominator == 1:
-            return int(exact)
-    raise TypeError("got an exponent that is not a single whole number; needed one, as in np.power(x, 3)")
-
-
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "all": lambda x, a, axis=None, keepdims=False: a.all(axis, keepdims),
     "allclose": lambda x, a, b, rtol=1e-5, atol=1e-8: bool(np.all(functions.isclose(a, b, rtol, atol))),
@@ -407,8 +417,11 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "argmin": lambda x, a, axis=None, keepdims=False: a.argmin(axis, keepdims),
     "argsort": lambda x, a, axis=-1: a.argsort(axis),
     "array_equal": _array_equal,
+    "around": lambda x, a, decimals=0: functions.decimals(a, decimals),
+    "cross": functions.cross,
     "diff": lambda x, a, n=1, axis=-1: functions.diff(a, n, axis),
     "dot": _dot,
+    "fix": lambda x, a: functions.elementary("trunc", a),
     "full_like": lambda x, a, fill_value: functions.full_like(a, fill_value),
     "isclose": lambda x, a, b, rtol=1e-5, atol=1e-8: functions.isclose(a, b, rtol, atol),
     "ndim": lambda x, a: a.ndim,
@@ -426,8 +439,10 @@ _FUNCTIONS: dict[str, Callable[..., Any]] = {
     "norm": lambda x, a, ord=None, axis=None, keepdims=False: functions.norm(a, ord, axis, keepdims),
     "ones_like": lambda x, a: functions.full_like(a, 1),
     "prod": lambda x, a, axis=None, keepdims=False: a.prod(axis, keepdims),
+    "round": lambda x, a, decimals=0: functions.decimals(a, decimals),
     "save": lambda x, file, arr, **options: np.save(file, np.asarray(arr), **options),
     "sort": lambda x, a, axis=-1: functions.sort(a, axis),
+    "select": lambda x, condlist, choicelist, default=0: functions.select(x, condlist, choicelist, default),
     "shape": lambda x, a: a.shape,
     "size": lambda x, a: a.size,
     "sum": lambda x, a, axis=None, keepdims=False: a.sum(axis, keepdims),

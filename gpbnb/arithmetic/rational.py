@@ -13,6 +13,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.conversion import entries as all_entries
 from gpbnb.arithmetic.conversion import exact_fraction
 
 
@@ -38,6 +39,8 @@ def exact(values: Any) -> NDArray[Any]:
             try:
                 entry = exact_fraction(entry)
             except (TypeError, ValueError) as error:
+                if isinstance(entry, (list, tuple)) and entries.ndim < 32:  # deeper lists leave NumPy's dimensions
+                    all_entries(values)  # which names the shapes of lists of different lengths
                 index = np.unravel_index(i, entries.shape)
                 where = f"entry {', '.join(map(str, index))}: " if index else ""
                 raise type(error)(f"{where}{error}") from None

@@ -25,13 +25,22 @@ class Rounding(Enum):
     #: Up or down at random, with probabilities that make the expected value exact.
     STOCHASTIC = "stochastic"
 
+    @classmethod
+    def _missing_(cls, value: object) -> Rounding:
+        """Find the member that a name means, so that ``Rounding("floor")`` and ``Rounding("UP")`` are roundings."""
+        return rounding_named(value)
+
     @staticmethod
     def documented() -> tuple[Rounding, Rounding]:
         """The two roundings of the reports: to nearest with ties away from zero, and chopping."""
         return Rounding.NEAREST, Rounding.CHOP
 
 
-def rounding_named(rounding: Rounding | str) -> Rounding:
+ALIASES = {"floor": Rounding.DOWN, "ceil": Rounding.UP, "ceiling": Rounding.UP, "truncate": Rounding.CHOP}
+"""Other names of roundings."""
+
+
+def rounding_named(rounding: object) -> Rounding:
     """Return a rounding, or the rounding with this name; case is ignored.
 
     Raises
@@ -42,11 +51,15 @@ def rounding_named(rounding: Rounding | str) -> Rounding:
     --------
     >>> rounding_named("nearest")
     <Rounding.NEAREST: 'nearest'>
+    >>> rounding_named("floor"), Rounding("UP")
+    (<Rounding.DOWN: 'down'>, <Rounding.UP: 'up'>)
     """
     if isinstance(rounding, Rounding):
         return rounding
     if isinstance(rounding, str):
         wanted = rounding.strip().lower()
+        if wanted in ALIASES:
+            return ALIASES[wanted]
         for each in Rounding:
             if wanted == each.value:
                 return each
@@ -61,6 +74,10 @@ Order = Literal["left", "pairwise", "blocked"]
 DRAW_BITS = 24
 
 
+#: What happens to a result beyond the limits of a floating-point format.
+FLOAT_OVERFLOWS = ("raise", "saturate", "infinity")
+
+
 class Limits(NamedTuple):
     """Range of a format."""
 
@@ -71,7 +88,8 @@ class Limits(NamedTuple):
     #: The largest number and the most negative one.
     largest: Fraction
     lowest: Fraction
-    #: "raise", "saturate" or "wrap", which is what happens to results beyond these.
+    #: What happens to results beyond these, which is "raise", "saturate", "wrap", or in a float format "infinity", or
+    #: "NaN" where it has no infinity.
     overflow: str = "raise"
     #: Whether all numbers have the same spacing, as in fixed point.
     fixed: bool = False

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from typing import Generic, NamedTuple, TypeVar
 
+from gpbnb.arithmetic.conversion import MaybeNone
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION, Compiled
+from gpbnb.arithmetic.kernels.backends import Compiled
+from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.rounding import Rounding
+
+Kind = TypeVar("Kind", FloatFormat, FixedFormat)
+"""Floating point or fixed point."""
 
 CHECKED: dict[int, tuple[int, ...]] = {2: (24, 53), 10: (7, 16), 16: (6, 13)}
 """Precisions like those of binary32 and binary64, which are always tried if they are above the answer."""
@@ -32,13 +39,13 @@ def smallest_precision(
     least: int = 1,
     largest: int | None = None,
     monotone: bool = False,
-) -> FloatFormat | None:
+) -> FloatFormat | MaybeNone:
     """Find the smallest precision with which a computation meets a requirement.
 
     Rounding errors do not shrink monotonically with the precision, so a precision qualifies only if the next higher one
     also meets the requirement. The search is a bisection: it assumes that all precisions above a qualifying one meet
-    the requirement. Whether or not they do, the answer and the next higher precision were tried and meet it, and the
-    next lower one was tried and does not qualify.
+    the requirement. In any case, the answer and the next higher precision have been tried and meet it, and the next
+    lower one has been tried and does not qualify.
 
     Parameters
     ----------
@@ -85,67 +92,98 @@ def _smallest(suffices: Callable[[int], bool], least: int, largest: int | None, 
     return answer if suffices(answer) else None
 
 
-def largest_compiled(like: FloatFormat) -> int:
+def largest_compiled(like: Kind) -> int:
     """Return the largest precision of formats such as `like` that have compiled loops; at least 2."""
     largest = LARGEST_PRECISION[like.base]
-    while largest > 2 and not isinstance(replace(like, precision=largest).backend, Compiled):
+    while largest > 2 and not isinstance(_with_digits(like, largest).backend, Compiled):
         largest -= 1  # stochastic rounding has fewer digits
     return largest
 
 
-class Search:
+def _with_digits(like: Kind, digits: int) -> Kind:
+    """Return a format such as `like` with another precision, or in fixed point with other fraction bits."""
+    if isinstance(like, FixedFormat):
+        return replace(like, fraction_bits=digits)
+    return replace(like, precision=digits)
+
+
+def least_from_which_on(met: Mapping[int, bool]) -> int | None:
+    """Return the smallest precision that meets a requirement together with all higher ones that were run, or None.
+
+    This is the rule of :class:`Search` for precisions that were chosen before.
+
+    Examples
+    --------
+    >>> least_from_which_on({20: True, 22: False, 24: True, 53: True})
+    24
+    """
+    missed = max((digits for digits, meets in met.items() if not meets), default=0)
+    return min((digits for digits in met if digits > missed), default=None)
+
+
+class Outcome(NamedTuple):
+    """What a precision gives: error / tolerance, and why it is infinite."""
+
+    ratio: float
+    why: str = ""
+
+
+class Search(Generic[Kind]):
     """The smallest precision that meets a tolerance, and above which every precision tried meets it.
 
     Parameters
     ----------
     error : function that returns error / tolerance in a format, and why it is infinite.
-    like : a format of any precision, with the base, the rounding and the range of those to try.
+    like : a format of any precision, with the base, the rounding and the range of those to try. In fixed point, the
+        precision that is searched is the number of fraction bits, and `largest` must be given.
     checks : precisions that are tried if they lie above the answer.
     tick : called after each run.
     bounds : whether the errors are bounds, which may not exist. Precisions above the answer that have no bound are
         then listed as undecided and do not invalidate the answer.
     largest : highest precision to try; by default the largest with compiled loops, see :func:`largest_compiled`.
         Precisions without compiled loops are tried only if none below qualifies.
+    least : lowest precision to try.
 
     Raises
     ------
-    ValueError : `largest` is below 2.
+    ValueError : `largest` is below `least`.
     """
 
     def __init__(
         self,
-        error: Callable[[FloatFormat], tuple[float, str]],
-        like: FloatFormat,
+        error: Callable[[Kind], Outcome],
+        like: Kind,
         checks: Sequence[int],
         tick: Callable[[], object] = lambda: None,
         bounds: bool = False,
         largest: int | None = None,
+        least: int = 2,
     ) -> None:
         self._ratios, self._why = dict[int, float](), dict[int, str]()
-        self._like, self._given = like, largest is not None
+        self._like: Kind = like
+        self._given = largest is not None
         #: Precisions above the answer for which there is no bound.
         self.undecided: tuple[int, ...] = ()
         #: Precisions that met the tolerance although a higher one missed it; usually empty.
         self.irregular: tuple[int, ...] = ()
         #: The answer, or None.
-        self.fmt: FloatFormat | None = None
-        fast = largest_compiled(like)
+        self.fmt: Kind | None = None
+        fast = largest_compiled(like) if largest is None or isinstance(like, FloatFormat) else largest
         #: The highest precision that may be tried.
         self.largest = fast if largest is None else largest
-        if self.largest < 2:
-            raise ValueError(f"got largest={largest}; needed a precision of at least 2 digits")
+        if self.largest < least:
+            raise ValueError(f"got largest={largest}; needed a precision of at least {least} digits")
 
         def meets(digits: int) -> bool:
             if digits not in self._ratios:
-                self._ratios[digits], self._why[digits] = error(replace(like, precision=digits))
+                self._ratios[digits], self._why[digits] = error(_with_digits(like, digits))
                 tick()
             return self._ratios[digits] <= 1
 
-        least = 2
         for top in sorted({min(fast, self.largest), self.largest}):
             answer = self._answer(meets, least, top, checks, bounds)
             if answer is not None and (answer < top or top == self.largest):
-                self.fmt = replace(like, precision=answer)
+                self.fmt = _with_digits(like, answer)
                 return
             least = top
 
@@ -181,8 +219,13 @@ class Search:
         return tuple(sorted(self._ratios.items()))
 
     @property
+    def reasons(self) -> dict[int, str]:
+        """Return for each precision tried why its error is infinite, empty if it is not."""
+        return dict(self._why)
+
+    @property
     def why(self) -> str:
-        """Return why, below the answer, the largest precision without a finite error has none."""
+        """Return why the largest precision that has no finite error, below the answer, has none."""
         below = math.inf if self.fmt is None else self.fmt.precision
         reasons = [
             f"in {digits} digits {reason}" for digits, reason in sorted(self._why.items()) if reason and digits < below

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpbnb.arithmetic.kernels.exact import ExactKernel, integer_text, kernel
-from gpbnb.arithmetic.kernels.limited import LimitedKernel
-from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
 
 def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: str, prefix: str) -> str:
@@ -41,6 +40,8 @@ def in_columns(texts: Callable[[int], str], shape: tuple[int, ...], separator: s
 
 def decimal_text(m: int, e: int, form: ExactKernel) -> str:
     """Return decimal digits that round to ``m * base**e`` in the format of a kernel, exact in base 10."""
+    if type(m) is float:  # infinity, NaN or negative zero
+        return "-0" if m == 0 else str(m)
     if m == 0:
         return "0"
     if form.base == 10:
@@ -70,12 +71,12 @@ def _shortened(m: int, e: int, form: ExactKernel) -> tuple[str, int]:
     format that may round to a number other than the nearest, the function returns all digits.
     """
     value = form.to_fraction(m, e)
-    if isinstance(form, LimitedKernel) and form.rounding not in (*Rounding.documented(), Rounding.EVEN):
+    if form.rounding not in (*Rounding.documented(), Rounding.EVEN):
         places = max(value.denominator.bit_length() - 1, 0)
         if 10**places % value.denominator == 0:
             return integer_text(int(value * 10**places)), -places
     count = math.ceil(form.precision * math.log10(form.base)) + 2
-    decimal = kernel(10, count, True)
+    decimal = kernel(Rules(10, count, Rounding.NEAREST))
     digits, exponent = decimal.from_ratio(value.numerator, value.denominator)
     if not form.nearest and decimal.to_fraction(digits, exponent) < value:
         digits += 1

@@ -8,7 +8,7 @@ digits.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numba.extending import overload
@@ -19,10 +19,11 @@ from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import load, put, round_
 from gpbnb.arithmetic.kernels.tags import PAIRS, DoubleDouble
-from gpbnb.bounds.envelope import units
-from gpbnb.bounds.gains import Schedule, pack
+from gpbnb.bounds.envelope import FilterLimits, units
+from gpbnb.bounds.gains import Schedule
 from gpbnb.bounds.guarantee import Guarantee, closed_loops, unit_disturbances
 from gpbnb.filters.kernels.bounded import widened
+from gpbnb.filters.opening import as_packed
 from gpbnb.filters.program import MULTIPLY, SUBTRACT, effects, execute
 
 
@@ -106,117 +107,146 @@ def _share(size: float, limit: float) -> float:
     return size / limit if limit > 0.0 else 1e10
 
 
+class _Attacked(NamedTuple):
+    """The filter that is attacked: the operations of a step, and coefficients whose rows from `first` on repeat."""
+
+    operations: NDArray[np.int64]
+    outputs: NDArray[np.int64]
+    #: packed, (steps, c).
+    coefficients: NDArray[Any]
+    #: the exact filter, double-double.
+    Phi: NDArray[np.float64]
+    HPhi: NDArray[np.float64]
+    K: NDArray[np.float64]
+    first: int
+    #: limits of the exact filter.
+    limits: FilterLimits
+
+
+class Plan(NamedTuple):
+    """How measurements are chosen, step by step."""
+
+    #: (steps, n), weight of an error after each step.
+    rows: NDArray[np.float64]
+    #: (steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
+    pool: NDArray[np.float64]
+    #: (m, n + 1), with `by_range`: steer (x_predicted, share) is added to innovations, within their limit.
+    steer: NDArray[np.float64]
+    by_range: bool
+    #: number of steps in which the share rises from 0 to 1.
+    ramp: float
+    #: whether each candidate is judged by the error one step later, after a measurement from the middle of the range.
+    ahead: bool
+
+
+class _Measured(NamedTuple):
+    """A measurement: packed, and minus what the exact filter expects, in double-double."""
+
+    z: NDArray[Any]
+    nu: NDArray[np.float64]
+
+
+@inner
+def _row(given: Any, k: int) -> int:
+    """Return the row of the coefficients of step k + 1."""
+    count = given.Phi.shape[0]
+    return k if k < count else given.first + (k - given.first) % (count - given.first)
+
+
+@inner
+def _measure(fmt: Any, given: Any, plan: Any, values: Any, pull: Any, seen: Any, into: Any) -> float:
+    """Turn a candidate into a measurement; return the largest share of a limit."""
+    exactly, limits, excess = DoubleDouble(), given.limits, 0.0
+    for r in range(values.shape[0]):
+        value = values[r]
+        if plan.by_range:
+            most = limits.innovation[r]
+            value = seen[r, 0] + min(max(pull[r] + value, -most), most) * (1 - 1e-6)
+        c = number(fmt, value)
+        put(fmt, into.z, r, c)
+        c_exact = widened(fmt, c)
+        put(exactly, into.nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
+        excess = max(excess, _share(abs(into.nu[r, 0]), limits.innovation[r]))
+        excess = max(excess, _share(abs(c_exact[0]), limits.measurement[r]))
+    return excess
+
+
+@inner
+def _corrected(K: Any, nu: Any, predicted: Any, c: Any) -> None:
+    """Compute c = predicted + K nu in double-double; c is not the predicted estimate itself."""
+    exactly = DoubleDouble()
+    _times(K, nu, c)
+    for i in range(c.shape[0]):
+        put(exactly, c, i, doubledouble.add(exactly, load(exactly, predicted, i), load(exactly, c, i)))
+
+
+@inner
+def _error_ahead(fmt: Any, given: Any, plan: Any, k: int, x: Any, x_exact: Any, values: Any) -> float:
+    """Return the weighted error one step after step k + 1, with a measurement from the middle of the range."""
+    exactly, m, then = DoubleDouble(), given.HPhi.shape[1], _row(given, k + 1)
+    beyond, moved, nu = np.empty_like(x_exact), np.empty_like(x_exact), np.empty((m, 2))
+    z, later = np.empty((m, *x.shape[1:]), x.dtype), x.copy()
+    _times(given.Phi[then], x_exact, beyond)
+    _times(given.HPhi[then], x_exact, nu)
+    for r in range(m):
+        c = number(fmt, nu[r, 0] if plan.by_range else plan.pool[k + 1, 0, r])
+        put(fmt, z, r, c)
+        put(exactly, nu, r, doubledouble.subtract(exactly, widened(fmt, c), load(exactly, nu, r)))
+    _corrected(given.K[then], nu, beyond, moved)
+    execute(fmt, given.operations, given.outputs, given.coefficients[then], later, z, values)
+    return _worth(fmt, plan.rows[k + 1], later, moved)
+
+
 @compiled
-def greedy(
-    fmt: Any,
-    operations: Any,
-    outputs: Any,
-    coefficients: Any,
-    Phi: Any,
-    HPhi: Any,
-    K: Any,
-    first: int,
-    rows: Any,
-    pool: Any,
-    x: Any,
-    x_exact: Any,
-    limits: Any,
-    steer: Any,
-    by_range: bool,
-    ramp: float,
-    ahead: bool,
-    chosen: Any,
-    errors: Any,
-) -> Any:
+def greedy(fmt: Any, given: Any, plan: Any, x: Any, x_exact: Any, chosen: Any, errors: Any) -> Any:
     """Choose a measurement at each step from a pool; keeps the errors in `errors` (steps, n).
 
-    Most products of a step depend only on the estimate. So with `ahead`, each candidate is judged by the error one step
-    later, after a measurement from the middle of the admissible range.
+    Most products of a step depend only on the estimate. So each candidate may be judged by the error one step later.
 
     Parameters
     ----------
-    rows : (steps, n), weight of an error after each step.
-    pool : (steps, candidates, m), measurements; with `by_range`, innovations, to which steering is added.
+    given : _Attacked. plan : Plan.
     x, x_exact : the first estimate, packed and double-double.
-    limits : limits of the exact filter.
-    steer : (m, n + 1), with `by_range`: steer (x_predicted, share) is added to innovations, within their limit;
-        the share rises from 0 to 1 in `ramp` steps.
     chosen : (steps, m[, 2]), the chosen measurements, packed.
 
     Returns
     -------
     violations : steps at which no candidate kept the exact filter within its limits.
     """
-    exactly = DoubleDouble()
-    n, m, steps = Phi.shape[1], HPhi.shape[1], rows.shape[0]
-    count = Phi.shape[0]
-    trial, best, later = np.empty_like(x), np.empty_like(x), np.empty_like(x)
-    values = np.empty((n + m + operations.shape[0], *x.shape[1:]), x.dtype)
-    z, taken, tried = (
-        np.empty((m, *x.shape[1:]), x.dtype),
-        np.empty((m, *x.shape[1:]), x.dtype),
-        np.empty((m, *x.shape[1:]), x.dtype),
-    )
+    n, m, steps = given.Phi.shape[1], given.HPhi.shape[1], plan.rows.shape[0]
+    exactly, trial, best = DoubleDouble(), np.empty_like(x), np.empty_like(x)
+    values = np.empty((n + m + given.operations.shape[0], *x.shape[1:]), x.dtype)
+    tried, taken = _Measured(np.empty((m, *x.shape[1:]), x.dtype), np.empty((m, 2))), np.empty_like(chosen[0])
     predicted, following, best_exact = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
-    beyond, moved = np.empty((n, 2)), np.empty((n, 2))
-    seen, nu, pull = np.empty((m, 2)), np.empty((m, 2)), np.zeros(m)
-    violations = 0
+    seen, pull, violations = np.empty((m, 2)), np.zeros(m), 0
     for k in range(steps):
-        at = k if k < count else first + (k - first) % (count - first)
-        _times(Phi[at], x_exact, predicted)
-        _times(HPhi[at], x_exact, seen)
-        if by_range:
+        at = _row(given, k)
+        _times(given.Phi[at], x_exact, predicted)
+        _times(given.HPhi[at], x_exact, seen)
+        if plan.by_range:
             for r in range(m):
-                pull[r] = steer[r, n] * min(1.0, k / ramp)
+                pull[r] = plan.steer[r, n] * min(1.0, k / plan.ramp)
                 for j in range(n):
-                    pull[r] += steer[r, j] * predicted[j, 0]
+                    pull[r] += plan.steer[r, j] * predicted[j, 0]
         largest, found = -np.inf, -1
-        for q in range(pool.shape[1]):
-            excess = 0.0
-            for r in range(m):
-                value = pool[k, q, r]
-                if by_range:
-                    most = limits.innovation[r]
-                    value = seen[r, 0] + min(max(pull[r] + value, -most), most) * (1 - 1e-6)
-                c = number(fmt, value)
-                put(fmt, z, r, c)
-                c_exact = widened(fmt, c)
-                put(exactly, nu, r, doubledouble.subtract(exactly, c_exact, load(exactly, seen, r)))
-                excess = max(excess, _share(abs(nu[r, 0]), limits.innovation[r]))
-                excess = max(excess, _share(abs(c_exact[0]), limits.measurement[r]))
-            _times(K[at], nu, following)
+        for q in range(plan.pool.shape[1]):
+            excess = _measure(fmt, given, plan, plan.pool[k, q], pull, seen, tried)
+            _corrected(given.K[at], tried.nu, predicted, following)
             for i in range(n):
-                s = doubledouble.add(exactly, load(exactly, predicted, i), load(exactly, following, i))
-                put(exactly, following, i, s)
-                excess = max(excess, _share(abs(s[0]), limits.state[i]))
+                excess = max(excess, _share(abs(following[i, 0]), given.limits.state[i]))
             trial[:] = x
-            execute(fmt, operations, outputs, coefficients[at], trial, z, values)
+            execute(fmt, given.operations, given.outputs, given.coefficients[at], trial, tried.z, values)
             if excess > 1.0:
                 score = -1e300 * min(excess, 1e7)
-            elif k + 1 == steps or not ahead:
-                score = _worth(fmt, rows[k], trial, following)
+            elif k + 1 == steps or not plan.ahead:
+                score = _worth(fmt, plan.rows[k], trial, following)
             else:
-                tried[:] = z
-                then = k + 1 if k + 1 < count else first + (k + 1 - first) % (count - first)
-                _times(Phi[then], following, beyond)
-                _times(HPhi[then], following, nu)
-                for r in range(m):
-                    c = number(fmt, nu[r, 0] if by_range else pool[k + 1, 0, r])
-                    put(fmt, z, r, c)
-                    put(exactly, nu, r, doubledouble.subtract(exactly, widened(fmt, c), load(exactly, nu, r)))
-                _times(K[then], nu, moved)
-                for i in range(n):
-                    s = doubledouble.add(exactly, load(exactly, beyond, i), load(exactly, moved, i))
-                    put(exactly, beyond, i, s)
-                later[:] = trial
-                execute(fmt, operations, outputs, coefficients[then], later, z, values)
-                score = _worth(fmt, rows[k + 1], later, beyond)
-                z[:] = tried
+                score = _error_ahead(fmt, given, plan, k, trial, following, values)
             if score > largest or found < 0:
                 largest, found = score, q
                 best[:] = trial
                 best_exact[:] = following
-                taken[:] = z
+                taken[:] = tried.z
         if largest <= -1e299:
             violations += 1
         x[:] = best
@@ -229,7 +259,7 @@ def greedy(
 
 
 def responses(given: Schedule, F: NDArray[np.float64], state: int, steps: int) -> NDArray[np.float64]:
-    """Return the contribution of an error after each step to the error of one state after the last, (steps, n)."""
+    """Return how much an error after each step adds to the error of one state after the last step, (steps, n)."""
     rows = np.zeros((steps, given.program.n))
     c = np.eye(given.program.n)[state]
     for k in range(steps - 1, -1, -1):
@@ -288,7 +318,7 @@ def attack(
 
 
 def shares_of(errors: NDArray[np.float64], bound: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return errors over their bounds; no error is within every bound, and any other beyond a bound of zero."""
+    """Return the ratio of each error to its bound: 0 for no error, infinity for an error with a bound of zero."""
     beyond = np.where(errors == 0, 0.0, np.inf)
     return np.asarray(np.divide(errors, bound, out=beyond, where=(errors != 0) & (bound != 0)))
 
@@ -371,29 +401,12 @@ def run_against(
     given, program = found.schedule, found.schedule.program
     backend = cast(Compiled, given.fmt.backend)
     steps = len(rows)
-    x = pack(given.fmt, given.x0)
+    x = as_packed(given.fmt, given.x0)
     chosen, errors = np.zeros((steps, program.m, *x.shape[1:]), x.dtype), np.zeros((steps, program.n))
-    outside = greedy(
-        backend.tag,
-        program.operations,
-        program.outputs,
-        given.packed,
-        given.Phi,
-        given.HPhi,
-        given.exact,
-        given.first,
-        rows,
-        pool,
-        x,
-        double_doubles(given.x0),
-        found.limits,
-        steer,
-        by_range,
-        float(ramp),
-        ahead,
-        chosen,
-        errors,
-    )
+    numbers = given.packed, given.Phi, given.HPhi, given.exact, given.first
+    attacked = _Attacked(program.operations, program.outputs, *numbers, found.limits)
+    plan = Plan(rows, pool, steer, by_range, float(ramp), ahead)
+    outside = greedy(backend.tag, attacked, plan, x, double_doubles(given.x0), chosen, errors)
     z = chosen if x.dtype == np.float64 else chosen[..., 0] * 10.0 ** chosen[..., 1]
     return outside, z, errors
 

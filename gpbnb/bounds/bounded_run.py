@@ -1,4 +1,4 @@
-"""A filter run together with its contraction bound."""
+"""The errors of a filter run together with their contraction bound."""
 
 from __future__ import annotations
 
@@ -10,15 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.filters.bounded_steps import advance_bound
-from gpbnb.filters.contraction import contraction_start
 from gpbnb.filters.emulation import History, compare_runs
-from gpbnb.filters.factors import covariance_of_factors
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.step import NEXT_CHECKPOINT
+from gpbnb.filters.missing import stored_measurements
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.run import BLOCK, Run, log_spaced, reference, widened
+from gpbnb.filters.run import Run, log_spaced, reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,56 +42,6 @@ class BoundedHistory:
         return np.stack(each, axis=1)
 
 
-class BoundedRun(Run):
-    """A run together with its contraction bound, :mod:`gpbnb.filters.contraction`; see ``Run``.
-
-    For the reference itself, in double-double, the bound limits the distance from the exact filter.
-    """
-
-    def __init__(
-        self, model: LinearModel, fmt: FloatFormat | None, form: Form | str, checkpoint_steps: Sequence[int]
-    ) -> None:
-        super().__init__(model, fmt, form, checkpoint_steps)
-        self.stored = model if fmt is None else model.rounded(fmt)
-        given = self.stored.to_float()
-        self._plain = given["Phi"], given["H"], given["Q"], given["R"]
-        self._exact = Run(self.stored, None, Form.INNOVATION, ()).matrices
-        n, m, count = model.n, model.m, len(self.checkpoint_steps)
-        self.bounds = np.full((count, n), np.inf), np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
-        zero_n, size = np.zeros(n), np.zeros((n, n))
-        if self.form is Form.UD:  # the first factors may have errors
-            stored = covariance_of_factors(self.exactly(self.P))
-            size = np.abs((stored - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
-        self.bound = contraction_start(given["P0"], zero_n, size)
-
-    def take(self, z: Any) -> None:
-        """Go on by as many steps as there are measurements, (steps, m)."""
-        self.model.check_measurements(z, self.steps)
-        if self.stopped or not len(z):
-            return
-        packed = self.pack_measurements(z)
-        in_floats = packed.dtype == np.float64
-        values = widened(packed) if in_floats else double_doubles(self.exactly(packed))
-        for begin in range(0, len(packed), BLOCK):
-            self._take_block(packed[begin : begin + BLOCK], values[begin : begin + BLOCK])
-            if self.stopped:
-                return
-
-    def _take_block(self, z: NDArray[Any], exact_z: NDArray[Any]) -> None:
-        """Take some steps, keep all their results, and extend the bound over them."""
-        first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
-        x, K, P = self.take_block(z)
-        done = len(x) - 1
-        if not done:
-            return
-        x, P, K, UR = (widened(each) for each in (x, P, K[1:], self.UR))
-        steps = self.bound, self.checkpoint_steps, at, self.bounds
-        try:
-            self.bound = advance_bound(self.form, self._exact, self._plain, exact_z[:done], first, x, P, K, UR, *steps)
-        except (OverflowError, ZeroDivisionError):  # beyond double-double: no bound from here on
-            self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
-
-
 def emulate_with_bound(
     model: LinearModel,
     z: Any,
@@ -104,11 +50,11 @@ def emulate_with_bound(
     checkpoint_steps: Sequence[int] | None = None,
 ) -> BoundedHistory:
     """Run the filter rounded, in double-double, and with its contraction bound; for the arguments, see ``emulate``."""
-    measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
+    measured: Any = z if hasattr(z, "to_fractions") else stored_measurements(z, fmt)
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
-    run = BoundedRun(model, fmt, form, chosen)
+    run = Run(model, fmt, form, chosen, bounded=True)
     run.take(measured)
-    history = compare_runs(run, reference(run.stored, measured.to_fractions(), chosen))
+    history = compare_runs(run, reference(model.rounded(fmt), measured.to_fractions(), chosen))
     c = len(history.steps)
     state, gain, covariance = run.bounds
     return BoundedHistory(history, state[:c], gain[:c], covariance[:c])

@@ -1,7 +1,7 @@
-r"""Gains that never repeat, enclosed for all time.
+r"""Gains that never repeat, enclosed for ever.
 
-Rounding can change the last digits of a computed covariance forever. Then no finite emulation lists all gains, but they
-follow from a set that the computed covariance never leaves: all :math:`P`, symmetric or not, with
+Rounding can change the last digits of a computed covariance for ever. Then no finite emulation lists all gains, but
+they follow from a set that the computed covariance never leaves: all :math:`P`, symmetric or not, with
 :math:`|P - P^*| \le B` entry by entry, where the symmetric :math:`P^*` is near the limit of the exact covariance.
 
 Let :math:`\mathcal E` be the exact step of the covariance, A and S the closed loop and the innovation covariance of the
@@ -34,9 +34,11 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel, gain, predicted, updated
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 
@@ -49,63 +51,6 @@ _SUMS = 1 + 1e-10
 _BITS = 160
 _SLOWEST, _SMALL = 0.9999, 1e-5
 """Closed loops with a larger spectral radius are not tried. Powers are computed until they are about this small."""
-
-
-def predicted(Phi: NDArray[Any], Q: NDArray[Any], P: NDArray[Any]) -> NDArray[Any]:
-    """Compute the predicted covariance with numbers of any kind, in the order of the compiled filter.
-
-    Parameters
-    ----------
-    Phi, Q, P : object arrays of numbers with operators; a product with zero must be zero.
-    """
-    return np.asarray((_product(Phi, _product(Phi, P).T) + Q.T).T)
-
-
-def gain(H: NDArray[Any], R: NDArray[Any], V: NDArray[Any], one: Any) -> NDArray[Any]:
-    """Compute the gain from the predicted covariance in the same way; `one` is the number 1."""
-    HV = _product(H, V.T)
-    S = _product(H, HV.T) + R
-    return _product(_inverse(S, one).T, HV).T
-
-
-def updated(form: Form, H: NDArray[Any], R: NDArray[Any], V: NDArray[Any], K: NDArray[Any], one: Any) -> NDArray[Any]:
-    """Compute the updated covariance in the same way, in the innovation form or Joseph's."""
-    n, zero = len(V), one - one
-    identity = np.array([[one if i == j else zero for j in range(n)] for i in range(n)], dtype=object)
-    W = identity - _product(H.T, K.T).T
-    if form is Form.JOSEPH:
-        return np.asarray(_product(_product(W, V), W.T) + _product(_product(K, R), K.T))
-    if form is not Form.INNOVATION:
-        raise ValueError(f"got the {form} form; needed the innovation form or Joseph's")
-    return _product(W, V)
-
-
-def _product(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """Multiply matrices, with each entry summed from left to right."""
-    total = np.multiply.outer(a[:, 0], b[0])
-    for k in range(1, a.shape[1]):
-        total = total + np.multiply.outer(a[:, k], b[k])
-    return np.asarray(total)
-
-
-def _inverse(a: NDArray[Any], one: Any) -> NDArray[Any]:
-    """Invert a matrix by elimination without pivoting."""
-    m, a = len(a), a.copy()
-    zero = one - one
-    c = np.array([[one if i == j else zero for j in range(m)] for i in range(m)], dtype=object)
-    for k in range(m):
-        for i in range(k + 1, m):
-            factor = a[i, k] / a[k, k]
-            for j in range(k + 1, m):
-                a[i, j] = a[i, j] - factor * a[k, j]
-            for j in range(m):
-                c[i, j] = c[i, j] - factor * c[k, j]
-    for j in range(m):
-        for k in range(m - 1, -1, -1):
-            for i in range(k + 1, m):
-                c[k, j] = c[k, j] - a[k, i] * c[i, j]
-            c[k, j] = c[k, j] / a[k, k]
-    return c
 
 
 # -- numbers with a bound for their roundings -------------------------------------------------------------------------
@@ -235,7 +180,7 @@ class _Phase:
 def enclose(
     stored: LinearModel, run: Run, fmt: FloatFormat | FixedFormat, form: Form, trials: int = 60
 ) -> Enclosure | None:
-    """Find a step from which on the computed covariance stays in a set forever, and enclose its gains.
+    """Find a step from which the computed covariance stays in a set for ever, and enclose its gains.
 
     Parameters
     ----------
@@ -245,7 +190,7 @@ def enclose(
 
     Returns
     -------
-    enclosure : None for another form, for a format with a limited range, or if no such set was found.
+    enclosure : None if the form or the format is not covered (a limited range is not), or if no such set was found.
     """
     if not isinstance(fmt, FloatFormat) or fmt.limits is not None:
         # relative errors exceed the unit roundoff where numbers underflow
@@ -316,11 +261,11 @@ class _Disturbed(NamedTuple):
 def _disturbed(form: Form, phase: _Phase, given: list[NDArray[Any]], B: NDArray[np.float64], unit: float) -> _Disturbed:
     """Bound w and the gain of a step from any covariance within B of the center."""
     Phi, H, Q, R = given
-    one, n = Enclosed(arb(1), unit), len(B)
-    V, error_V = _restarted(predicted(Phi, Q, _enclosed(phase.center, unit, B)))
-    computed = gain(H, R, V, one)
+    algebra, n = Algebra(lambda size: _enclosed(np.eye(size), unit)), len(B)
+    V, error_V = _restarted(predicted(algebra, Phi, _enclosed(phase.center, unit, B), Q))
+    computed = gain(algebra, H, R, V).K
     K, error_K = _restarted(computed)
-    result = updated(form, H, R, V, K, one)
+    result = updated(algebra, form, StepModel(Phi, H, Q, R), V, K)
     rounded = np.array([[each.error for each in row] for row in result])
     h, v = _of(H), _of(V)
     s = h * v * h.transpose() + _of(R)

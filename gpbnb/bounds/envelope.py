@@ -1,7 +1,7 @@
 r"""Bound sums over all earlier steps by a certificate that a finite computation can check.
 
-Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` with :math:`L \le k`, which may depend
-on k, and :math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
+Let :math:`e_k = F_k e_{k-1} + w_k`. For any row vectors :math:`c_0, \dots, c_L` with :math:`1 \le L \le k`, which may
+depend on k, and :math:`r_l = c_l F_{k-l} - c_{l+1}`, telescoping gives *exactly*
 
 .. math:: c_0 e_k = \sum_{l<L} c_l w_{k-l} + \sum_{l<L} r_l e_{k-l-1} + c_L e_{k-L}.
 
@@ -11,8 +11,8 @@ If the error was within b at all earlier steps, then
 
 .. math:: |c_0 e_k| \le \sum_{l<L} |c_l w_{k-l}| + \Big(\sum_{l<L} |r_l| + |c_L|\Big) b,
 
-and if the right side is at most b for each state and each step of the period, then the error stays within b forever, by
-induction.
+and if the right side is at most b for each state and each step of the period, then the error stays within b for ever,
+by induction.
 
 Disturbances are given as columns: :math:`w_k = \sum_g G_{k,g}\rho_g + s`, :math:`|\rho_g| \le h_{k,g}`, :math:`|s| \le
 \text{slack}_k`, and :math:`|c w| \le \sum_g |c\,G_g| h_g + |c|\,\text{slack}`, which is smaller than :math:`|c||w|`
@@ -54,8 +54,8 @@ ROUNDING, LOOP, GAIN, START = range(4)
 class Units(NamedTuple):
     r"""The largest rounding error of a result of at most a given size, :math:`\tfrac12 b^{e-t}` or :math:`b^{e-t}`.
 
-    The size is below :math:`b^e`. The table spans 2**±900, or the range of the format: the error does not fall below
-    that of the least numbers, and none is given beyond the largest.
+    The size is below :math:`b^e`. The table covers sizes from 2**-900 to 2**900, or the range of the format. Below the
+    least number, the error stays that of the least number; beyond the largest, the table has no error.
     """
 
     #: powers of the base, rounded down.
@@ -119,7 +119,7 @@ def _is_power(units: Any, high: float, low: float) -> bool:
     return bool(units.exact[at, 0] == sign * high and units.exact[at, 1] == sign * low)
 
 
-class Limits(NamedTuple):
+class FilterLimits(NamedTuple):
     """Limits on the filter without rounding, in float64; none is negative, some may be infinite.
 
     The state and the innovation, or the measurement, must be finite.
@@ -157,23 +157,36 @@ def columns(found: Disturbances) -> NDArray[np.float64]:
     return np.abs(found.G) * np.where(found.G == 0, 0.0, found.limits[:, np.newaxis, :])
 
 
+class Steps(NamedTuple):
+    """Coefficients of some steps, and the exact filter of these steps."""
+
+    #: (steps, c, 2), double-double.
+    coefficients: NDArray[np.float64]
+    #: (steps, c), largest distance of the true coefficients from these.
+    offsets: NDArray[np.float64]
+    #: (steps, n, n, 2) and (steps, m, n, 2), double-double.
+    Phi: NDArray[np.float64]
+    HPhi: NDArray[np.float64]
+    #: (steps, n, m, 2) and (steps, n, m), the exact filter's gain, double-double, and a bound of its error.
+    exact: NDArray[np.float64]
+    dK: NDArray[np.float64]
+
+
+class _Values(NamedTuple):
+    """What is known of each value of a step: the states, the measurements, then the results of the operations."""
+
+    #: (values, n + m, 2) and (values, n + m), the linear function and the function with all signs made positive.
+    rows: NDArray[np.float64]
+    sizes: NDArray[np.float64]
+    #: (values,), largest rounding error so far, whether it is always zero, largest drift and largest size.
+    off: NDArray[np.float64]
+    none: NDArray[np.bool_]
+    drift: NDArray[np.float64]
+    largest: NDArray[np.float64]
+
+
 @compiled
-def disturbances(
-    operations: Any,
-    outputs: Any,
-    groups: Any,
-    roots: Any,
-    coefficients: Any,
-    offsets: Any,
-    units: Any,
-    Phi: Any,
-    HPhi: Any,
-    exact: Any,
-    dK: Any,
-    limits: Any,
-    b: Any,
-    caps: Any,
-) -> Any:
+def disturbances(program: Any, given: Any, units: Any, limits: Any, b: Any, caps: Any) -> Any:
     r"""Compute disturbances of each step, :math:`e_k = \hat F e_{k-1} + q_k + \Delta F x_{k-1} + (\hat K - K)\nu_k`.
 
     If the coefficients of a step are known only within limits, each value differs by at most its drift from the value
@@ -182,131 +195,160 @@ def disturbances(
 
     Parameters
     ----------
-    operations, outputs, groups, roots : fields of a :class:`gpbnb.filters.program.Program`.
-    coefficients : (steps, c, 2), double-double.
-    offsets : (steps, c), largest distance of the true coefficients of a step from these.
-    units : units of the format.
-    Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), double-double.
-    exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain, double-double, and a bound of its error.
+    program : :class:`gpbnb.filters.program.Operations`.
+    given : Steps. units : units of the format.
     limits : limits on the filter without rounding.
     b : (n,), bound of the error before and after each step.
     caps : (o,), bound of each operation's linear function of the exact filter; infinite if not known.
     """
-    steps, n, m = coefficients.shape[0], Phi.shape[1], HPhi.shape[1]
-    first, o_count, g_count = n + m, operations.shape[0], roots.shape[0]
+    steps, n, m = given.coefficients.shape[0], given.Phi.shape[1], given.HPhi.shape[1]
+    first, o_count, g_count = n + m, program.operations.shape[0], program.roots.shape[0]
     F, spread = np.zeros((steps, n, n)), np.zeros((steps, n, n))
     G, lim = np.zeros((steps, n, g_count + n + m)), np.zeros((steps, g_count + n + m))
     slack, K = np.zeros((steps, n)), np.zeros((steps, n, m))
     loop, gain = np.zeros((steps, n, n)), np.zeros((steps, n, m))
-    rows, sizes = np.empty((first + o_count, first, 2)), np.empty((first + o_count, first))
-    effect, effect_sizes = np.empty((first + o_count, n)), np.empty((first + o_count, n))
-    off, none = np.empty(first + o_count), np.empty(first + o_count, np.bool_)
-    drift, largest = np.empty(first + o_count), np.empty(first + o_count)
-    X, V, Z = limits.state, limits.innovation, limits.measurement
-    result_of = np.full(first + o_count, -1)
-    for i in range(n):
-        result_of[outputs[i]] = i
-    plain = np.empty(coefficients.shape[1])
+    count = first + o_count
+    rows, sizes = np.empty((count, first, 2)), np.empty((count, first))
+    values = _Values(rows, sizes, np.empty(count), np.empty(count, np.bool_), np.empty(count), np.empty(count))
+    effect, effect_sizes = np.empty((count, n)), np.empty((count, n))
+    plain = np.empty(given.coefficients.shape[1])
     for k in range(steps):
-        functionals(operations, coefficients[k], first, rows, sizes)
+        functionals(program.operations, given.coefficients[k], first, rows, sizes)
         for a in range(len(plain)):
-            plain[a] = coefficients[k, a, 0]
-        effects(operations, outputs, plain, first, effect, effect_sizes)
-        off[:first] = 0.0
-        none[:first] = False
-        drift[:first] = 0.0
-        for j in range(n):
-            largest[j] = (X[j] + b[j]) * _UP
-        for i in range(m):
-            largest[n + i] = V[i]
-            for j in range(n):
-                if HPhi[k, i, j, 0] != 0.0:
-                    largest[n + i] += abs(HPhi[k, i, j, 0]) * X[j]
-            largest[n + i] = min(Z[i], largest[n + i] * _UP)
-        for o in range(o_count):
-            v = first + o
-            code, a, c = operations[o, 0], operations[o, 1], operations[o, 2]
-            # The largest possible size of the result, by state and measurement, or by state and innovation.
-            seen, known, carried = 0.0, 0.0, 0.0
-            for j in range(n):
-                r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
-                by_innovation = r
-                for i in range(m):
-                    by_innovation += rows[v, n + i, 0] * HPhi[k, i, j, 0]
-                    tiny += (m + 8) * _U * abs(rows[v, n + i, 0] * HPhi[k, i, j, 0])
-                if r != 0.0:
-                    seen += (abs(r) + 2.0**-90 * sizes[v, j]) * X[j]
-                if by_innovation != 0.0 or tiny != 0.0:
-                    known += (abs(by_innovation) + tiny) * X[j]
-                carried += (abs(r) + 2.0**-90 * sizes[v, j]) * b[j]
-            for i in range(m):
-                size = abs(rows[v, n + i, 0]) + 2.0**-90 * sizes[v, n + i]
-                if size != 0.0:
-                    seen += size * Z[i]
-                    known += size * V[i]
-            size = min(min(seen, known), caps[o]) + carried
-            if code == MULTIPLY:
-                factor = abs(plain[a])
-                before = factor * off[c]
-                drift[v] = factor * drift[c]
-                if offsets[k, a] != 0.0:
-                    drift[v] += offsets[k, a] * largest[c]
-                none[v] = none[c] or (factor == 0.0 and offsets[k, a] == 0.0)
-                is_exact = none[v] or (
-                    offsets[k, a] == 0.0 and _is_power(units, coefficients[k, a, 0], coefficients[k, a, 1])
-                )
-            else:
-                before = off[a] + off[c]
-                drift[v] = drift[a] + drift[c]
-                none[v] = none[a] and none[c]
-                is_exact = none[a] or none[c] or units.sums_exact
-            drift[v] *= _UP
-            size = (size + before + drift[v]) * _UP
-            if result_of[v] >= 0:
-                size = min(size, (X[result_of[v]] + b[result_of[v]]) * _UP)
-            h = largest_error(units, size)
-            if is_exact and h < np.inf:
-                h = 0.0
-            off[v] = (before + h) * _UP
-            largest[v] = (size + h) * _UP
-            lim[k, groups[o]] += h
+            plain[a] = given.coefficients[k, a, 0]
+        effects(program.operations, program.outputs, plain, first, effect, effect_sizes)
+        _operands(given.HPhi[k], limits, b, values)
+        _results(program, given, k, units, limits, b, caps, values, lim[k])
         for g in range(g_count):
-            v = first + roots[g]
+            v = first + program.roots[g]
             h = lim[k, g] * _UP
             lim[k, g] = h
             for i in range(n):
                 G[k, i, g] = effect[v, i]
                 slack[k, i] += (6 * o_count + 2 * n + 16) * _U * effect_sizes[v, i] * h
-        for i in range(n):
-            v = outputs[i]
-            slack[k, i] += drift[v]
-            for j in range(n):
-                F[k, i, j] = rows[v, j, 0]
-                spread[k, i, j] = (n + 4) * _U * abs(F[k, i, j]) + 2.0**-89 * sizes[v, j]
-                s = rows[v, j, 0], rows[v, j, 1]
-                size = sizes[v, j] + abs(Phi[k, i, j, 0])
-                s = _minus(s, (Phi[k, i, j, 0], Phi[k, i, j, 1]))
-                for r in range(m):
-                    s = _plus_product(s, rows[v, n + r], HPhi[k, r, j])
-                    size += 2 * sizes[v, n + r] * abs(HPhi[k, r, j, 0])
-                loop[k, i, j] = s[0]
-                G[k, i, g_count + j] = s[0]
-                if size != 0.0 and X[j] < np.inf:
-                    slack[k, i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size) * X[j]
-            for r in range(m):
-                K[k, i, r] = rows[v, n + r, 0]
-                s = _minus((rows[v, n + r, 0], rows[v, n + r, 1]), (exact[k, i, r, 0], exact[k, i, r, 1]))
-                gain[k, i, r] = s[0]
-                G[k, i, g_count + n + r] = s[0]
-                size = sizes[v, n + r] + abs(exact[k, i, r, 0])
-                if size != 0.0 and V[r] < np.inf:
-                    slack[k, i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size + dK[k, i, r]) * V[r]
+        into = Disturbances(F[k], spread[k], G[k], lim[k], slack[k], K[k], loop[k], gain[k])
+        _differences(program.outputs, given, k, limits, values, into)
         for j in range(n):
-            lim[k, g_count + j] = X[j]
+            lim[k, g_count + j] = limits.state[j]
         for r in range(m):
-            lim[k, g_count + n + r] = V[r]
+            lim[k, g_count + n + r] = limits.innovation[r]
         slack[k] *= _UP
     return Disturbances(F, spread, G, lim, slack, K, loop, gain)
+
+
+@compiled
+def _operands(HPhi: Any, limits: Any, b: Any, values: Any) -> None:
+    """Note the largest states and measurements of a step, which have no rounding errors of their own."""
+    m, n = HPhi.shape[0], HPhi.shape[1]
+    values.off[: n + m] = 0.0
+    values.none[: n + m] = False
+    values.drift[: n + m] = 0.0
+    largest = values.largest
+    for j in range(n):
+        largest[j] = (limits.state[j] + b[j]) * _UP
+    for i in range(m):
+        largest[n + i] = limits.innovation[i]
+        for j in range(n):
+            if HPhi[i, j, 0] != 0.0:
+                largest[n + i] += abs(HPhi[i, j, 0]) * limits.state[j]
+        largest[n + i] = min(limits.measurement[i], largest[n + i] * _UP)
+
+
+@compiled
+def _size(v: int, HPhi: Any, limits: Any, b: Any, cap: float, values: Any) -> float:
+    """Return the largest size of a value's function, by state and measurement, or by state and innovation."""
+    m, n = HPhi.shape[0], HPhi.shape[1]
+    rows, sizes = values.rows, values.sizes
+    seen, known, carried = 0.0, 0.0, 0.0
+    for j in range(n):
+        r, tiny = rows[v, j, 0], (m + 8) * _U * sizes[v, j]
+        by_innovation = r
+        for i in range(m):
+            by_innovation += rows[v, n + i, 0] * HPhi[i, j, 0]
+            tiny += (m + 8) * _U * abs(rows[v, n + i, 0] * HPhi[i, j, 0])
+        if r != 0.0:
+            seen += (abs(r) + 2.0**-90 * sizes[v, j]) * limits.state[j]
+        if by_innovation != 0.0 or tiny != 0.0:
+            known += (abs(by_innovation) + tiny) * limits.state[j]
+        carried += (abs(r) + 2.0**-90 * sizes[v, j]) * b[j]
+    for i in range(m):
+        size = abs(rows[v, n + i, 0]) + 2.0**-90 * sizes[v, n + i]
+        if size != 0.0:
+            seen += size * limits.measurement[i]
+            known += size * limits.innovation[i]
+    return min(min(seen, known), cap) + carried
+
+
+@compiled
+def _results(
+    program: Any, given: Any, k: int, units: Any, limits: Any, b: Any, caps: Any, values: Any, lim: Any
+) -> None:
+    """Note sizes, drifts and rounding errors of a step's operations, and add the errors of each group to its limit."""
+    n, m = given.Phi.shape[1], given.HPhi.shape[1]
+    off, none, drift, largest = values.off, values.none, values.drift, values.largest
+    coefficients, offsets = given.coefficients[k], given.offsets[k]
+    result_of = np.full(len(off), -1)
+    for i in range(n):
+        result_of[program.outputs[i]] = i
+    for o in range(program.operations.shape[0]):
+        v = n + m + o
+        code, a, c = program.operations[o, 0], program.operations[o, 1], program.operations[o, 2]
+        size = _size(v, given.HPhi[k], limits, b, caps[o], values)
+        if code == MULTIPLY:
+            factor = abs(coefficients[a, 0])
+            before = factor * off[c]
+            drift[v] = factor * drift[c]
+            if offsets[a] != 0.0:
+                drift[v] += offsets[a] * largest[c]
+            none[v] = none[c] or (factor == 0.0 and offsets[a] == 0.0)
+            is_exact = none[v] or (offsets[a] == 0.0 and _is_power(units, coefficients[a, 0], coefficients[a, 1]))
+        else:
+            before = off[a] + off[c]
+            drift[v] = drift[a] + drift[c]
+            none[v] = none[a] and none[c]
+            is_exact = none[a] or none[c] or units.sums_exact
+        drift[v] *= _UP
+        size = (size + before + drift[v]) * _UP
+        if result_of[v] >= 0:
+            size = min(size, (limits.state[result_of[v]] + b[result_of[v]]) * _UP)
+        h = largest_error(units, size)
+        if is_exact and h < np.inf:
+            h = 0.0
+        off[v] = (before + h) * _UP
+        largest[v] = (size + h) * _UP
+        lim[program.groups[o]] += h
+
+
+@compiled
+def _differences(outputs: Any, given: Any, k: int, limits: Any, values: Any, into: Any) -> None:
+    """Note closed loop and gain of step k + 1, and their differences from those of the exact filter."""
+    n, m = into.K.shape
+    g_count = into.G.shape[1] - n - m
+    rows, sizes, X, V = values.rows, values.sizes, limits.state, limits.innovation
+    for i in range(n):
+        v = outputs[i]
+        into.slack[i] += values.drift[v]
+        for j in range(n):
+            into.F[i, j] = rows[v, j, 0]
+            into.spread[i, j] = (n + 4) * _U * abs(into.F[i, j]) + 2.0**-89 * sizes[v, j]
+            s = rows[v, j, 0], rows[v, j, 1]
+            size = sizes[v, j] + abs(given.Phi[k, i, j, 0])
+            s = _minus(s, (given.Phi[k, i, j, 0], given.Phi[k, i, j, 1]))
+            for r in range(m):
+                s = _plus_product(s, rows[v, n + r], given.HPhi[k, r, j])
+                size += 2 * sizes[v, n + r] * abs(given.HPhi[k, r, j, 0])
+            into.loop[i, j] = s[0]
+            into.G[i, g_count + j] = s[0]
+            if size != 0.0 and X[j] < np.inf:
+                into.slack[i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size) * X[j]
+        for r in range(m):
+            into.K[i, r] = rows[v, n + r, 0]
+            s = _minus((rows[v, n + r, 0], rows[v, n + r, 1]), (given.exact[k, i, r, 0], given.exact[k, i, r, 1]))
+            into.gain[i, r] = s[0]
+            into.G[i, g_count + n + r] = s[0]
+            size = sizes[v, n + r] + abs(given.exact[k, i, r, 0])
+            if size != 0.0 and V[r] < np.inf:
+                into.slack[i] += ((n + 4) * _U * abs(s[0]) + 2.0**-86 * size + given.dK[k, i, r]) * V[r]
 
 
 @compiled
@@ -346,6 +388,39 @@ def _two_product(a: float, b: float, p: float) -> Any:
     return p, ((a1 * b1 - p) + a1 * b2 + a2 * b1) + a2 * b2
 
 
+class Columns(NamedTuple):
+    """Closed loops and columns of some steps; the first five fields are those of :class:`Disturbances`."""
+
+    F: NDArray[np.float64]
+    spread: NDArray[np.float64]
+    G: NDArray[np.float64]
+    limits: NDArray[np.float64]
+    slack: NDArray[np.float64]
+    #: (g,), the part of the bound to which each column belongs.
+    part: NDArray[np.int64]
+
+
+class End(NamedTuple):
+    """When the rows of a certificate end."""
+
+    #: after this number of steps at the latest.
+    most: int
+    #: (n,), and once ``abs(c) @ scale`` of a row c is below `small`.
+    scale: NDArray[np.float64]
+    small: float
+
+
+class Sizes(NamedTuple):
+    """Sizes of the exact filter."""
+
+    #: (n,), largest size of each state so far.
+    state: NDArray[np.float64]
+    #: (m,), limit of each measurement.
+    measurement: NDArray[np.float64]
+    #: (n,), size of the first estimate.
+    first: NDArray[np.float64]
+
+
 class Certificate(NamedTuple):
     """Results of :func:`certify` for each start."""
 
@@ -362,41 +437,41 @@ class Certificate(NamedTuple):
 
 
 @compiled
-def certify(
-    F: Any,
-    spread: Any,
-    G: Any,
-    limits: Any,
-    slack: Any,
-    part: Any,
-    starts: Any,
-    k: int,
-    first: int,
-    steady: bool,
-    most: int,
-    scale: Any,
-    small: float,
-) -> Any:
+def meet(given: Any, at: int, c: Any, each: Any) -> None:
+    """Set `each`, (4,), to the effect of the disturbances of a step on the product c e, part by part."""
+    n, g_count = given.F.shape[1], given.G.shape[2]
+    each[:] = 0.0
+    for j in range(n):
+        each[ROUNDING] += abs(c[j]) * given.slack[at, j]
+    for g in range(g_count):
+        if given.limits[at, g] != 0.0:
+            s = 0.0
+            for j in range(n):
+                s += c[j] * given.G[at, j, g]
+            if s != 0.0:
+                each[given.part[g]] += abs(s) * given.limits[at, g]
+
+
+@compiled
+def certify(given: Any, starts: Any, k: int, first: int, steady: bool, end: Any) -> Any:
     """Sum the effects of all earlier disturbances on some linear functions of the error after step k.
 
     Parameters
     ----------
-    F, spread, G, limits, slack : fields of :class:`Disturbances`; the rows from `first` on repeat forever.
-    part : (g,), the part of the bound to which each column belongs.
+    given : Columns; the rows from `first` on repeat for ever.
     starts : (t, n), the functions.
     k : the step; with `steady`, it counts from `first`, and the past is infinite.
-    most : largest number of steps to go back.
-    scale, small : (n,), stop when every ``abs(c) @ scale`` is below small.
+    end : End, when to stop.
     """
-    n, t, g_count = F.shape[1], starts.shape[0], G.shape[2]
-    rows = F.shape[0]
+    n, t, g_count = given.F.shape[1], starts.shape[0], given.G.shape[2]
+    rows = given.F.shape[0]
     period = rows - first
     sums, residual, tail, lags = np.zeros((t, 4)), np.zeros((t, n)), np.zeros((t, n)), 0
     begun = np.zeros((t, n))
     following, rate, each = np.empty(n), np.empty(n), np.empty(4)
     for i in range(t):
         c = starts[i].copy()
-        for lag in range(most):
+        for lag in range(end.most):
             if not steady and k - lag <= 0:
                 break
             at = k - lag - 1
@@ -405,19 +480,11 @@ def certify(
             elif at >= rows:
                 at = first + (at - first) % period
             size = 0.0
-            each[:] = 0.0  # a sum of its own, so that no term takes part in more than n + g + lags additions
             for j in range(n):
-                size += abs(c[j]) * scale[j]
-                each[ROUNDING] += abs(c[j]) * slack[at, j]
-            if size < small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
+                size += abs(c[j]) * end.scale[j]
+            if size < end.small and lag >= n:  # a state that only repeats an earlier one has no disturbance of its own
                 break
-            for g in range(g_count):
-                if limits[at, g] != 0.0:
-                    s = 0.0
-                    for j in range(n):
-                        s += c[j] * G[at, j, g]
-                    if s != 0.0:
-                        each[part[g]] += abs(s) * limits[at, g]
+            meet(given, at, c, each)  # a sum of its own, so that no term takes part in more than n + g + lags additions
             for p in range(4):
                 sums[i, p] += each[p]
             following[:] = 0.0
@@ -425,8 +492,8 @@ def certify(
             for j in range(n):
                 if c[j] != 0.0:
                     for r in range(n):
-                        following[r] += c[j] * F[at, j, r]
-                        rate[r] += abs(c[j]) * spread[at, j, r]
+                        following[r] += c[j] * given.F[at, j, r]
+                        rate[r] += abs(c[j]) * given.spread[at, j, r]
             for r in range(n):
                 c[r] = following[r]
                 residual[i, r] += rate[r]
@@ -443,34 +510,18 @@ def certify(
 
 
 @compiled
-def peaks(
-    F: Any,
-    spread: Any,
-    G: Any,
-    limits: Any,
-    slack: Any,
-    part: Any,
-    HPhi: Any,
-    X: Any,
-    V: Any,
-    Z: Any,
-    x0: Any,
-    first: int,
-    early: int,
-    steady: bool,
-    most: int,
-    scale: Any,
-    small: float,
-) -> Any:
+def peaks(given: Any, HPhi: Any, known: Any, first: int, early: int, steady: bool, end: Any) -> Any:
     """Return worst-case peaks of state and innovation of the exact filter, driven by the columns.
 
     Parameters
     ----------
-    HPhi : (steps, m, n), float64. X, V : peaks so far, for the small terms and the tail. Z : (m,), limits of
-        the measurements. x0 : (n,), size of the first estimate.
+    given : Columns. HPhi : (steps, m, n), float64.
+    known : Sizes; those of the states are for the small terms and the tail.
     early : number of first steps to examine. steady : whether to examine each step of the period as well.
+    end : End, as for :func:`certify`.
     """
-    n, m, rows = F.shape[1], HPhi.shape[1], F.shape[0]
+    n, m, rows = given.F.shape[1], HPhi.shape[1], given.F.shape[0]
+    X, Z, x0 = known
     peak_x, peak_v = x0.copy(), np.zeros(m)
     for r in range(m):
         s = Z[r]
@@ -487,7 +538,7 @@ def peaks(
         if following >= rows:
             following = first + (following - first) % (rows - first) if steady else rows - 1
         starts[n:] = HPhi[following]
-        found = certify(F, spread, G, limits, slack, part, starts, at, first, settled, most, scale, small)
+        found = certify(given, starts, at, first, settled, end)
         for i in range(n + m):
             total = found.sums[i].sum()
             for j in range(n):

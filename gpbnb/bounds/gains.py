@@ -1,4 +1,4 @@
-"""Find a filter's coefficients for all time: emulate the covariance until it repeats, and enclose the exact gain.
+"""Find a filter's coefficients for all steps: emulate the covariance until it repeats, and enclose the exact gain.
 
 As long as the rounding is deterministic, a computed covariance and the phase of the model's cycle determine the next
 covariance. The measurements have no influence on it. Once the computed covariance equals, digit for digit, the one a
@@ -24,21 +24,21 @@ from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.matrices import difference, is_zero, product_by_sparse
 from gpbnb.arithmetic.kernels.scalar import load, multiply, store, subtract
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import BoundedRun
 from gpbnb.bounds.enclosure import enclose
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
-from gpbnb.filters.opening import packed_array
+from gpbnb.filters.opening import widened_array
 from gpbnb.filters.program import Program, innovation_program, loop_program, sequential_program
 from gpbnb.filters.run import Run
+from gpbnb.filters.system import LinearFilter
 
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
     """Coefficients of each step of a linear filter, and the corresponding exact filter.
 
-    Row k of each array is for step k + 1. If `settled`, the rows from `first` on repeat forever.
+    Row k of each array is for step k + 1. If `settled`, the rows from `first` on repeat for ever.
 
     Parameters
     ----------
@@ -49,11 +49,12 @@ class Schedule:
     Phi, HPhi : (steps, n, n, 2) and (steps, m, n, 2), the model as stored, double-double.
     exact, dK : (steps, n, m, 2) and (steps, n, m), the exact filter's gain and a bound of its error.
     x0 : (n,), the first estimate as stored.
-    first : row at which the period begins. settled : whether the rows from there on repeat forever.
+    first : row at which the period begins. settled : whether the rows from there on repeat for ever.
     repeat, period : first step whose computed covariance occurs again, `period` steps later.
     why : why the gain has not settled, if it has not.
-    enclosed : the step from which on a gain that never repeats stays within limits.
+    enclosed : the first step from which a gain that never repeats stays within known limits.
     limits : (steps, c), largest distance of the true coefficients from these; None if they are known exactly.
+    origin, form : the filter as given, and the form of a Kalman filter.
     """
 
     program: Program
@@ -72,6 +73,8 @@ class Schedule:
     why: str = ""
     enclosed: int | None = None
     limits: NDArray[np.float64] | None = None
+    origin: LinearModel | LinearFilter | None = None
+    form: Form | None = None
 
     @property
     def steps(self) -> int:
@@ -189,8 +192,9 @@ def schedule(
         count = model.n * model.m  # the gain has the last coefficients
         wide[enclosed:, -count:] = enclosure.gain[(late - enclosed) % stored.cycle].reshape(len(late), count)
     return Schedule(
-        program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why, enclosed, wide
-    )
+        program, fmt, coefficients, packed, Phi, HPhi, K, dK, x0, first, settled, repeat, period, why, enclosed, wide,
+        model, form,
+    )  # fmt: skip
 
 
 def _rows(steps: int, repeat: int | None, period: int | None) -> NDArray[np.int64]:
@@ -230,7 +234,7 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
     rows : indices of the run's checkpoints; the first checkpoint is for step `before` + 1.
     """
     n, m, last = run.model.n, run.model.m, int(rows.max()) + 1
-    Phi, H, identity = run.matrices[0], run.matrices[2], run.matrices[7]
+    Phi, H, identity = run.matrices.Phi, run.matrices.H, run.matrices.identity
     K = np.ascontiguousarray(run.G[:last])
     tail = K.shape[3:]
 
@@ -258,45 +262,23 @@ def packed_coefficients(run: Run, rows: NDArray[np.int64], before: int = 0) -> t
     return innovation_program(n, m), np.concatenate([*parts, flat(K)], axis=1)
 
 
-def pack(fmt: FloatFormat | FixedFormat, values: Any) -> NDArray[Any]:
-    """Convert numbers to the form that the compiled loops of a format expect."""
-    return packed_array(fmt.array(values))
-
-
-def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
-    """Convert packed numbers of any format to double-double, exactly in base 2 and 16, to the nearest in base 10."""
-    if packed.dtype == np.float64:
-        return np.stack([packed, np.zeros_like(packed)], axis=-1)
-    significands, exponents = packed[..., 0], packed[..., 1]
-    out = np.empty((*significands.shape, 2))
-    known: dict[tuple[int, int], tuple[float, float]] = {}
-    for index in np.ndindex(significands.shape):
-        pair = int(significands[index]), int(exponents[index])
-        if pair not in known:
-            value = Fraction(pair[0]) * Fraction(10) ** pair[1]
-            high = float(value)
-            known[pair] = high, float(value - Fraction(high))
-        out[index] = known[pair]
-    return out
-
-
 # -- the exact gain ---------------------------------------------------------------------------------------------------
 
 
 def _exact_gains(
     stored: LinearModel, repeat: int, period: int | None, most: int, fmt: FloatFormat | FixedFormat
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], bool, int]:
-    """Return the exact gain in double-double, a bound of its error, whether it holds forever, and from which row.
+    """Return the exact gain in double-double, a bound of its error, whether it holds for ever, and from which row.
 
     Without a period, these cover the first `repeat` steps. With a period, they go on until the exact gain is periodic,
     too. Distances are measured in the norm of the contraction bound. If the exact covariance is within some distance of
-    the computed one at the beginning of a period, and within the same distance at its end, it stays so forever.
+    the computed one at the beginning of a period, and within the same distance at its end, it stays so for ever.
     """
     n, m = stored.n, stored.m
     if period is None:
         run = _bounded_run(stored, repeat, to_the_end=False)
         done = run.steps
-        return run.G[:done].reshape(done, n, m, 2), run.bounds[1][:done], False, done
+        return run.G[:done].reshape(done, n, m, 2), run.bounds.gain[:done], False, done
     unit = float(fmt.unit if isinstance(fmt, FixedFormat) else fmt.unit_roundoff)
     steps = repeat + 2 * period
     while True:
@@ -322,11 +304,11 @@ def _exact_gains(
         steps = repeat + (steps - repeat) // period * period
         run = _bounded_run(stored, steps)
         first = steps - period
-    return run.G.reshape(run.steps, n, m, 2), run.bounds[1], False, run.steps
+    return run.G.reshape(run.steps, n, m, 2), run.bounds.gain, False, run.steps
 
 
-def _bounded_run(stored: LinearModel, steps: int, to_the_end: bool = True) -> BoundedRun:
-    run = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
+def _bounded_run(stored: LinearModel, steps: int, to_the_end: bool = True) -> Run:
+    run = Run(stored, None, Form.INNOVATION, range(1, steps + 1), bounded=True)
     run.take(np.zeros((steps, stored.m)))
     if run.stopped and to_the_end:
         raise ArithmeticError(f"the exact filter leaves the range of float64 at step {run.stopped}")
@@ -336,15 +318,15 @@ def _bounded_run(stored: LinearModel, steps: int, to_the_end: bool = True) -> Bo
 class _Closed(NamedTuple):
     """A run of one more period, the bound of its gain's error, and the smallest sufficient factor."""
 
-    run: BoundedRun
+    run: Run
     dK: NDArray[np.float64]
     needed: float
 
 
-def _closes(stored: LinearModel, run: BoundedRun, first: int, period: int, larger: float, most: int) -> _Closed | None:
+def _closes(stored: LinearModel, run: Run, first: int, period: int, larger: float, most: int) -> _Closed | None:
     """Follow one more period from a trial invariant distance, `larger` times the change in the last period."""
     steps = run.steps + period
-    longer = BoundedRun(stored, None, Form.INNOVATION, range(1, steps + 1))
+    longer = Run(stored, None, Form.INNOVATION, range(1, steps + 1), bounded=True)
     longer.take(np.zeros((run.steps, stored.m)))
     begin, P_begin = longer.bound, _symmetric(longer)
     weights = arb_mat([[arb(float(a)) for a in row] for row in begin.L])
@@ -364,15 +346,15 @@ def _closes(stored: LinearModel, run: BoundedRun, first: int, period: int, large
     if not carried + arb(moved) <= arb(float(trial)):
         return None
     shrinks = 1 - float(carried.mid()) / trial  # a distance shrinks by this share in a period
-    return _Closed(longer, longer.bounds[1], 1.1 * max(moved, wrap) / shrinks / max(begin.zeta, wrap))
+    return _Closed(longer, longer.bounds.gain, 1.1 * max(moved, wrap) / shrinks / max(begin.zeta, wrap))
 
 
-def _symmetric(run: BoundedRun) -> NDArray[Any]:
+def _symmetric(run: Run) -> NDArray[Any]:
     P = run.exactly(run.P)
     return np.asarray((P + P.T) / 2)
 
 
-def _symmetric_of(run: BoundedRun, row: int) -> NDArray[Any]:
+def _symmetric_of(run: Run, row: int) -> NDArray[Any]:
     P = run.exactly(run.C[row])
     return np.asarray((P + P.T) / 2)
 

@@ -36,13 +36,19 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
+from gpbnb.bounds.certificate import written
 from gpbnb.bounds.envelope import (
     GAIN,
     LOOP,
     ROUNDING,
     START,
+    Columns,
     Disturbances,
-    Limits,
+    End,
+    FilterLimits,
+    Sizes,
+    Steps,
     certify,
     columns,
     disturbances,
@@ -54,9 +60,10 @@ from gpbnb.bounds.reach import forward, nothing, onward, units_of_trace
 from gpbnb.bounds.storing import stored_sizes
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LARGEST_EXPONENT, LinearModel
+from gpbnb.filters.named import whole_number
 from gpbnb.filters.program import functionals
 
-PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "carried on")
+PARTS = ("roundings of the estimate", "roundings of the closed loop", "errors of the gain", "older errors")
 """Names of the parts of a bound, in the order in which a guarantee lists them."""
 
 BUDGET = 3e8
@@ -70,14 +77,15 @@ class Guarantee:
     Parameters
     ----------
     bound : (n,), bound of the error of each state after every step; infinite if there is none.
-    steps : None if the bound holds forever; otherwise the number of steps for which it holds.
-    why : why the bound does not hold forever, if it does not.
+    steps : None if the bound holds for ever; otherwise the number of steps for which it holds.
+    why : why the bound does not hold for ever; empty if it does.
     history : (k, n), bounds after each of the first steps.
     parts : (n, 4), the parts of each state's bound at the step where it is largest; see :data:`PARTS`.
     limits : limits on the filter without rounding: those given, and those that follow from them.
     schedule : the filter's coefficients.
     lags : number of earlier steps that the sums include.
     radius : growth of an error per step, averaged over a period.
+    asked : limits as given.
     """
 
     bound: NDArray[np.float64]
@@ -85,36 +93,59 @@ class Guarantee:
     why: str
     history: NDArray[np.float64]
     parts: NDArray[np.float64]
-    limits: Limits
+    limits: FilterLimits
     schedule: Schedule
     lags: int
     radius: float
+    asked: FilterLimits
 
     @property
     def for_ever(self) -> bool:
         """Whether the bound holds for any number of steps."""
         return self.steps is None
 
+    def certificate(self) -> str:
+        """Return the guarantee as JSON, which :mod:`gpbnb.bounds.check` verifies without the rest of this package.
+
+        Raises
+        ------
+        ValueError : there is no bound, the gain never repeats, or the schedule does not hold the filter.
+        """
+        loops = closed_loops(self.schedule)
+        return written(self.schedule, self.asked, self.limits, self.bound, self.steps, loops)
+
     def __str__(self) -> str:
         numbers = ", ".join(f"{b:.3g}" for b in self.bound)
-        if self.steps is None:
-            at = f"; its gain repeats from step {self.schedule.repeat}" if self.schedule.repeat is not None else ""
-            if self.schedule.enclosed is not None:
-                at = f"; its gain is enclosed from step {self.schedule.enclosed}"
-            return f"within {numbers} for ever ({self.schedule.fmt}{at})"
-        return f"within {numbers} for {self.steps} steps only, for {self.why} ({self.schedule.fmt})"
+        fmt = arithmetic(self.schedule.fmt)
+        if self.steps is not None:
+            return f"within {numbers} for {self.steps} steps only, because {self.why}; in {fmt}"
+        at = ""
+        if self.schedule.repeat is not None:
+            at = f"; the gain repeats from step {self.schedule.repeat}"
+        if self.schedule.enclosed is not None:
+            at = f"; the gain stays within known limits from step {self.schedule.enclosed}"
+        return f"within {numbers} for ever, in {fmt}{at}"
 
 
-def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf) -> Limits:
-    """Set limits on the filter without rounding, each either one number or one number per entry.
+def limits(
+    n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, measurement: Any = math.inf
+) -> FilterLimits:
+    """Set limits on the states, innovations or measurements of the exact filter.
+
+    Each limit is one number for all entries, or one number per entry.
 
     Raises
     ------
-    ValueError : a limit is negative or NaN; neither one number nor one per entry; or too few limits are finite.
+    ValueError : a limit is negative or NaN; there is neither one number nor one per entry; or too few limits are
+        finite.
     """
     found = []
+    n, m = whole_number("states", n), whole_number("measurements", m)
     for name, each, size in (("state", state, n), ("innovation", innovation, m), ("measurement", measurement, m)):
-        given = np.asarray(each, dtype=np.float64)
+        try:
+            given = np.asarray(each, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"got {each!r} on the {name}; needed numbers, one or {size}") from None
         if given.shape not in ((), (1,), (size,)):
             raise ValueError(f"got limits {given} on the {name}; needed one number, or {size}")
         found.append(np.array(np.broadcast_to(given, (size,))))
@@ -134,7 +165,7 @@ def limits(n: int, m: int, state: Any = math.inf, innovation: Any = math.inf, me
                 f"got a limit {each} on the {name}; needed 0, infinity, or 2**-{LARGEST_EXPONENT} to "
                 f"2**{LARGEST_EXPONENT}, or sums leave the range of float64; scale the model by powers of two"
             )
-    return Limits(X, V, Z)
+    return FilterLimits(X, V, Z)
 
 
 def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] = ()) -> None:
@@ -150,7 +181,7 @@ def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
     TypeError : `within` is not a result of :func:`limits`.
     ValueError : limits for another number of states or measurements, or a first estimate beyond its limit.
     """
-    if not isinstance(within, Limits):
+    if not isinstance(within, FilterLimits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
     for name, size in (("state", n), ("innovation", m), ("measurement", m)):
         shape = np.shape(getattr(within, name))
@@ -171,7 +202,7 @@ def check_limits(within: Any, n: int, m: int, x0: Sequence[Any] | NDArray[Any] =
 def guarantee(
     model: LinearModel,
     fmt: FloatFormat | FixedFormat,
-    within: Limits,
+    within: FilterLimits,
     form: Form | str = Form.INNOVATION,
     most: int = 20_000,
     horizon: int = 1_000,
@@ -184,20 +215,26 @@ def guarantee(
 
     Parameters
     ----------
-    model, fmt, form : the filter. It is compared with the exact filter of the same stored model and measurements. For a
-        model with `steps`, the bound holds for these.
-    within : limits on the exact filter, from :func:`limits`; those on the measurements hold before they are stored.
-    most : largest number of steps to emulate until the gain settles.
-    horizon : number of steps for which to give a bound if none holds forever.
-    budget : approximate number of multiplications for disturbances before the gain settles. A larger budget gives a
-        smaller bound for a filter that settles slowly.
+    model, fmt, form : the filter. The bound covers the distance of its estimates from those of the exact filter with
+        the same stored model and measurements. If the model has a number of `steps`, the bound holds for these steps.
+    within : limits on the exact filter, from :func:`limits`; limits on the measurements apply to the values before they
+        are stored.
+    most : the largest number of steps to emulate while the gain settles.
+    horizon : the number of steps that the bound covers if no bound holds for ever.
+    budget : approximate number of multiplications to spend on the steps before the gain settles. For a filter that
+        settles slowly, a larger budget gives a smaller bound.
 
     Raises
     ------
-    TypeError : `within` is not a result of :func:`limits`, or `fmt` is no format.
-    ValueError : the format has no compiled loops, rounds at random, or a covariance is not definite in it; limits for
-        another filter; a first estimate beyond its limit.
+    TypeError : `within` is not a result of :func:`limits`, or `fmt` is not a format.
+    ValueError : the format has no compiled loops, or rounds stochastically; a covariance is not definite when the
+        format stores it; limits for another filter; a first estimate beyond its limit.
     """
+    if not isinstance(model, LinearModel):
+        raise TypeError(
+            f"got a {type(model).__name__}; needed a LinearModel; for a linear system, ask required_precision(..., "
+            'basis="guarantee", within=limits(...))'
+        )
     if not isinstance(fmt, (FloatFormat, FixedFormat)):
         raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
     model.refuse_inputs("a guarantee")
@@ -210,15 +247,16 @@ def guarantee(
     return found
 
 
-def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget: float = BUDGET) -> Guarantee:
+def from_schedule(given: Schedule, within: FilterLimits, horizon: int = 1_000, budget: float = BUDGET) -> Guarantee:
     """Compute a guarantee for a linear filter of any origin whose coefficients are known; see :func:`guarantee`.
 
     Raises
     ------
-    TypeError, ValueError : as of :func:`check_limits`.
+    TypeError, ValueError : for a reason given in :func:`check_limits`.
     """
     n = given.program.n
     check_limits(within, n, given.program.m, given.x0)
+    asked = within
     within = within._replace(measurement=stored_sizes(given.fmt, within.measurement))
     why, radius = given.why, _radius(given)
     for_ever = given.settled and radius < 1
@@ -247,37 +285,23 @@ def from_schedule(given: Schedule, within: Limits, horizon: int = 1_000, budget:
             why = f"no bound was found within the range of {given.fmt}: a number may exceed the largest"
     at = history.argmax(axis=0)
     worst = np.array([parts[at[i], i] for i in range(n)])
-    return Guarantee(b if np.isfinite(new).all() else new, ended, why, history, worst, known, given, lags, radius)
+    return Guarantee(
+        b if np.isfinite(new).all() else new, ended, why, history, worst, known, given, lags, radius, asked
+    )
 
 
 def _disturbances(
-    given: Schedule, within: Limits, b: NDArray[np.float64], caps: NDArray[np.float64] | None = None
+    given: Schedule, within: FilterLimits, b: NDArray[np.float64], caps: NDArray[np.float64] | None = None
 ) -> Disturbances:
     program = given.program
     if caps is None:
         caps = np.full(len(program.operations), math.inf)
-    return Disturbances(
-        *disturbances(
-            program.operations,
-            program.outputs,
-            program.groups,
-            program.roots,
-            given.coefficients,
-            given.offsets,
-            units(given.fmt),
-            given.Phi,
-            given.HPhi,
-            given.exact,
-            given.dK,
-            within,
-            b,
-            caps,
-        )
-    )
+    numbers = Steps(given.coefficients, given.offsets, given.Phi, given.HPhi, given.exact, given.dK)
+    return Disturbances(*disturbances(program.compiled, numbers, units(given.fmt), within, b, caps))
 
 
 def disturbances_of(found: Guarantee) -> Disturbances:
-    """Return the closed loops and disturbances behind a guarantee that holds forever."""
+    """Return the closed loops and disturbances behind a guarantee that holds for ever."""
     return _disturbances(found.schedule, found.limits, found.bound)
 
 
@@ -294,7 +318,7 @@ def closed_loops(given: Schedule) -> NDArray[np.float64]:
 
 def unit_disturbances(given: Schedule) -> Disturbances:
     """Return closed loops and disturbances of the steps of a schedule, for limits of one."""
-    ones = Limits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
+    ones = FilterLimits(np.ones(given.program.n), np.ones(given.program.m), np.ones(given.program.m))
     return _disturbances(given, ones, np.zeros(given.program.n))
 
 
@@ -344,7 +368,7 @@ def _sums(
     used = (sizes > 0).any(axis=(0, 1))
     if for_ever and not np.isfinite(sizes).all():  # a number may leave the range of the format
         return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), most
-    arrays = (
+    arrays = Columns(
         found.F,
         found.spread,
         np.ascontiguousarray(found.G[:, :, used]),
@@ -363,7 +387,7 @@ def _sums(
         return np.where(np.isnan(history), math.inf, history), parts, steps
     period, sums = given.steps - given.first, []
     for phase in range(1, period + 1):
-        sums.append(certify(*arrays, np.eye(n), phase, given.first, True, most, scale, small))
+        sums.append(certify(arrays, np.eye(n), phase, given.first, True, End(most, scale, small)))
     lags = max(certificate.lags for certificate in sums)
     reach = nothing(window, part[used], n)
     begin, parts = forward(*arrays[:5], reach, 0, given.first, np.zeros(n), size)
@@ -383,7 +407,7 @@ def _sums(
             continue
         if not given.first:  # without a separate start, sums have fewer terms
             return np.array(rows), np.array(row_parts), lags
-        after, after_parts = onward(*arrays, given.first, lags, reach, size, largest)
+        after, after_parts = onward(arrays, given.first, lags, reach, size, largest)
         new = after.max(axis=0)
         if (new <= largest).all():
             return np.concatenate([begin, after, rows]), np.concatenate([parts, after_parts, row_parts]), lags
@@ -391,7 +415,7 @@ def _sums(
     return np.full((1, n), math.inf), np.full((1, n, 4), math.inf), lags
 
 
-def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: bool, steps: int) -> Limits:
+def _from_measurements(given: Schedule, within: FilterLimits, most: int, for_ever: bool, steps: int) -> FilterLimits:
     r"""Derive limits on state and innovation of the exact filter from those on the measurements.
 
     The exact filter obeys :math:`x_k = \hat F x_{k-1} + \hat K z_k - \Delta F x_{k-1} - (\hat K - K)\nu_k`, where
@@ -412,27 +436,15 @@ def _from_measurements(given: Schedule, within: Limits, most: int, for_ever: boo
         limit = np.concatenate([np.tile(a, (given.steps, 1)) for a in (within.measurement, X, V)], axis=1)
         slack = tiny * (np.abs(found.K) @ within.measurement + np.abs(found.gain) @ V) + given.dK @ V
         slack += (tiny * np.abs(found.loop) + found.spread) @ X
-        arrays = (found.F, found.spread, G, limit, slack, part)
+        arrays = Columns(found.F, found.spread, G, limit, slack, part)
         scale = (np.abs(G) * limit[:, None, :]).sum(axis=2).max(axis=0) + 1e-300
-        peak_x, peak_v = peaks(
-            *arrays,
-            HPhi,
-            X,
-            V,
-            within.measurement,
-            x0,
-            given.first,
-            early,
-            for_ever,
-            most,
-            scale,
-            1e-9 * float(scale.max()),
-        )
+        end = End(most, scale, 1e-9 * float(scale.max()))
+        peak_x, peak_v = peaks(arrays, HPhi, Sizes(X, within.measurement, x0), given.first, early, for_ever, end)
         peak_x, peak_v = np.minimum(peak_x, within.state), np.minimum(peak_v, within.innovation)
         if (peak_x <= X).all() and (peak_v <= V).all():
-            return Limits(X, V, within.measurement)
+            return FilterLimits(X, V, within.measurement)
         X, V = np.maximum(X, peak_x * (1 + 2.0**-30)), np.maximum(V, peak_v * (1 + 2.0**-30))
-    return Limits(np.full(n, math.inf), np.full(m, math.inf), within.measurement)
+    return FilterLimits(np.full(n, math.inf), np.full(m, math.inf), within.measurement)
 
 
 def _product_share(n: int) -> float:
@@ -440,7 +452,7 @@ def _product_share(n: int) -> float:
     return (2 * n + 30) * 2.0**-53
 
 
-def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
+def _caps(given: Schedule, within: FilterLimits, most: int) -> NDArray[np.float64]:
     """Bound each operation's own linear function, more tightly than the peaks of the states do.
 
     The coefficients of the filter must never change, and its first estimate must be zero. The exact filter is then the
@@ -458,21 +470,9 @@ def _caps(given: Schedule, within: Limits, most: int) -> NDArray[np.float64]:
     tiny = _product_share(program.n)
     slack = tiny * np.abs(found.K) @ within.measurement + found.spread @ within.state
     size = np.abs(found.K[0]) @ within.measurement + 1e-300
-    peak = certify(
-        found.F,
-        found.spread,
-        found.K,
-        limit,
-        slack,
-        np.zeros(program.m, dtype=np.int64),
-        np.ascontiguousarray(of_state),
-        1,
-        0,
-        True,
-        most,
-        size,
-        1e-9 * float(size.max()),
-    )
+    part = np.zeros(program.m, dtype=np.int64)
+    arrays = Columns(found.F, found.spread, found.K, limit, slack, part)
+    peak = certify(arrays, np.ascontiguousarray(of_state), 1, 0, True, End(most, size, 1e-9 * float(size.max())))
     total = peak.sums.sum(axis=1) + (peak.residual + peak.tail) @ within.state + of_input @ within.measurement
     total += 2.0**-50 * sizes[first:] @ np.concatenate([within.state, within.measurement])
     return np.asarray(total * (1 + 2.0**-40))

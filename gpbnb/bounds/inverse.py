@@ -30,8 +30,9 @@ import flint
 import numpy as np
 
 from gpbnb.arithmetic import linalg, search
-from gpbnb.arithmetic.array import FloatArray
-from gpbnb.arithmetic.bounds import column_sum, gamma, gamma_probabilistic
+from gpbnb.arithmetic.array import FloatArray, NumberFormat
+from gpbnb.arithmetic.bounds import above, column_sum, gamma, gamma_probabilistic
+from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.linalg import LU
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
@@ -125,7 +126,7 @@ def rule_of_thumb(factors: LU, x: FloatArray) -> float:
     return _from_factors(factors, x, math.sqrt(3 * len(x)) * float(x.format.unit_roundoff))
 
 
-def _count(n: int, fmt: FloatFormat) -> float:
+def _count(n: int, fmt: NumberFormat) -> float:
     return float(gamma(3 * n, fmt.unit_roundoff))
 
 
@@ -223,7 +224,7 @@ def _working(bits: int) -> Iterator[None]:
         flint.ctx.prec = before
 
 
-def _bits(fmt: FloatFormat) -> int:
+def _bits(fmt: NumberFormat) -> int:
     return max(2, math.ceil(fmt.precision * math.log2(fmt.base)))
 
 
@@ -246,10 +247,7 @@ def _column_sum(a: Any) -> Any:
 
 def _upper(x: Any) -> float:
     """Return a float64 that is not below any number in the ball."""
-    m, e = x.upper().man_exp()
-    exactly = Fraction(int(m)) * Fraction(2) ** int(e)
-    nearest = float(exactly)
-    return nearest if Fraction(nearest) >= exactly else math.nextafter(nearest, math.inf)
+    return above(exact_fraction(x.upper()))
 
 
 # -- the true error -------------------------------------------------------------------------------
@@ -264,7 +262,7 @@ def true_error(x: Any, inverse: Any) -> Fraction:
 
 
 @dataclass(frozen=True)
-class Guarantee:
+class ProvedInverse:
     """A computed inverse whose relative error norm is proved to be at most `bound`."""
 
     fmt: FloatFormat
@@ -279,7 +277,7 @@ def smallest_precision(
     rounding: Rounding = Rounding.NEAREST,
     pivot: bool = True,
     largest: int | None = None,
-) -> Guarantee:
+) -> ProvedInverse:
     r"""Find the fewest digits in which the computed inverse of a matrix is proved to be within a tolerance.
 
     In each precision that :func:`gpbnb.arithmetic.search.smallest_precision` tries, the matrix is rounded and inverted,
@@ -314,13 +312,13 @@ def smallest_precision(
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.size:
         raise ValueError(f"a must be a square matrix (n, n) with n at least 1; got shape {given.shape}")
     true_inverse(given)
-    tried: dict[FloatFormat, Guarantee] = {}
+    tried: dict[FloatFormat, ProvedInverse] = {}
     why: dict[int, str] = {}
 
     def meets(fmt: FloatFormat) -> bool:
         try:
             x = linalg.inv(fmt.array(given), pivot)
-            tried[fmt] = Guarantee(fmt, x, _relative(a_posteriori(given, x), x))
+            tried[fmt] = ProvedInverse(fmt, x, _relative(a_posteriori(given, x), x))
         except (np.linalg.LinAlgError, ValueError) as error:  # it is singular in so few digits, or no bound was proved
             why[fmt.precision] = str(error)
             return False

@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from gpbnb.bounds.envelope import Disturbances
 from gpbnb.bounds.guarantee import Guarantee, disturbances_of
+from gpbnb.filters.structures import steady_covariance
 
 
 def separate_roundings(found: Guarantee) -> Disturbances:
@@ -37,7 +37,7 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
 
     Raises
     ------
-    ValueError : the guarantee does not hold forever.
+    ValueError : the guarantee does not hold for ever.
     """
     given = found.schedule
     if not found.for_ever:
@@ -51,7 +51,7 @@ def probable_error(found: Guarantee) -> NDArray[np.float64]:
     whole, gathered = np.eye(given.program.n), np.zeros_like(noise[0])
     for loop, added in zip(F, noise, strict=True):
         whole, gathered = loop @ whole, loop @ gathered @ loop.T + added
-    covariance = np.asarray(scipy.linalg.solve_discrete_lyapunov(whole, gathered))
+    covariance = steady_covariance(whole, gathered)
     largest = np.diagonal(covariance).copy()
     for loop, added in zip(F, noise, strict=True):
         covariance = loop @ covariance @ loop.T + added

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.compiling import compiled
-from gpbnb.bounds.envelope import ROUNDING, START
+from gpbnb.bounds.envelope import ROUNDING, START, meet
 
 _U = 2.0**-53
 _UP = 1 + 2.0**-40
@@ -212,19 +212,7 @@ def width(M: Any, a: Any) -> float:
 
 
 @compiled
-def onward(
-    F: Any,
-    spread: Any,
-    G: Any,
-    limits: Any,
-    slack: Any,
-    part: Any,
-    first: int,
-    lags: int,
-    reach: Any,
-    size: Any,
-    b: Any,
-) -> Any:
+def onward(given: Any, first: int, lags: int, reach: Any, size: Any, b: Any) -> Any:
     """Bound the error after each of some steps from `first` on, when the coefficients are periodic.
 
     All steps of a phase share the rows of their certificate. They differ only in where these rows meet the set after
@@ -233,6 +221,7 @@ def onward(
 
     Parameters
     ----------
+    given : :class:`gpbnb.bounds.envelope.Columns`; the rows from `first` on repeat.
     lags : number of steps. reach : the set after step `first`. b : (n,), bound of earlier errors, by which the
         rounding errors of the rows are multiplied.
 
@@ -240,7 +229,7 @@ def onward(
     -------
     bounds, parts : (lags, n) and (lags, n, 4).
     """
-    n, g_count, rows = F.shape[1], G.shape[2], F.shape[0]
+    n, g_count, rows = given.F.shape[1], given.G.shape[2], given.F.shape[0]
     period = rows - first
     bounds, parts = np.zeros((lags, n)), np.zeros((lags, n, 4))
     whole = np.zeros((1, n, n))
@@ -258,21 +247,13 @@ def onward(
             residual, largest, asked = 0.0, 0.0, False
             for lag in range(1, lags + 1):
                 at = first + (phase - lag) % period
+                meet(given, at, c, each)  # sums of their own, so that no term takes part in more additions than allowed
                 c_next[:] = 0.0
-                each[:] = 0.0  # sums of their own, so that no term takes part in more additions than are allowed for
                 for j in range(n):
-                    each[ROUNDING] += abs(c[j]) * slack[at, j]
                     if c[j] != 0.0:
                         for r in range(n):
-                            c_next[r] += c[j] * F[at, j, r]
-                            each[START] += abs(c[j]) * spread[at, j, r] * b[r]
-                for g in range(g_count):
-                    if limits[at, g] != 0.0:
-                        s = 0.0
-                        for j in range(n):
-                            s += c[j] * G[at, j, g]
-                        if s != 0.0:
-                            each[part[g]] += abs(s) * limits[at, g]
+                            c_next[r] += c[j] * given.F[at, j, r]
+                            each[START] += abs(c[j]) * given.spread[at, j, r] * b[r]
                 residual += each[START]
                 for p in range(3):
                     sums[p] += each[p]

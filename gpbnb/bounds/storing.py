@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.bounds import above
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
@@ -27,8 +27,8 @@ def storing_errors(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -
 def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest size of a number that was within each size before a format stored it.
 
-    Rounding keeps the order of numbers, so it is that of the stored limit, if this is larger; at random, that of the
-    next number of the format. A limit beyond the range stays as it is.
+    Rounding keeps the order of numbers, so this size is the stored limit, if it is larger. With stochastic rounding, it
+    is the next number of the format. A limit beyond the range stays as it is.
     """
     upwards = replace(fmt, rounding=Rounding.UP) if fmt.rounding is Rounding.STOCHASTIC else fmt
     found = []
@@ -36,12 +36,6 @@ def stored_sizes(fmt: FloatFormat | FixedFormat, sizes: NDArray[np.float64]) -> 
         largest = float(size)
         if np.isfinite(size):
             with contextlib.suppress(OverflowError):
-                largest = max(largest, *(_above(abs(upwards.round(sign * float(size)))) for sign in (1, -1)))
+                largest = max(largest, *(above(abs(upwards.round(sign * float(size)))) for sign in (1, -1)))
         found.append(largest)
     return np.array(found).reshape(np.shape(sizes))
-
-
-def _above(value: Fraction) -> float:
-    """Return the least float64 that is not below a number."""
-    near = float(value)
-    return near if Fraction(near) >= value else float(np.nextafter(near, np.inf))

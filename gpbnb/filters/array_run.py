@@ -7,32 +7,156 @@ gives the same digits.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import operator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.algebra import Algebra
+from gpbnb.arithmetic.array import FloatArray, NegativeRootError
 from gpbnb.arithmetic.exits import stays
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
 from gpbnb.filters import array_steps
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.bounded_steps import advance_bound
-from gpbnb.filters.contraction import Contraction, contraction_start
+from gpbnb.filters.array_steps import ONE_FORMAT, BlockStorage
+from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.bounded_steps import CarriedBound, Taken
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import (
+    HUNG_FORMS,
+    BlockAlgebra,
+    StepModel,
+    by_closed_loop,
+    corrected,
+    measured_in,
+    predicted_in,
+    second_gain,
+)
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.opening import opening
-from gpbnb.filters.run import Checkpoints, Run
+from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums
 
-_HUNG = (Form.HUNG, Form.HUNG_SECOND_GAIN)
-_ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
-_FACTORED = (Form.UD, *_ROOTS)
+ROOTS = (ArrayForm.POTTER, ArrayForm.CARLSON)
+FACTORED = (Form.UD, *ROOTS)
+
+PREDICT: dict[AnyForm, Callable[..., tuple[Any, bool]]] = {
+    Form.UD: array_steps.predict_ud,
+    ArrayForm.POTTER: array_steps.predict_root,
+    ArrayForm.CARLSON: array_steps.predict_root,
+}
+"""How a form predicts factors or roots."""
+
+OBSERVE: dict[AnyForm, Callable[..., tuple[Any, Any, Any, bool]]] = {
+    Form.UD: array_steps.observe_ud,
+    ArrayForm.POTTER: array_steps.observe_potter,
+    ArrayForm.CARLSON: array_steps.observe_carlson,
+}
+"""How a form updates factors or roots by one measurement."""
 
 
-class ArrayRun:
+class SteppedRun(ABC):
+    """A run that takes one step after another in array operations, and keeps what a search asks of it.
+
+    Parameters
+    ----------
+    n, m : numbers of states and measurements.
+    stored : function that rounds measurements into the format of the state.
+    form : form of the update.
+    checkpoint_steps : as for :class:`~gpbnb.filters.run.Run`.
+    """
+
+    x: FloatArray
+    P: FloatArray
+    _bound: _BoundTaker | None = None
+
+    def __init__(
+        self, n: int, m: int, stored: Callable[[Any], FloatArray], form: AnyForm, checkpoint_steps: Sequence[int]
+    ) -> None:
+        self._size, self._stored, self.form = (n, m), stored, form
+        self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
+        self.steps, self.reason = 0, ""
+        self.indefinite: int | None = None
+        self.stopped: int | None = None
+        self._saved: list[tuple[int, Any, Any, Any]] = []
+
+    @abstractmethod
+    def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
+        """Take step k + 1; return the gain, or columns for decorrelated measurements, and whether all is definite."""
+
+    @abstractmethod
+    def _check(self, z: Any) -> None:
+        """Reject measurements of another shape, or of more steps than the model describes."""
+
+    @abstractmethod
+    def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
+        """Return the exact gain of step k + 1 for all measurements together."""
+
+    def take(self, z: Any) -> None:
+        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
+        for _ in self._steps_taken(z):
+            pass
+
+    def states(self, z: Any) -> NDArray[np.float64]:
+        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
+        found = [_double_doubles(x) for x in self._steps_taken(z)]
+        return np.array(found, dtype=np.float64).reshape(-1, self._size[0], 2)
+
+    def _steps_taken(self, z: Any) -> Iterator[FloatArray]:
+        """Take one step after the other, and give the estimate after each."""
+        self._check(z)
+        for measured in self._stored(z):
+            if self.stopped is not None:
+                return
+            try:
+                K, definite = self._step(self.steps, measured)
+            except (ZeroDivisionError, OverflowError, NegativeRootError) as error:
+                self.stopped = self.steps + 1
+                self.reason = f"{_fault(error)} at step {self.stopped}"
+                return
+            self.steps += 1
+            if not definite and self.indefinite is None:
+                self.indefinite = self.steps
+            at = len(self._saved)
+            saved = at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == self.steps
+            if saved:
+                self._saved.append((self.steps, self.x, K, self.P))
+            if self._bound is not None:
+                self._bound.take(measured)
+            yield self.x
+
+    def checkpoints(self) -> Checkpoints:
+        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
+        n, m = self._size
+        x, K, P = np.empty((len(self._saved), n), object), np.empty((len(self._saved), n, m), object), []
+        for at, (step, state, K_saved, covariance) in enumerate(self._saved):
+            x[at], K[at] = state.to_fractions(), self._whole_gain(step - 1, K_saved)
+            P.append(self.covariance(covariance))
+        steps = tuple(step for step, *_ in self._saved)
+        return Checkpoints(steps, x, K, np.array(P, dtype=object).reshape(-1, n, n))
+
+    def covariance(self, P: FloatArray) -> NDArray[Any]:
+        """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
+        given: NDArray[Any] = P.to_fractions()
+        if self.form in ROOTS:
+            return np.asarray(given @ given.T)
+        if self.form is Form.UD:
+            return covariance_of_factors(given)
+        return given
+
+
+def _fault(error: Exception) -> str:
+    if isinstance(error, OverflowError):
+        return "overflow"
+    return "the square root of a negative number" if isinstance(error, ValueError) else "a division by zero"
+
+
+class ArrayRun(SteppedRun):
     """A run in array operations; its attributes are those of :class:`~gpbnb.filters.run.Run`.
 
     Parameters
@@ -56,17 +180,14 @@ class ArrayRun:
         checkpoint_steps: Sequence[int],
         bounded: bool = False,
     ) -> None:
-        if model.has_inputs and form in _HUNG:
+        if model.has_inputs and form in HUNG_FORMS:
             raise ValueError(
                 f"got known inputs in the {form} form, which is not defined with them; needed another "
                 'form, such as "innovation"'
             )
         fmt.check_compiled()
-        self.model, self.fmt, self.form = model, fmt, form
-        self.checkpoint_steps = tuple(int(step) for step in checkpoint_steps)
-        self.steps, self.reason = 0, ""
-        self.indefinite: int | None = None
-        self.stopped: int | None = None
+        super().__init__(model.n, model.m, fmt.array, form, checkpoint_steps)
+        self.model, self.fmt = model, fmt
         sound = model.definite_in(fmt)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(sound.repairs)
@@ -75,74 +196,28 @@ class ArrayRun:
         self._given: dict[str, list[FloatArray]] = {letter: [] for letter in ("B", "u", "b", "d")}
         for letter, each in stored.items():
             self._given[letter] = list(each[np.newaxis] if each.ndim == 1 else each)
-        self._identity = fmt.array(np.eye(model.n, dtype=int))
+        self._blocks = block_algebra([fmt] * 4, ONE_FORMAT)
         if form is ArrayForm.COMPENSATED:
             self._given["increment"] = [fmt.array(each - np.eye(model.n, dtype=int)) for each in model.Phi]
             self._carried = self.x * 0
-        if form in _FACTORED:
+        if form in FACTORED:
             self._factor()
-        self._saved: list[tuple[int, Any, Any, Any]] = []
-        self._bound = _StateBound(self) if bounded else None
+        self._bound = _BoundTaker(self) if bounded else None
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the run also computes the contraction bound of its estimate."""
+        return self._bound is not None
 
     @property
     def bounds(self) -> tuple[NDArray[np.float64]]:
         """Bounds of the errors of the state at the checkpoint steps, (c, n); infinite if there is none."""
         if self._bound is None:
             raise ValueError("got a run without its bound; needed bounded=True")
-        return (self._bound.state,)
+        return (self._bound.carried.saved.state,)
 
-    def take(self, z: Any) -> None:
-        """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
-        for _ in self._steps_taken(z):
-            pass
-
-    def states(self, z: Any) -> NDArray[np.float64]:
-        """Continue as :meth:`take` does, and return all estimates, (steps done, n, 2), as double-double."""
-        found = [_double_doubles(x) for x in self._steps_taken(z)]
-        return np.array(found, dtype=np.float64).reshape(-1, self.model.n, 2)
-
-    def _steps_taken(self, z: Any) -> Iterator[FloatArray]:
-        """Take one step after the other, and give the estimate after each."""
+    def _check(self, z: Any) -> None:
         self.model.check_measurements(z, self.steps)
-        for measured in self.fmt.array(z):
-            if self.stopped is not None:
-                return
-            try:
-                K, definite = self._step(self.steps, measured)
-            except (ZeroDivisionError, OverflowError) as error:
-                self.stopped = self.steps + 1
-                kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
-                self.reason = f"{kind} at step {self.stopped}"
-                return
-            self.steps += 1
-            if not definite and self.indefinite is None:
-                self.indefinite = self.steps
-            at = len(self._saved)
-            saved = at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == self.steps
-            if saved:
-                self._saved.append((self.steps, self.x, K, self.P))
-            if self._bound is not None:
-                self._bound.take(measured)
-            yield self.x
-
-    def checkpoints(self) -> Checkpoints:
-        """Return estimate, gain and covariance at the checkpoint steps that were reached."""
-        n, m = self.model.n, self.model.m
-        x, K, P = np.empty((len(self._saved), n), object), np.empty((len(self._saved), n, m), object), []
-        for at, (step, state, gain, covariance) in enumerate(self._saved):
-            x[at], K[at] = state.to_fractions(), self._whole_gain(step - 1, gain)
-            P.append(self.covariance(covariance))
-        steps = tuple(step for step, *_ in self._saved)
-        return Checkpoints(steps, x, K, np.array(P, dtype=object).reshape(-1, n, n))
-
-    def covariance(self, P: FloatArray) -> NDArray[Any]:
-        """Return the exact covariance, as Fractions, from a covariance, its factors or its root."""
-        given: NDArray[Any] = P.to_fractions()
-        if self.form in _ROOTS:
-            return np.asarray(given @ given.T)
-        if self.form is Form.UD:
-            return covariance_of_factors(given)
-        return given
 
     def known_state(self, k: int) -> NDArray[Any] | None:
         """Return the exact input to the states in step k + 1, as the format stores it; None without inputs."""
@@ -154,36 +229,24 @@ class ArrayRun:
     # -- one step ---------------------------------------------------------------------------------------
 
     def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        """Take step k + 1; return the gain, or columns for decorrelated measurements, and whether all is definite."""
         if self._given["d"]:
             z = z - self._at("d", k)
-        return self._factored_step(k, z) if self.form in _FACTORED else self._covariance_step(k, z)
+        return self._factored_step(k, z) if self.form in FACTORED else self._covariance_step(k, z)
 
     def _covariance_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
-        Phi, H, Q, R = (self._at(letter, k) for letter in ("Phi", "H", "Q", "R"))
-        predicted = (Phi @ (Phi @ self.P).T + Q.T).T
-        HP = H @ predicted.T
-        SI, definite = array_steps.inverse(H @ HP.T + R)
-        K = (SI.T @ HP).T
-        W = self._identity - K @ H
-        P = W @ predicted
-        if self.form is Form.JOSEPH:
-            P = P @ W.T + K @ R @ K.T
-        if self.form is ArrayForm.SYMMETRIZED:
-            P = (P + P.T) / 2
+        algebra, model = self._blocks.state, StepModel(*(self._at(letter, k) for letter in ("Phi", "H", "Q", "R")))
+        V = predicted_in(self._blocks, model.Phi, self.P, model.Q)
+        K, P, pivots = measured_in(self._blocks, self.form, model.H, model.R, V)
         if self.form is Form.HUNG_SECOND_GAIN:
-            RI, _ = array_steps.inverse(R)
-            K = P @ H.T @ RI
-            W = self._identity - K @ H
-        if self.form in _HUNG:
-            x = W @ Phi @ self.x + K @ z
+            K = second_gain(algebra, model.H, model.R, P)
+        if self.form in HUNG_FORMS:
+            self.x = by_closed_loop(algebra, model, K, self.x, z)
         elif self.form is ArrayForm.COMPENSATED:
-            x = self._compensated(k, H, K, z)
+            self.x = self._compensated(k, model.H, K, z)
         else:
-            ahead = self._predicted_state(k, Phi)
-            x = ahead + K @ (z - H @ ahead)
-        self.x, self.P = x, P
-        return K, definite and bool(np.all(np.diagonal(P) > 0))
+            self.x = corrected(algebra, model.H, K, self._predicted_state(k, model.Phi), z)
+        self.P = P
+        return K, all(bool(each > 0) for each in pivots) and bool(np.all(np.diagonal(P) > 0))
 
     def _predicted_state(self, k: int, Phi: FloatArray) -> FloatArray:
         return self._with_inputs(k, Phi @ self.x)
@@ -203,21 +266,10 @@ class ArrayRun:
 
     def _factored_step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
         Phi, H, UR = self._at("Phi", k), self._at("H", k), self._at("UR", k)
-        predict = array_steps.predict_ud if self.form is Form.UD else array_steps.predict_root
-        observe = {
-            Form.UD: array_steps.observe_ud,
-            ArrayForm.POTTER: array_steps.observe_potter,
-            ArrayForm.CARLSON: array_steps.observe_carlson,
-        }[self.form]
-        P, definite = predict(Phi, self.P, self._at("UQ", k))
-        x = self._predicted_state(k, Phi)
-        rows, values, gains = array_steps.decorrelated(UR, H), array_steps.decorrelated(UR, z), []
-        for i in range(self.model.m):
-            x, P, K, positive = observe(rows[i], values[i], UR[i, i], x, P)
-            gains.append(K)
-            definite = definite and positive
-        self.x, self.P = x, P
-        return gains, definite
+        P, definite = PREDICT[self.form](Phi, self.P, self._at("UQ", k))
+        found = array_steps.observed(OBSERVE[self.form], H, UR, z, self._predicted_state(k, Phi), P)
+        self.x, self.P = found.x, found.P
+        return found.gains, definite and found.definite
 
     # -- what it needs ----------------------------------------------------------------------------------
 
@@ -231,7 +283,7 @@ class ArrayRun:
         self.repairs += start.raised
         first, Q, R = (self._unpacked(each) for each in (start.U0, start.UQ, start.UR))
         self._given["UR"] = list(R)
-        if self.form in _ROOTS:
+        if self.form in ROOTS:
             self.P = array_steps.root_of_factors(first)
             self._given["UQ"] = [array_steps.root_of_factors(each) for each in Q]
         else:
@@ -249,8 +301,8 @@ class ArrayRun:
         return combined_gain([each.to_fractions() for each in gain], UR, H)
 
 
-class _StateBound:
-    """The contraction bound of an array run, step by step; see :mod:`gpbnb.filters.contraction`.
+class _BoundTaker:
+    """What the contraction bound of an array run needs of each step; see :mod:`gpbnb.filters.contraction`.
 
     A known input c can be moved out of a step: the exact filter goes from x to :math:`E(x, z - Hc) + c`,
     with the step E of the filter without inputs. So the residual of a step is that of a filter without inputs, whose
@@ -262,19 +314,10 @@ class _StateBound:
         self.run = run
         self.stored = run.model.rounded(run.fmt).without_inputs()
         self.offset = [each.to_fractions() for each in run._given["d"]]
-        given = self.stored.to_float()
-        self.plain = given["Phi"], given["H"], given["Q"], given["R"]
-        self.exact = Run(self.stored, None, Form.INNOVATION, ()).matrices
-        n, m, count = run.model.n, run.model.m, len(run.checkpoint_steps)
-        self.state = np.full((count, n), np.inf)
-        self._rest = np.full((count, n, m), np.inf), np.full((count, n, n), np.inf)
-        self._UR = np.zeros((1, m, m, 2))
-        self._gain = np.zeros((1, n, m, 2))
-        self.steps = np.array(run.checkpoint_steps, dtype=np.int64)
-        off = np.zeros((n, n))
-        if run.form in _FACTORED:
-            off = np.abs((run.covariance(run.P) - self.stored.P0).astype(np.float64)) * (1 + 2.0**-50)
-        self.bound: Contraction = contraction_start(given["P0"], np.zeros(n), off)
+        first = run.covariance(run.P) if run.form in FACTORED else None
+        self.carried = CarriedBound(self.stored, Form.INNOVATION, first, np.array(run.checkpoint_steps, dtype=np.int64))
+        n, m = run.model.n, run.model.m
+        self._gains, self._UR = np.zeros((1, n, m, 2)), np.zeros((1, m, m, 2))  # only the state's bound is asked for
         self.x, self.P = self._wide_state(None), self._wide_covariance()
 
     def take(self, measured: FloatArray) -> None:
@@ -288,24 +331,12 @@ class _StateBound:
             z = z - self.stored.H[k % len(self.stored.H)] @ known
         try:
             x, P = self._wide_state(known), self._wide_covariance()
-            self.bound = advance_bound(
-                Form.INNOVATION,
-                self.exact,
-                self.plain,
-                double_doubles(z.reshape(1, -1, 1)),
-                k,
-                np.stack([self.x, x]),
-                np.stack([self.P, P]),
-                self._gain,
-                self._UR,
-                self.bound,
-                self.steps,
-                int(np.searchsorted(self.steps, k, side="right")),
-                (self.state, *self._rest),
-            )
+            measurements = double_doubles(z.reshape(1, -1, 1))
+            taken = Taken(measurements, np.stack([self.x, x]), np.stack([self.P, P]), self._gains, self._UR)
+            self.carried.take(k, taken)
             self.x, self.P = x if known is None else self._wide_state(None), P
-        except (OverflowError, ZeroDivisionError):  # beyond double-double, so there is no bound from here on
-            self.bound = self.bound._replace(eta=np.inf, zeta=np.inf)
+        except (OverflowError, ZeroDivisionError):  # beyond double-double
+            self.carried.end()
 
     def _wide_state(self, known: NDArray[Any] | None) -> NDArray[np.float64]:
         """Return the estimate minus a known input as double-double, (n, 1, 2)."""
@@ -314,9 +345,52 @@ class _StateBound:
         return double_doubles((self.run.x.to_fractions() - known).reshape(-1, 1))
 
     def _wide_covariance(self) -> NDArray[np.float64]:
-        if self.run.form in _FACTORED:
+        if self.run.form in FACTORED:
             return double_doubles(self.run.covariance(self.run.P))
         return _double_doubles(self.run.P)
+
+
+def opened_run(
+    model: LinearModel,
+    fmt: FloatFormat | BlockFormats,
+    form: AnyForm,
+    checkpoint_steps: Sequence[int] = (),
+    bounded: bool = False,
+    sums: Sums = LEFT_TO_RIGHT,
+    compensated: bool = False,
+) -> Run | ArrayRun:
+    """Return a run in compiled loops if the form has them and the model has no inputs, else in array operations.
+
+    Raises
+    ------
+    ValueError : the run has no compiled loops, but other sums or compensated summation are required; or for a reason
+        given in
+        :class:`~gpbnb.filters.run.Run` and :class:`ArrayRun`.
+    """
+    if not model.has_inputs and not isinstance(form, ArrayForm):
+        return Run(model, fmt, form, checkpoint_steps, sums, compensated, bounded)
+    if sums != LEFT_TO_RIGHT or compensated:
+        raise ValueError(
+            "got sums or compensated with known inputs or a form without compiled loops; needed neither; for "
+            'compensated summation write form="compensated"'
+        )
+    if isinstance(fmt, BlockFormats):
+        raise ValueError(
+            "got formats of blocks with known inputs or a form without compiled loops; needed neither; its forms are "
+            f"{', '.join(map(str, Form))}"
+        )
+    return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
+
+
+def block_algebra(formats: Sequence[FloatFormat], stored: BlockStorage) -> BlockAlgebra:
+    """Return how matrices of the formats of state, gain, covariance and innovation covariance are computed."""
+    known = {fmt: _algebra(fmt) for fmt in dict.fromkeys(formats)}
+    state, gain, covariance, innovation = (known[fmt] for fmt in formats)
+    return BlockAlgebra(state, gain, covariance, innovation, stored)
+
+
+def _algebra(fmt: FloatFormat) -> Algebra:
+    return Algebra(cache(lambda n: fmt.array(np.eye(n, dtype=int))), operator.matmul)
 
 
 def _double_doubles(a: FloatArray) -> NDArray[np.float64]:

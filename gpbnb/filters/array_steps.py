@@ -1,43 +1,33 @@
-"""The arithmetic of one step with arrays of a format, for covariances, their factors and their square roots.
+"""One step with factors or square roots of the covariance, over arrays of numbers of any kind; roots need ``sqrt``.
 
-Where the compiled loops of ``gpbnb.filters.kernels.step`` have the same form, operations are done in the same order,
-so that every digit is the same.
+The compiled loops of ``gpbnb.filters.kernels.step`` do the operations of the UD form in the same order, so that every
+digit is the same. :mod:`gpbnb.filters.kalman_step` has the forms that compute the covariance itself.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.algebra import Matrix, as_computed
 
 
-def inverse(a: FloatArray) -> tuple[FloatArray, bool]:
-    """Return the inverse, by elimination without pivoting, and whether all pivots are positive.
+class BlockStorage(NamedTuple):
+    """How each block of a filter takes numbers from the model or from another block; by default as they are."""
 
-    Raises
-    ------
-    ZeroDivisionError : a pivot is zero.
-    """
-    m = len(a)
-    rows, columns = [a[i] for i in range(m)], list(a.format.array(np.eye(m, dtype=int)))
-    definite = True
-    for k in range(m):
-        definite = definite and bool(rows[k][k] > 0)
-        if rows[k][k] == 0:
-            raise ZeroDivisionError("a zero pivot in the innovation covariance")
-        for i in range(k + 1, m):
-            factor = rows[i][k] / rows[k][k]
-            rows[i], columns[i] = rows[i] - factor * rows[k], columns[i] - factor * columns[k]
-    for k in range(m - 1, -1, -1):
-        for i in range(k + 1, m):
-            columns[k] = columns[k] - rows[k][i] * columns[i]
-        columns[k] = columns[k] / rows[k][k]
-    return _stacked(columns), definite
+    state: Callable[[Matrix], Matrix] = as_computed
+    gain: Callable[[Matrix], Matrix] = as_computed
+    covariance: Callable[[Matrix], Matrix] = as_computed
+    innovation: Callable[[Matrix], Matrix] = as_computed
 
 
-def predict_ud(Phi: FloatArray, U: FloatArray, UQ: FloatArray) -> tuple[FloatArray, bool]:
+ONE_FORMAT = BlockStorage()
+"""All blocks compute with the same numbers."""
+
+
+def predict_ud(Phi: Matrix, U: Matrix, UQ: Matrix) -> tuple[Matrix, bool]:
     """Predict UD factors by Thornton's modified weighted Gram-Schmidt; the diagonals hold the variances."""
     n = len(U)
     W = np.concatenate([Phi @ _unit(U), _unit(UQ)], axis=1)
@@ -48,18 +38,37 @@ def predict_ud(Phi: FloatArray, U: FloatArray, UQ: FloatArray) -> tuple[FloatArr
         d = (W[j] * c).sum()
         found[j][j] = d
         definite = definite and bool(d > 0)
-        if j and d != 0:
-            s = (W[:j] * c).sum(1) / d
+        if j:
+            s = if_nonzero(d, _share(W[:j], c, d), U[:j, j] * 0)
             W = np.concatenate([W[:j] - s[:, None] * W[j], W[j:]])
             for i in range(j):
                 found[i][j] = s[i]
     return _matrix(found), definite
 
 
+def _share(W: Matrix, c: Matrix, d: Matrix) -> Callable[[], Matrix]:
+    return lambda: (W * c).sum(1) / d
+
+
+def if_nonzero(x: Any, changed: Callable[[], Any], unchanged: Any) -> Any:
+    """Return changed numbers if x is not zero, else the unchanged ones.
+
+    A number that records its operations, see :mod:`gpbnb.filters.tracing`, records both.
+    """
+    if hasattr(x, "if_nonzero"):
+        return x.if_nonzero(changed, unchanged)
+    return changed() if x != 0 else unchanged
+
+
 def observe_ud(
-    h: FloatArray, z: FloatArray, r: FloatArray, x: FloatArray, U: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+    h: Matrix, z: Matrix, r: Matrix, x: Matrix, U: Matrix, stored: BlockStorage = ONE_FORMAT
+) -> tuple[Matrix, Matrix, Matrix, bool]:
     """Update UD factors by Bierman's method, for one measurement z of h'x with variance r.
+
+    Parameters
+    ----------
+    h (n,), r : in the innovation block. z, x (n,) : in the state block. U (n, n) : in the covariance block.
+    stored : how a block takes numbers from another one.
 
     Returns
     -------
@@ -71,34 +80,45 @@ def observe_ud(
     ZeroDivisionError : the variance of the innovation is zero.
     """
     n = len(x)
-    y = z
+    y, c = z, stored.state(h)
     for j in range(n):
-        if h[j] != 0:
-            y = y - h[j] * x[j]
-    f = _unit(U).T @ h
-    g = np.diagonal(U) * f
-    factors, gain = _entries(U), [h[0] * 0 for _ in range(n)]
+        y = y - c[j] * x[j]
+    seen = stored.innovation(U)
+    f = _unit(seen).T @ h
+    g = np.diagonal(seen) * f
+    taken, moved = stored.gain(g), stored.covariance(f)
+    factors, gain = _entries(U), [stored.gain(h[0] * 0) for _ in range(n)]
     a, definite = r, True
     for j in range(n):
-        if g[j] != 0:
-            before, a = a, a + f[j] * g[j]
-            if a == 0:
-                raise ZeroDivisionError("a zero pivot in the innovation covariance")
-            definite = definite and bool(a > 0)
-            factors[j][j] = factors[j][j] * before / a
-            factor = -(f[j] / before)
-            for k in range(j):
-                u, c = factors[k][j], gain[k]
-                if c != 0:
-                    factors[k][j] = u + factor * c
-                gain[k] = c + g[j] * u
+        before, a = a, a + f[j] * g[j]
+        if a == 0:
+            raise ZeroDivisionError("a zero pivot in the innovation covariance")
+        definite = definite and bool(a > 0)
+        column = [factors[k][j] for k in range(j + 1)]
+        known = [stored.covariance(each) for each in gain[:j]]
+        change = _updated(column, known, moved[j], stored.covariance(before), stored.covariance(a))
+        updated = if_nonzero(g[j], change, column)
+        for k in range(j):
+            gain[k] = gain[k] + taken[j] * stored.gain(column[k])
+        for k in range(j + 1):
+            factors[k][j] = updated[k]
         definite = definite and not bool(factors[j][j] < 0)
-        gain[j] = g[j]
-    K = _stacked(gain) / a
-    return x + K * y, _matrix(factors), K, definite
+        gain[j] = taken[j]
+    K = _stacked(gain) / stored.gain(a)
+    return x + stored.state(K) * y, _matrix(factors), K, definite
 
 
-def predict_root(Phi: FloatArray, S: FloatArray, SQ: FloatArray) -> tuple[FloatArray, bool]:
+def _updated(column: list[Matrix], gain: list[Matrix], f: Matrix, before: Matrix, a: Matrix) -> Callable[[], Any]:
+    """Return a function that updates a column of U, whose last entry is a variance."""
+
+    def updated() -> list[Matrix]:
+        variance, factor = column[-1] * before / a, -(f / before)
+        return [*(u + factor * c for u, c in zip(column, gain, strict=False)), variance]
+
+    return updated
+
+
+def predict_root(Phi: Matrix, S: Matrix, SQ: Matrix) -> tuple[Matrix, bool]:
     """Return the upper triangular root of the predicted covariance, by modified Gram-Schmidt on (Phi S, SQ)."""
     n = len(S)
     W = np.concatenate([Phi @ S, SQ], axis=1)
@@ -116,9 +136,7 @@ def predict_root(Phi: FloatArray, S: FloatArray, SQ: FloatArray) -> tuple[FloatA
     return _matrix(found), definite
 
 
-def observe_potter(
-    h: FloatArray, z: FloatArray, r: FloatArray, x: FloatArray, S: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+def observe_potter(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:
     r"""Update a square root by Potter's method, for one measurement; see :func:`observe_ud`.
 
     .. math:: f = S^Th, \quad a = f^Tf + r, \quad K = Sf/a, \quad S^+ = S - \frac{(Sf) f^T}{a + \sqrt{ra}}
@@ -131,9 +149,7 @@ def observe_potter(
     return x + K * (z - h @ x), S, K, bool(a > 0)
 
 
-def observe_carlson(
-    h: FloatArray, z: FloatArray, r: FloatArray, x: FloatArray, S: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+def observe_carlson(h: Matrix, z: Matrix, r: Matrix, x: Matrix, S: Matrix) -> tuple[Matrix, Matrix, Matrix, bool]:
     r"""Update an upper triangular root by Carlson's method, for one measurement; see :func:`observe_ud`.
 
     With :math:`f = S^Th` and :math:`a_j = a_{j-1} + f_j^2`, :math:`a_0 = r`, column j becomes
@@ -143,7 +159,7 @@ def observe_carlson(
     n = len(x)
     f = S.T @ h
     a, k = r, x * 0
-    columns: list[FloatArray] = []
+    columns: list[Matrix] = []
     for j in range(n):
         before, column = a, S[:, j]
         if f[j] != 0:
@@ -156,34 +172,78 @@ def observe_carlson(
     return x + K * (z - h @ x), _stacked(columns).T, K, bool(a > 0)
 
 
-def decorrelated(UR: FloatArray, a: FloatArray) -> FloatArray:
+def decorrelated(UR: Matrix, a: Matrix) -> Matrix:
     """Return the inverse of the unit upper triangle of R = U D U' times a, by back substitution."""
     m = len(UR)
     rows = [a[i] for i in range(m)]
     for i in range(m - 1, -1, -1):
         for k in range(i + 1, m):
-            if UR[i, k] != 0:
-                rows[i] = rows[i] - UR[i, k] * rows[k]
+            rows[i] = rows[i] - UR[i, k] * rows[k]
     return _stacked(rows)
 
 
-def root_of_factors(U: FloatArray) -> FloatArray:
+class FactoredStep(NamedTuple):
+    """The estimate (n,), the factors or root (n, n), the gains (n,) one by one, and whether variances stay positive."""
+
+    x: Matrix
+    P: Matrix
+    gains: list[Matrix]
+    definite: bool
+
+
+Observe = Callable[[Matrix, Matrix, Matrix, Matrix, Matrix], tuple[Matrix, Matrix, Matrix, bool]]
+"""An update by one measurement, such as :func:`observe_ud`."""
+
+
+def observed(
+    observe: Observe,
+    H: Matrix,
+    UR: Matrix,
+    z: Sequence[Any] | Matrix,
+    ahead: Matrix,
+    P: Matrix,
+    stored: BlockStorage = ONE_FORMAT,
+) -> FactoredStep:
+    """Update a predicted estimate and its factors or root by measurements, decorrelated and one by one.
+
+    Parameters
+    ----------
+    H (m, n), UR (m, m) : measurement matrix, and factors of R. z (m,), ahead (n,), P (n, n) : measurements, predicted
+        estimate, and its factors or root.
+    stored : how a block takes numbers from the model.
+    """
+    UR, of_state = stored.innovation(UR), stored.state(UR)
+    rows, values, gains, x, definite = (
+        decorrelated(UR, stored.innovation(H)),
+        decorrelated(of_state, z),
+        [],
+        ahead,
+        True,
+    )
+    for i in range(len(UR)):
+        x, P, K, positive = observe(rows[i], values[i], UR[i, i], x, P)
+        gains.append(K)
+        definite = definite and positive
+    return FactoredStep(x, P, gains, definite)
+
+
+def root_of_factors(U: Matrix) -> Matrix:
     r"""Return :math:`U\sqrt{D}` for the factors of U D U'."""
     return _unit(U) * np.sqrt(np.diagonal(U))
 
 
-def _unit(U: FloatArray) -> Any:
+def _unit(U: Matrix) -> Any:
     """Return the upper triangle with ones on its diagonal."""
     return np.where(np.eye(len(U), dtype=bool), 1, U)
 
 
-def _entries(a: FloatArray) -> list[list[FloatArray]]:
+def _entries(a: Matrix) -> list[list[Matrix]]:
     return [[a[i, j] for j in range(a.shape[1])] for i in range(a.shape[0])]
 
 
-def _matrix(entries: list[list[FloatArray]]) -> FloatArray:
+def _matrix(entries: list[list[Matrix]]) -> Matrix:
     return _stacked([_stacked(row) for row in entries])
 
 
-def _stacked(parts: list[FloatArray]) -> Any:
+def _stacked(parts: list[Matrix]) -> Any:
     return np.stack(parts)

@@ -1,16 +1,19 @@
-"""The contraction bound over steps that a run has taken."""
+"""The contraction bound of a run, taken along step by step, in compiled runs and in array runs alike."""
 
 from __future__ import annotations
 
 import contextlib
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.kernels.backends import double_doubles
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 from gpbnb.filters.contraction import (
     Contraction,
+    Repeated,
+    contraction_start,
     contraction_step,
     covariance_error_bound,
     evaluation_errors,
@@ -18,80 +21,124 @@ from gpbnb.filters.contraction import (
     state_error_bound,
 )
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel
 from gpbnb.filters.kernels.bounded import residuals, symmetric_parts, whole_gain
 from gpbnb.filters.kernels.step import NEXT_CHECKPOINT, advance
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.opening import opening, step_arrays
 
 Array = NDArray[np.float64]
 
 _UNIT = 2.0**-100  # of double-double
 
 
-def advance_bound(
-    form: Form,
-    exact_model: tuple[NDArray[Any], ...],
-    plain: tuple[Array, ...],
-    z: Array,
-    first: int,
-    x: Array,
-    P: Array,
-    gains: Array,
-    UR: Array,
-    bound: Contraction,
-    checkpoint_steps: NDArray[np.int64],
-    at: int,
-    bounds: tuple[Array, Array, Array],
-) -> Contraction:
-    """Take the contraction bound over steps that a run has taken; returns it, and saves it at checkpoint steps.
+class Bounds(NamedTuple):
+    """Bounds at the checkpoint steps, infinite if there is none."""
 
-    Each step is repeated in double-double from where the run stood: its residuals enter the bound.
+    #: (c, n).
+    state: Array
+    #: (c, n, m).
+    gain: Array
+    #: (c, n, n), of the symmetric part.
+    covariance: Array
+
+
+class Taken(NamedTuple):
+    """Steps that a run has taken, in double-double, (..., 2)."""
+
+    #: (steps, m, 1, 2), the measurements.
+    z: Array
+    #: (steps + 1, n, 1, 2), estimates before and after each step.
+    x: Array
+    #: (steps + 1, n, n, 2), covariances, or factors in the UD form, before and after each step.
+    P: Array
+    #: (steps, n, m, 2), gains as the run computed them.
+    gains: Array
+    #: (k, m, m, 2), factors of R as the run computed them.
+    UR: Array
+
+
+class CarriedBound:
+    """The contraction bound of :mod:`gpbnb.filters.contraction`, computed along with a run.
 
     Parameters
     ----------
-    form : the form of the run.
-    exact_model, plain : the stored model in double-double, as ``Run.matrices``, and Phi, H, Q, R in float64.
-    z : (steps, m, 1, 2), the measurements.
-    first : how many steps were taken before these.
-    x, P : (steps + 1, n, 1, 2) and (steps + 1, n, n, 2), states and covariances, or factors, before and after each.
-    gains : (steps, n, m, 2), as the run computed them.
-    UR : (k, m, m, 2), the factors of R as the run computed them.
-    bound : before the first of these steps.
-    checkpoint_steps, at : all steps to be saved, and which of them is next.
-    bounds : of state (c, n), gain (c, n, m) and covariance (c, n, n), written at the checkpoint steps.
-
-    Raises
-    ------
-    OverflowError : a step cannot be repeated; what was saved of the steps before it holds.
+    stored : the model as the run stores it, without known inputs.
+    form : the form whose covariances, or factors, and gains the steps have.
+    first : (n, n), the covariance from which the run starts, as Fractions, if factors represent it; otherwise None.
+    checkpoint_steps : steps after which bounds are saved.
     """
-    covariances = np.empty_like(P)
-    symmetric_parts(int(form), P, covariances)
-    xe, Ke, Pe, Se = _repeated(exact_model, z, first, x, covariances)
-    steps, n, m = len(xe), x.shape[1], z.shape[1]
-    y, q, T = np.empty((steps, m)), np.empty((steps, n)), np.empty((steps, n, n))
-    after = x[: steps + 1], covariances[: steps + 1]
-    residuals(exact_model, z[:steps], first, *after, (xe, Pe), (y, q, T))
-    before, measured, K, S, size = (
-        np.ascontiguousarray(each) for each in (x[..., 0, 0], z[..., 0, 0], Ke[..., 0], Se[..., 0], covariances[..., 0])
-    )
-    if form == Form.UD:
-        diagonal = np.diagonal(size, axis1=1, axis2=2)
-        size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
-    bounds_x, bounds_K, bounds_P = bounds
-    for i, k in enumerate(range(first, first + steps)):
-        phi, h, Q, R = (each[k % len(each)] for each in plain)
-        dq, dT, dK, dy = evaluation_errors(phi, h, Q, R, before[i], size[i], measured[i], K[i], S[i], _UNIT)
-        bound = contraction_step(bound, phi, h, Q, R, K[i], S[i], y[i], q[i], T[i], dq, dT, dK, dy)
-        if at < len(checkpoint_steps) and checkpoint_steps[at] == k + 1:
-            used = np.empty_like(gains[i])
-            whole_gain(int(form), gains[i], exact_model[2][k % len(exact_model[2])], UR[k % len(UR)], used)
-            bounds_x[at], bounds_P[at] = state_error_bound(bound), covariance_error_bound(bound)
-            bounds_K[at] = gain_error_bound(bound, K[i], np.ascontiguousarray(used[..., 0]), dK)
-            at += 1
-    if steps < len(z):
-        raise OverflowError(f"got a step {first + steps + 1} beyond double-double; needed one within it")
-    return bound
+
+    def __init__(
+        self, stored: LinearModel, form: Form, first: NDArray[Any] | None, checkpoint_steps: NDArray[np.int64]
+    ) -> None:
+        self.form, self.checkpoint_steps = form, checkpoint_steps
+        given = stored.to_float()
+        self._plain = given["Phi"], given["H"], given["Q"], given["R"]
+        start = opening(stored, None, Form.INNOVATION, DoubleDouble())
+        self._exact = step_arrays(start, double_doubles(np.eye(stored.n, dtype=int)))
+        n, m, count = stored.n, stored.m, len(checkpoint_steps)
+        #: Bounds at the checkpoint steps.
+        self.saved = Bounds(*(np.full((count, *shape), np.inf) for shape in ((n,), (n, m), (n, n))))
+        off = np.zeros((n, n))
+        if first is not None:  # the first factors may have errors
+            off = np.abs((first - stored.P0).astype(np.float64)) * (1 + 2.0**-50)
+        #: The bound after the last step that was taken.
+        self.now: Contraction = contraction_start(given["P0"], np.zeros(n), off)
+
+    def end(self) -> None:
+        """Give up the bound, because a number is beyond double-double."""
+        self.now = self.now._replace(eta=np.inf, zeta=np.inf)
+
+    def take(self, first: int, taken: Taken) -> None:
+        """Continue the bound over steps that a run has taken, and save it at checkpoint steps.
+
+        Each step is repeated in double-double from the run's state before that step, and its residuals enter the bound.
+        If a step cannot
+        be repeated, there is no bound from there on.
+
+        Parameters
+        ----------
+        first : how many steps were taken before these.
+        """
+        try:
+            covariances = np.empty_like(taken.P)
+            symmetric_parts(int(self.form), taken.P, covariances)
+            done = self._take(first, taken, covariances)
+        except (OverflowError, ZeroDivisionError):
+            done = 0
+        if done < len(taken.z):
+            self.end()
+
+    def _take(self, first: int, taken: Taken, covariances: Array) -> int:
+        """Take the bound over as many steps as can be repeated; return their number."""
+        z, x, exact = taken.z, taken.x, self._exact
+        xe, Ke, Pe, Se = _repeated(exact, z, first, x, covariances)
+        steps, n, m = len(xe), x.shape[1], z.shape[1]
+        y, q, T = np.empty((steps, m)), np.empty((steps, n)), np.empty((steps, n, n))
+        residuals(exact, z[:steps], first, x[: steps + 1], covariances[: steps + 1], (xe, Pe), (y, q, T))
+        before, measured, K, S, size = map(
+            np.ascontiguousarray, (x[..., 0, 0], z[..., 0, 0], Ke[..., 0], Se[..., 0], covariances[..., 0])
+        )
+        if self.form == Form.UD:
+            diagonal = np.diagonal(size, axis1=1, axis2=2)
+            size = np.sqrt(np.abs(diagonal[:, :, np.newaxis] * diagonal[:, np.newaxis, :])) * (1 + 2.0**-50)
+        at = int(np.searchsorted(self.checkpoint_steps, first, side="right"))
+        for i, k in enumerate(range(first, first + steps)):
+            model = StepModel(*(each[k % len(each)] for each in self._plain))
+            off = evaluation_errors(model, before[i], size[i], measured[i], K[i], S[i], _UNIT)
+            self.now = contraction_step(self.now, model, Repeated(K[i], S[i], y[i], q[i], T[i]), off)
+            if at < len(self.checkpoint_steps) and self.checkpoint_steps[at] == k + 1:
+                used = np.empty_like(taken.gains[i])
+                whole_gain(int(self.form), taken.gains[i], exact.H[k % len(exact.H)], taken.UR[k % len(taken.UR)], used)
+                self.saved.state[at] = state_error_bound(self.now)
+                self.saved.gain[at] = gain_error_bound(self.now, K[i], np.ascontiguousarray(used[..., 0]), off.gain)
+                self.saved.covariance[at] = covariance_error_bound(self.now)
+                at += 1
+        return steps
 
 
-def _repeated(exact_model: tuple[NDArray[Any], ...], z: Array, first: int, x: Array, P: Array) -> tuple[Any, ...]:
+def _repeated(exact: Any, z: Array, first: int, x: Array, P: Array) -> tuple[Any, ...]:
     """Estimates, gains, covariances and innovation covariances of steps repeated in double-double, as far as that goes.
 
     Each step begins where the run stood.
@@ -102,6 +149,6 @@ def _repeated(exact_model: tuple[NDArray[Any], ...], z: Array, first: int, x: Ar
     tag, form = DoubleDouble(), int(Form.INNOVATION)
     with contextlib.suppress(OverflowError, ZeroDivisionError):
         repeated, kept = (x[:-1], P[:-1], S), (every, *after)
-        advance(tag, form, exact_model, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes)
+        advance(tag, form, exact, z, first, x[0].copy(), P[0].copy(), repeated, kept, notes)
     done = int(notes[NEXT_CHECKPOINT])
     return tuple(each[:done] for each in (*after, S))

@@ -34,6 +34,8 @@ from numpy.typing import NDArray
 
 from gpbnb.filters.kernels.contraction import (
     Contraction,
+    EvaluationErrors,
+    Repeated,
     contraction_start,
     contraction_step,
     covariance_error_bound,
@@ -44,6 +46,8 @@ from gpbnb.filters.kernels.contraction import (
 
 __all__ = [
     "Contraction",
+    "EvaluationErrors",
+    "Repeated",
     "companion_bound",
     "contraction_start",
     "contraction_step",
@@ -57,7 +61,7 @@ _U = 2.0**-53
 
 
 def companion_bound(difference: Any, bound: Any) -> NDArray[np.float64]:
-    r"""Bound the errors of a run by those of a companion run, for example with more digits, that has a small bound.
+    r"""Bound the errors of a run by its distance from a companion run, such as one with more digits, and its bound.
 
     .. math:: |\hat x - x| \le |\hat x - \hat x_c| + |\hat x_c - x|
 

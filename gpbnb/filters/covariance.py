@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.definiteness import is_definite
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 
@@ -96,7 +97,7 @@ def repaired(
 
     Raises
     ------
-    ValueError : it needs a larger change than the tolerance, or has a fault not due to rounding.
+    ValueError : the covariance needs a larger change than the tolerance, or its error is not due to rounding.
     """
     symmetric, asymmetry, shift = matrix, 0.0, 0.0
     try:
@@ -196,34 +197,6 @@ def raised_until(
             return raised, shift
         shift *= 2
     return None
-
-
-def is_definite(matrix: NDArray[Any], strictly: bool = False) -> bool:
-    """Whether a symmetric matrix is exactly positive semidefinite or, with `strictly`, definite."""
-    try:
-        return bool(np.all(factor(matrix)[1] > 0)) or not strictly
-    except ValueError:
-        return False
-
-
-def factor(covariance: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return exact L and d of a symmetric matrix L diag(d) L'; L is lower triangular with a unit diagonal.
-
-    Raises
-    ------
-    ValueError : the matrix is not positive semidefinite.
-    """
-    rest, n = covariance.copy(), len(covariance)
-    lower = np.array([[Fraction(int(i == j)) for j in range(n)] for i in range(n)], dtype=object)
-    d = np.array([Fraction(0)] * n, dtype=object)
-    for j in range(n):
-        d[j] = rest[j, j]
-        if d[j] < 0 or (d[j] == 0 and np.any(rest[j + 1 :, j] != 0)):
-            raise ValueError("not positive semidefinite")
-        if d[j] > 0:
-            lower[j + 1 :, j] = rest[j + 1 :, j] / d[j]
-            rest[j + 1 :, j + 1 :] -= np.multiply.outer(lower[j + 1 :, j], rest[j, j + 1 :])
-    return lower, d
 
 
 def check_covariance(letter: str, matrix: NDArray[Any], strictly: bool) -> None:

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rounding import Order
-from gpbnb.filters.array_forms import AnyForm, ArrayForm
-from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.array_forms import AnyForm
+from gpbnb.filters.array_run import ArrayRun, opened_run
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.missing import without_missing
+from gpbnb.filters.missing import stored_measurements, without_missing
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
-from gpbnb.filters.run import Checkpoints, Run, log_spaced, reference
+from gpbnb.filters.run import LEFT_TO_RIGHT, Checkpoints, Run, Sums, log_spaced, reference
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class History:
     """
 
     model: LinearModel
-    fmt: FloatFormat
+    fmt: FloatFormat | BlockFormats
     form: AnyForm
     steps: NDArray[np.int64]
     state: NDArray[np.float64]
@@ -94,7 +94,8 @@ def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
         (each - other[:c]).astype(np.float64)
         for each, other in ((checkpoints.x, true.x), (checkpoints.K, true.K), (checkpoints.P, true.P))
     )
-    fmt, steps = cast(FloatFormat, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
+    blocks = run.block_formats if isinstance(run, Run) else None
+    fmt, steps = blocks or cast(FloatFormat, run.fmt), np.array(checkpoints.steps, dtype=np.int64)
     repairs = tuple(str(each) for each in run.repairs)
     return History(run.model, fmt, run.form, steps, x, K, P, true, run.indefinite, run.stopped, run.reason, repairs)
 
@@ -102,61 +103,53 @@ def compare_runs(run: Run | ArrayRun, true: Checkpoints) -> History:
 def emulate(
     model: LinearModel,
     z: Any,
-    fmt: FloatFormat,
+    fmt: FloatFormat | BlockFormats,
     form: AnyForm | str = Form.INNOVATION,
     checkpoint_steps: Sequence[int] | None = None,
     true: Checkpoints | None = None,
-    fused: bool = False,
-    sums: FloatFormat | FixedFormat | None = None,
+    sums: Sums = LEFT_TO_RIGHT,
     compensated: bool = False,
-    order: Order = "left",
-    block: int = 32,
 ) -> History:
-    """Run the filter with model, measurements and every operation rounded, and compare it with the reference.
+    """Run the filter with model, measurements and every operation rounded, and compare the run with the reference.
 
     Parameters
     ----------
     model : a model with n states and m measurements.
     z : (steps, m), measurements; NaN or masked if missing.
-    fmt : any format of base 2 up to 53 digits, 10 up to 18, or 16 up to 13; or fixed point.
+    fmt : a floating-point format with at most 53 digits in base 2, 18 in base 10 or 13 in base 16; a fixed-point
+        format; or one format for each block of a step, as in :class:`gpbnb.filters.blocks.BlockFormats`.
     form : a form or its name, such as "UD".
     checkpoint_steps : steps at which to compare; by default four per decade.
-    true : a reference to compare with. By default it gets model and measurements as the format stores them, so
-        errors come only from the arithmetic. With a reference for the model as given, they include those of storing it.
-    fused : whether products are added by fused multiply-add, as processors with one do; base 2 or 16.
-    sums, compensated, order, block : as for :class:`~gpbnb.filters.run.Run`.
+    true : the reference run to compare with. By default, it uses model and measurements as the format stores them, so
+        the errors come only from the arithmetic. With a reference for the model as given, they include the errors of
+        storing the model.
+    sums, compensated : as for :class:`~gpbnb.filters.run.Run`.
 
     Raises
     ------
-    TypeError : no model, or no format.
-    ValueError : no measurements; one of these options together with known inputs or a form without compiled loops.
+    TypeError : `model` is not a model, or `fmt` is not a format.
+    ValueError : there are no measurements; a checkpoint step is beyond the run; or `sums`, `compensated` or formats for
+        blocks are combined with known inputs, or with a form without compiled loops.
     """
     form = form_named(form)
     if not isinstance(model, LinearModel):
         raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
-    if not isinstance(fmt, (FloatFormat, FixedFormat)):
-        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat or a FixedFormat")
+    if not isinstance(fmt, (FloatFormat, FixedFormat, BlockFormats)):
+        raise TypeError(f"got the format {fmt!r}; needed a FloatFormat, a FixedFormat or BlockFormats")
     if not hasattr(z, "to_fractions"):
         model, z = without_missing(model, z)
-    fmt.restart()
-    measured: Any = z if hasattr(z, "to_fractions") else fmt.array(z)
+    if not isinstance(fmt, BlockFormats):
+        fmt.restart()
+    measured: Any = z if hasattr(z, "to_fractions") else stored_measurements(z, fmt)
     model.check_measurements(measured, 0)
     if not len(measured):
         raise ValueError("got no measurements; needed at least one step")
     chosen = log_spaced(len(measured)) if checkpoint_steps is None else tuple(checkpoint_steps)
     if chosen and max(chosen) > len(measured):
         raise ValueError(f"got checkpoint step {max(chosen)}; needed none above the {len(measured)} steps of the run")
-    run: Run | ArrayRun
-    if model.has_inputs or isinstance(form, ArrayForm):
-        if fused or sums is not None or compensated or order != "left":
-            raise ValueError(
-                "got fused, sums, compensated or order with known inputs or a form without compiled loops; needed none "
-                'of them; for compensated summation write form="compensated"'
-            )
-        run = ArrayRun(model, fmt, form, chosen)
-    else:
-        run = Run(model, fmt, form, chosen, fused, sums, compensated, order, block)
+    run = opened_run(model, fmt, form, chosen, False, sums, compensated)
     run.take(measured)
     if true is None:
-        true = reference(model.rounded(fmt), measured.to_fractions(), chosen)
+        stored = model.rounded(fmt.model if isinstance(fmt, BlockFormats) else fmt)
+        true = reference(stored, measured, chosen)
     return compare_runs(run, true)

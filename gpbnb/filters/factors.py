@@ -8,7 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.definiteness import factor
 from gpbnb.arithmetic.rational import exact, inverse_of
+
+
+def upper_factors(covariance: NDArray[Any]) -> NDArray[Any]:
+    """Return exact factors U D U' of a covariance (n, n): D is the diagonal, U the unit triangle above it.
+
+    Raises
+    ------
+    ValueError : the covariance is not positive semidefinite.
+    """
+    lower, d = factor(covariance[::-1, ::-1])
+    return np.triu(lower[::-1, ::-1], 1) + np.diag(d[::-1])
 
 
 def unit_triangle(factors: NDArray[Any]) -> NDArray[Any]:

@@ -5,10 +5,15 @@ from __future__ import annotations
 from enum import IntEnum
 
 
-class Form(IntEnum):
-    r"""The order in which one step is computed; in exact arithmetic all forms agree.
+def plain_name(name: str) -> str:
+    """Return the name of a form in capitals, with underscores for blanks and hyphens."""
+    return name.strip().upper().replace(" ", "_").replace("-", "_")
 
-    P_p is the predicted covariance (100).
+
+class Form(IntEnum):
+    r"""The order in which a filter computes one step. In exact arithmetic, all forms agree.
+
+    In the table, P_p is the predicted covariance (100).
 
     ================  ===================================================================================
     form              gain, covariance, estimate
@@ -16,7 +21,7 @@ class Form(IntEnum):
     HUNG              the first form of (99); :math:`(I - KH)P_p`; (111) with (109) and (110)
     HUNG_SECOND_GAIN  the same, but the estimate uses :math:`P H^T R^{-1}`, the second form of (99), with
                       the new P
-    INNOVATION        the first form of (99); :math:`(I - KH)P_p`; (98), by the innovation
+    INNOVATION        the first form of (99); :math:`(I - KH)P_p`; (98), with the innovation
     JOSEPH            as INNOVATION, but :math:`(I - KH)P_p(I - KH)^T + KRK^T`
     UD                Thornton's and Bierman's recursions for the factors of :math:`P = UDU^T`
     ================  ===================================================================================
@@ -34,6 +39,16 @@ class Form(IntEnum):
 
     def __str__(self) -> str:
         return _NAMES[self]
+
+    @classmethod
+    def _missing_(cls, value: object) -> Form:
+        """Find the member with a name in any case, such as ``Form("ud")``."""
+        wanted = plain_name(str(value))
+        for each in cls:
+            if wanted in (each.name, plain_name(str(each))):
+                return each
+        names = ", ".join(repr(each.name.lower()) for each in cls)
+        raise ValueError(f"got form {value!r}; needed one of {names}, or a number from 0 to {len(cls) - 1}")
 
 
 _NAMES = {

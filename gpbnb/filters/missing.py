@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.model import LinearModel
 
 
@@ -40,6 +44,19 @@ def real_numbers(values: Any) -> NDArray[Any]:
         raise TypeError(f"measurements: {error}") from None
     except ValueError as error:
         raise ValueError(f"measurements: {error}") from None
+
+
+def stored_measurements(z: Any, fmt: FloatFormat | FixedFormat | BlockFormats) -> FloatArray:
+    """Round measurements into a format.
+
+    Raises
+    ------
+    OverflowError : a measurement beyond the range of the format.
+    """
+    try:
+        return fmt.array(z)
+    except OverflowError as error:
+        raise OverflowError(f"measurements: {error}") from None
 
 
 def without_missing(model: LinearModel, z: Any) -> tuple[LinearModel, Any]:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
@@ -25,53 +27,60 @@ from gpbnb.filters.covariance import (
     repaired,
     stored_in,
 )
-from gpbnb.filters.named import checked_name
+from gpbnb.filters.named import checked_name, checked_names, range_text, sized
 
 LARGEST_EXPONENT = 450
 """Largest size of an exponent of two in a model for compiled loops of a format with any exponent."""
 
 
-@dataclass(frozen=True, eq=False)
+Entries: TypeAlias = "Numbers | Callable[[int], Numbers]"
+"""What a matrix of a model may be given as, numbers or a function of the step."""
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class LinearModel:
-    r"""A linear process and its measurements; hung1984, ch. II, before (98).
+    r"""A linear process and its measurements, as in hung1984, ch. II, before (98).
 
     .. math:: x_k = \Phi_{k-1} x_{k-1} + B_{k-1} u_{k-1} + b_{k-1} + w_{k-1}, \qquad z_k = H_k x_k + d_k + v_k, \qquad
         w_k \sim N(0, Q_k),\ v_k \sim N(0, R_k)
 
-    Each matrix and offset may be the same for all steps, or a cycle with a leading axis. Step k = 1, 2, … then uses
-    member (k - 1) mod p; each cycle has its own p. It may also be a function of k, which is called for
-    k = 1 … `steps`. Entries are stored exactly, as Fractions; numbers, strings and Decimals are read exactly.
+    Each matrix and offset may be the same for all steps, or a cycle of c matrices along a leading axis. Step k = 1, 2,
+    … then uses member (k - 1) mod c; each cycle has its own c. A matrix may also be a function of k, which is called
+    for k = 1 … `steps`. Entries are stored exactly, as Fractions; numbers, strings and Decimals are read exactly.
 
     Without u, b and d this is the model of the report. With them, a filter predicts
     :math:`((\Phi\hat x) + (Bu)) + b` and takes the innovation :math:`(z - d) - H\hat x`, in this order.
 
     Parameters
     ----------
-    Phi : (n, n) or (p, n, n), transition.
-    H : (m, n) or (p, m, n), measurement.
-    Q : (n, n) or (p, n, n), covariance of the process noise, positive semidefinite.
-    R : (m, m) or (p, m, m), covariance of the measurement noise, positive definite.
+    Phi : (n, n) or (c, n, n), transition matrix.
+    H : (m, n) or (c, m, n), measurement matrix.
+    Q : (n, n) or (c, n, n), covariance of the process noise, positive semidefinite.
+    R : (m, m) or (c, m, m), covariance of the measurement noise, positive definite.
     x0 : (n,), the first estimate.
-    P0 : (n, n), its covariance, positive semidefinite.
+    P0 : (n, n), covariance of the first estimate, positive semidefinite.
     name : name in tables and figures.
     repair : whether to repair rounding errors in Q, R and P0, as described in :mod:`gpbnb.filters.covariance`. By
-        default, only covariances given in floats are repaired, not those of strings, whole numbers or Fractions; but
-        one that becomes indefinite when a format stores it is repaired unless `repair` is False.
+        default, only covariances given in floats are repaired, not those given as strings, whole numbers or Fractions.
+        A covariance that becomes indefinite when a format stores it is repaired unless `repair` is False.
     B : (n, p) or (c, n, p), input matrix.
     u : (steps, p), known inputs, row k - 1 for step k; or (p,), the same in every step.
-    b : (n,) or (c, n), known offset of the states.
-    d : (m,) or (c, m), known offset of the measurements.
-    steps : number of steps that the model describes; required if an argument is a function. By default the number of
-        rows of `u`, or any number. A longer run is rejected.
+    b : (n,), or (c, n) for a cycle: known offset of the states.
+    d : (m,), or (c, m) for a cycle: known offset of the measurements.
+    steps : number of steps that the model describes; required if an argument is a function. By default, this is the
+        number of rows of `u`; without rows, there is no limit. A longer run is rejected.
+    state_names, measurement_names, input_names : names of the n states, m measurements and inputs u, for messages,
+        tables and reports, each optionally with its unit, as in ``["tilt (°)", "rate (°/s)"]``; by default they are
+        numbered.
 
     Attributes
     ----------
-    repairs : the changes made; empty if there are none.
+    repairs : the repairs of Q, R and P0; empty if nothing was repaired.
 
     Raises
     ------
-    ValueError : shapes that do not fit; NaN or infinity; a covariance that is not symmetric or not definite; a function
-        without `steps`, or inputs for fewer steps.
+    ValueError : shapes do not fit together; an entry is NaN or infinite; a covariance is not symmetric or not definite;
+        a matrix is a function but `steps` is missing; or there are fewer inputs than steps.
 
     Examples
     --------
@@ -91,16 +100,62 @@ class LinearModel:
     R: NDArray[Any]
     x0: NDArray[Any]
     P0: NDArray[Any]
-    name: str = "a linear model"
-    repair: bool | None = None
-    B: Any = None
-    u: Any = None
-    b: Any = None
-    d: Any = None
-    steps: int | None = None
+    name: str
+    repair: bool | None
+    B: Any
+    u: Any
+    b: Any
+    d: Any
+    steps: int | None
+    state_names: tuple[str, ...]
+    measurement_names: tuple[str, ...]
+    input_names: tuple[str, ...]
     repairs: tuple[Repair, ...] = field(default=(), init=False)
 
-    def __post_init__(self) -> None:
+    def __init__(
+        self,
+        Phi: Entries,
+        H: Entries,
+        Q: Entries,
+        R: Entries,
+        x0: Numbers,
+        P0: Numbers,
+        name: str = "a linear model",
+        repair: bool | None = None,
+        B: Entries | None = None,
+        u: Entries | None = None,
+        b: Entries | None = None,
+        d: Entries | None = None,
+        steps: int | None = None,
+        state_names: Sequence[str] | None = None,
+        measurement_names: Sequence[str] | None = None,
+        input_names: Sequence[str] | None = None,
+    ) -> None:
+        names = (state_names, measurement_names, input_names)
+        given = (Phi, H, Q, R, x0, P0, name, repair, B, u, b, d, steps, *names)
+        for each, value in zip(fields(self), given, strict=False):  # the last, `repairs`, is found
+            object.__setattr__(self, each.name, value)
+        self._read()
+        for what, count in (("state_names", self.n), ("measurement_names", self.m), ("input_names", self.p)):
+            object.__setattr__(self, what, checked_names(what, getattr(self, what), count))
+
+    def __repr__(self) -> str:
+        """Describe the model in three lines: its sizes, its matrices with the sizes of their entries, and its start."""
+        inputs = f"; {sized(self.p, 'input', self.input_names)}" if self.p else ""
+        steps = "" if self.steps is None else f"; at most {self.steps} steps"
+        matrices = [
+            f"{letter} {_of_one(given) if letter in _CYCLES else given.shape} {range_text(given.flat)}"
+            + (f" in a cycle of {len(given)}" if letter in _CYCLES and len(given) > 1 else "")
+            for letter in (*_LETTERS, *_INPUTS)
+            if (given := getattr(self, letter)) is not None
+        ]
+        return (
+            f"LinearModel {self.name!r}, {sized(self.n, 'state', self.state_names)}; "
+            f"{sized(self.m, 'measurement', self.measurement_names)}{inputs}{steps}\n"
+            f"  {', '.join(matrices[:4])}\n  {', '.join(matrices[4:])}"
+        )
+
+    def _read(self) -> None:
         if self.repair is not None and not isinstance(self.repair, bool):
             raise ValueError(f"got repair {self.repair!r}; needed True, False or None")
         checked_name(self.name)
@@ -214,7 +269,7 @@ class LinearModel:
 
     def without_inputs(self) -> LinearModel:
         """Return the same model without known inputs and offsets."""
-        return replace(self, B=None, u=None, b=None, d=None) if self.has_inputs else self
+        return replace(self, B=None, u=None, b=None, d=None, input_names=()) if self.has_inputs else self
 
     def known(self, k: int) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the exact input of step k + 1, :math:`Bu + b`, (n,), and the measurement offset d, (m,)."""
@@ -239,18 +294,19 @@ class LinearModel:
             )
 
     def check_measurements(self, z: Any, first: int) -> None:
-        """Reject measurements of another shape than (steps, m), or of more steps than the model describes.
+        """Reject measurements whose shape is not (steps, m), or that have more steps than the model describes.
 
         Parameters
         ----------
-        first : how many steps come before them.
+        first : number of steps before the first of these measurements.
 
         Raises
         ------
-        ValueError : another shape; more than `steps` steps altogether.
+        ValueError : the shape is not (steps, m), or there are more than `steps` steps altogether.
         """
-        if np.ndim(z) != 2 or np.shape(z)[1] != self.m:
-            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.m})")
+        shape = z.shape if hasattr(z, "shape") else np.shape(z)
+        if len(shape) != 2 or shape[1] != self.m:
+            raise ValueError(f"got measurements of shape {shape}; needed (steps, {self.m})")
         self.check_steps(first + len(z))
 
     def check_steps(self, count: int) -> None:
@@ -264,11 +320,12 @@ class LinearModel:
             raise ValueError(f"got {count} steps; needed at most {self.steps}: {self.name} describes no more")
 
     def check_sizes(self) -> None:
-        """Reject entries whose products leave the exponents of float64, which compiled loops compute with.
+        """Reject entries whose products would leave the exponent range of float64, in which the compiled loops compute.
 
         Raises
         ------
-        OverflowError : an entry is not between 2**-:data:`LARGEST_EXPONENT` and 2**:data:`LARGEST_EXPONENT` in size.
+        OverflowError : the absolute value of an entry is not between 2**-:data:`LARGEST_EXPONENT` and
+            2**:data:`LARGEST_EXPONENT`.
         """
         for letter in (*_LETTERS, *_INPUTS):
             given = getattr(self, letter)
@@ -292,15 +349,21 @@ class LinearModel:
         return int(self.H.shape[1])
 
     @property
+    def p(self) -> int:
+        """Number of known inputs in each step."""
+        return 0 if self.B is None else int(self.B.shape[2])
+
+    @property
     def cycle(self) -> int:
         """Number of steps after which all four matrices repeat."""
         return math.lcm(*(len(each) for each in (self.Phi, self.H, self.Q, self.R)))
 
     def definite_in(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
-        """Return this model, or a copy with other covariances where those stored in a format would be indefinite.
+        """Return this model, or a copy with covariances repaired so that they stay definite when a format stores them.
 
-        The variances of such a covariance are raised as described in :mod:`gpbnb.filters.covariance`; `repairs` lists
-        the changes. Nothing is changed where that does not help, if `repair` is False, or for stochastic rounding.
+        The variances of a covariance that would become indefinite are raised as described in
+        :mod:`gpbnb.filters.covariance`; `repairs` lists the changes. A covariance stays as it is if that does not help,
+        if `repair` is False, or for stochastic rounding.
         """
         if self.repair is False or fmt.rounding is Rounding.STOCHASTIC:
             return self
@@ -309,24 +372,25 @@ class LinearModel:
     def rounded(self, fmt: FloatFormat | FixedFormat) -> LinearModel:
         """Return the model as a computer with this format stores it, with each entry rounded.
 
-        It is the model of the exact filter with which runs in this format are compared. A run itself opens with the
-        model as given, see :mod:`gpbnb.filters.opening`.
+        Runs in this format are compared with the exact filter of this model. A run itself starts from the model as
+        given; see :mod:`gpbnb.filters.opening`.
 
         Raises
         ------
-        ValueError : a stored covariance is indefinite in spite of :meth:`definite_in`.
+        ValueError : a stored covariance is indefinite, and :meth:`definite_in` could not repair it.
         """
         sound = self.definite_in(fmt)
         stored = {letter: array.to_fractions() for letter, array in sound.arrays(fmt).items()}
-        made = LinearModel(**stored, name=f"{self.name}, in {fmt}", steps=self.steps)
+        made = replace(self, **stored, name=f"{self.name}, in {fmt}", repair=None)
         object.__setattr__(made, "repairs", sound.repairs)
         return made
 
     def arrays(self, fmt: FloatFormat | FixedFormat) -> dict[str, FloatArray]:
-        """Return Phi, H, Q, R, x0, P0 and the inputs there are, with each entry rounded into the format, by letter.
+        """Return the model as a dict of arrays, by letter, with each entry rounded into the format.
 
-        Stochastic rounding starts with its first random number; entries of a covariance below the diagonal are those
-        above it, so that it stays symmetric.
+        The dict holds Phi, H, Q, R, x0, P0 and any inputs and offsets. With stochastic rounding, the random numbers
+        restart from the seed, and entries of a covariance above the diagonal are copied below it, so that the
+        covariance stays symmetric.
 
         Raises
         ------
@@ -346,7 +410,7 @@ class LinearModel:
         return made
 
     def to_float(self) -> dict[str, NDArray[np.float64]]:
-        """Return the nearest float64 of each entry of Phi, H, Q, R, x0 and P0, by letter.
+        """Return a dict, by letter, of Phi, H, Q, R, x0 and P0, with the nearest float64 of each entry.
 
         Raises
         ------
@@ -357,6 +421,7 @@ class LinearModel:
 
 _LETTERS = ("Phi", "H", "Q", "R", "x0", "P0")
 _INPUTS = ("B", "u", "b", "d")
+_CYCLES = ("Phi", "H", "Q", "R", "B")
 _COVARIANCES = {"Q": False, "R": True, "P0": False}  # and whether they must be definite
 
 

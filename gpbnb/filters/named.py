@@ -3,13 +3,27 @@
 from __future__ import annotations
 
 import operator
+import re
+from collections.abc import Iterable
+from fractions import Fraction
 from typing import Any
 
+from gpbnb.arithmetic.kernels.exact import size_text
 from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.filters.array_forms import ALIASES, AnyForm, ArrayForm
-from gpbnb.filters.forms import Form
+from gpbnb.filters.forms import Form, plain_name
 
-__all__ = ["checked_name", "compiled_form", "form_named", "rounding_named", "whole_number"]
+__all__ = [
+    "checked_name",
+    "checked_names",
+    "compiled_form",
+    "form_named",
+    "named",
+    "range_text",
+    "rounding_named",
+    "sized",
+    "whole_number",
+]
 
 
 def form_named(form: AnyForm | str) -> AnyForm:
@@ -29,18 +43,15 @@ def form_named(form: AnyForm | str) -> AnyForm:
     if isinstance(form, (Form, ArrayForm)):
         return form
     if isinstance(form, str):
-        wanted = _plain(form)
+        wanted = plain_name(form)
         if wanted in ALIASES:
             return ALIASES[wanted]
         for each in (*Form, *ArrayForm):
-            if wanted in (each.name, _plain(str(each))):
+            if wanted in (each.name, plain_name(str(each))):
                 return each
     names = ", ".join(repr(each.name.lower()) for each in (*Form, *ArrayForm))
+    names += f", {', '.join(repr(each.lower()) for each in ALIASES)}"
     raise ValueError(f"got form {form!r}; needed one of {names}, or a member of Form or ArrayForm")
-
-
-def _plain(name: str) -> str:
-    return name.strip().upper().replace(" ", "_").replace("-", "_")
 
 
 def compiled_form(form: AnyForm | str) -> Form:
@@ -84,3 +95,68 @@ def checked_name(name: Any) -> str:
     if isinstance(name, str):
         return name
     raise TypeError(f"got name {name!r} of type {type(name).__name__}; needed text")
+
+
+def checked_names(what: str, given: Any, count: int) -> tuple[str, ...]:
+    """Check the names of the states, measurements, inputs or outputs of a model, and return them as a tuple.
+
+    A name may end with a unit, as in "rate (°/s)".
+
+    Raises
+    ------
+    TypeError : the names are not a list of texts.
+    ValueError : another number of names than `count`, or a name that is empty or occurs twice.
+    """
+    if given is None:
+        return ()
+    names = tuple(given) if isinstance(given, (list, tuple)) else (given,)
+    if not all(isinstance(name, str) for name in names):
+        raise TypeError(f"got {what} {given!r}; needed a list of {count} names")
+    if not names:
+        return ()
+    if len(names) != count:
+        raise ValueError(f"got {len(names)} {what}, {', '.join(map(repr, names))}; needed {count} names")
+    if not all(name.strip() for name in names) or len(set(names)) < count:
+        raise ValueError(f"got {what} {', '.join(map(repr, names))}; needed {count} different names that are not empty")
+    return names
+
+
+def named(kind: str, i: int, names: tuple[str, ...]) -> str:
+    """Name one of several states, measurements, inputs or outputs in a message: its name without unit, or its index.
+
+    Examples
+    --------
+    >>> named("state", 1, ("tilt (°)", "rate (°/s)")), named("state", 1, ())
+    ('state "rate"', 'state 1')
+    """
+    return f'{kind} "{_UNIT.sub("", names[i])}"' if names else f"{kind} {i}"
+
+
+_UNIT = re.compile(r"\s*(\([^()]*\)|\[[^][]*\])\s*$")
+
+
+def sized(count: int, kind: str, names: tuple[str, ...]) -> str:
+    """Count states, measurements, inputs or outputs, and list their names.
+
+    Examples
+    --------
+    >>> sized(2, "state", ("tilt (°)", "rate (°/s)")), sized(1, "input", ())
+    ('2 states: tilt (°), rate (°/s)', '1 input')
+    """
+    return f"{count} {kind}{'s' * (count != 1)}{': ' * bool(names)}{', '.join(names)}"
+
+
+def range_text(numbers: Iterable[Fraction]) -> str:
+    """Describe the sizes of the numbers that are not zero.
+
+    Examples
+    --------
+    >>> from fractions import Fraction
+    >>> range_text([Fraction(0), Fraction(-1, 4), Fraction(3)])
+    '0.25 … 3'
+    """
+    sizes = {abs(number) for number in numbers if number}
+    if not sizes:
+        return "0"
+    low, high = size_text(min(sizes)), size_text(max(sizes))
+    return low if low == high else f"{low} … {high}"

@@ -16,6 +16,7 @@ forms, see :mod:`gpbnb.filters.covariance`.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -23,14 +24,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
+from gpbnb.arithmetic.kernels.backends import Compiled, Floats, Pairs, double_doubles
 from gpbnb.arithmetic.kernels.tags import Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.covariance import LARGEST_STORED_SHIFT, Repair, least_shift, raised_until
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.step import factor_each, invert_each
+from gpbnb.filters.kernels.records import pairs_as_double_doubles
+from gpbnb.filters.kernels.step import StepArrays, factor_each, invert_each
 from gpbnb.filters.model import LinearModel
 
 
@@ -66,7 +69,7 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
 
     Parameters
     ----------
-    model : the model as given, not as stored: factors are those of variances as given.
+    model : the model as given, not as stored, because the UD factors are computed from the variances as given.
     fmt : None for double-double.
     tag : arithmetic of the compiled loops, which computes factors and inverses.
 
@@ -116,7 +119,31 @@ def opening(model: LinearModel, fmt: FloatFormat | None, form: Form, tag: Tag) -
     return Opening(Phi, H, Q, R, x0, P0, UQ, UR, U0, RI, tuple(raised), (*stored.repairs, *raised))
 
 
-def as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
+def step_arrays(start: Opening, identity: NDArray[Any], increment: NDArray[Any] | None = None) -> StepArrays:
+    """Return the arrays that the compiled steps of a filter use before the first step.
+
+    Parameters
+    ----------
+    identity : (n, n), packed. increment : (p, n, n), packed, for compensated summation; by default none.
+    """
+    PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (start.Phi, start.H))
+    none, carried = np.zeros((0, *identity.shape), identity.dtype), np.zeros_like(start.x0[:, np.newaxis])
+    return StepArrays(
+        start.Phi,
+        PhiT,
+        start.H,
+        HT,
+        start.Q,
+        start.R,
+        start.RI,
+        identity,
+        none if increment is None else increment,
+        carried,
+        np.zeros(1, dtype=np.int64),
+    )
+
+
+def as_packed(fmt: FloatFormat | FixedFormat | None, values: Any) -> NDArray[Any]:
     """Round numbers into a format, None for double-double, and return them as the compiled loops expect them.
 
     Raises
@@ -125,6 +152,8 @@ def as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
     OverflowError : numbers beyond the range of the format or its compiled loops.
     """
     if fmt is None:
+        if hasattr(values, "to_fractions"):
+            return double_doubles_of(values)
         entries = np.asarray(values)
         if entries.dtype == np.float64:
             if not np.isfinite(entries).all():
@@ -132,6 +161,17 @@ def as_packed(fmt: FloatFormat | None, values: Any) -> NDArray[Any]:
             return np.stack([entries, np.zeros_like(entries)], axis=-1)
         return double_doubles(exact(entries))
     return packed_array(fmt.array(values))
+
+
+def double_doubles_of(array: FloatArray) -> NDArray[np.float64]:
+    """Round the numbers of an array to the nearest double-doubles, (..., 2); exact in base 2 and 16."""
+    backend, parts = array.backend, array.components
+    if isinstance(backend, Floats):
+        return np.stack([parts[0], np.zeros_like(parts[0])], axis=-1)
+    out = np.empty((array.size, 2))
+    if isinstance(backend, Pairs) and pairs_as_double_doubles(parts[0].ravel(), parts[1].ravel(), out) == array.size:
+        return out.reshape(*array.shape, 2)
+    return double_doubles(array.to_fractions())
 
 
 def packed_array(array: FloatArray) -> NDArray[Any]:
@@ -149,6 +189,23 @@ def packed_array(array: FloatArray) -> NDArray[Any]:
             f"got numbers beyond the range of the compiled loops of {array.format}; scale the states{cure}"
         )
     return array.backend.pack(array.components)
+
+
+def widened_array(packed: NDArray[Any]) -> NDArray[np.float64]:
+    """Convert packed numbers of any format to double-double, exactly in base 2 and 16, to the nearest in base 10."""
+    if packed.dtype == np.float64:
+        return np.stack([packed, np.zeros_like(packed)], axis=-1)
+    significands, exponents = packed[..., 0], packed[..., 1]
+    out = np.empty((*significands.shape, 2))
+    known: dict[tuple[int, int], tuple[float, float]] = {}
+    for index in np.ndindex(significands.shape):
+        pair = int(significands[index]), int(exponents[index])
+        if pair not in known:
+            value = Fraction(pair[0]) * Fraction(10) ** pair[1]
+            high = float(value)
+            known[pair] = high, float(value - Fraction(high))
+        out[index] = known[pair]
+    return out
 
 
 def _packed(model: LinearModel, fmt: FloatFormat | None) -> list[NDArray[Any]]:

@@ -1,47 +1,94 @@
 r"""One step of a linear filter as a list of rounded operations, in the order of the compiled kernels.
 
 Covariance and gain of a Kalman filter do not depend on the measurements. Once they are known, the estimate needs only
-products with known coefficients, sums and differences: a *linear program*. The same list of operations serves
-three purposes, so that they cannot disagree:
+products with known coefficients, sums and differences: a *linear program*. A filter given by its transfer function has
+constant coefficients from the start, and each of its structures is another program. The same list of operations serves
+several purposes, so that they cannot disagree:
 
 * :func:`execute` runs it in any format, digit for digit like the filter itself;
-* :func:`functionals` computes the exact linear function of (x, z) that each intermediate value approximates;
-* :func:`effects` computes the effect of a rounding error in each operation on the result of the step.
+* :func:`matrices` and :func:`functionals` compute the linear function of (x, z) that each value approximates;
+* :func:`effects` computes the effect of a rounding error in each operation on the result of the step;
+* :mod:`gpbnb.filters.words` runs it on integers, with formats of their own for coefficients, data and sums;
+* :mod:`gpbnb.wordlength.code` prints it as C.
 
-The coefficients are arguments and not part of the program, because they change from step to step. A product with a zero
-coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
+A step that also computes the covariance is not linear: it multiplies and divides values. :mod:`gpbnb.filters.tracing`
+lists its operations with the same codes, for C code and for :func:`steps_in_python`; the compiled functions here take
+linear programs and limits.
+
+The coefficients are arguments and not part of the program, because they may change from step to step. A product with a
+zero coefficient is exact, and so is a sum with this product; the compiled kernels omit both.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels import doubledouble
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
-from gpbnb.arithmetic.kernels.scalar import add, load, multiply, put, store, subtract
+from gpbnb.arithmetic.kernels.scalar import add, less, load, multiply, put, store, subtract
 from gpbnb.arithmetic.kernels.tags import DoubleDouble
 
-MULTIPLY, ADD, SUBTRACT = 0, 1, 2
+MULTIPLY, ADD, SUBTRACT, AT_LEAST, AT_MOST, PRODUCT, DIVIDE, CONSTANT, CHOOSE = range(9)
+"""Codes of operations. AT_LEAST and AT_MOST limit a value by a coefficient, as a controller limits its output. PRODUCT
+and DIVIDE take two values, CONSTANT is a coefficient. CHOOSE is its first value if the guard of the operation is not
+zero, else its second."""
+
+LINEAR = (MULTIPLY, ADD, SUBTRACT)
+"""Codes of operations that are linear functions of their values."""
+
+_ON_TWO_VALUES = (ADD, SUBTRACT, PRODUCT, DIVIDE, CHOOSE)
+
+DIVISOR, POSITIVE, NOT_NEGATIVE = range(3)
+"""Kinds of checks. A divisor of zero ends a run; a value that should be positive, or not negative, and is not, is the
+sign of a covariance that is no longer definite."""
+
+
+def values_of(code: int, a: int, b: int) -> tuple[int, ...]:
+    """Return the values among the two operands of an operation; the others are coefficients."""
+    if code in _ON_TWO_VALUES:
+        return a, b
+    return () if code == CONSTANT else (b,)
+
+
+class Operations(NamedTuple):
+    """Operations of a step as the compiled loops of the bounds take them; fields of :class:`Program`."""
+
+    operations: NDArray[np.int64]
+    outputs: NDArray[np.int64]
+    groups: NDArray[np.int64]
+    roots: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Program:
     """Operations of one step.
 
+    Values are numbered: the n states, the m inputs, then the result of each operation. After the operations of a step,
+    state i takes the value ``outputs[i]``, all at once. Every state is stored in the format of the data.
+
     Parameters
     ----------
     n, m : number of states and of inputs.
-    operations : (o, 3), code and two operands. Values are numbered: the n states, the m inputs, then the result of each
-        operation. MULTIPLY takes a coefficient and a value; ADD and SUBTRACT take two values.
+    operations : (o, 3), code and two operands. MULTIPLY, AT_LEAST and AT_MOST take a coefficient and a value, CONSTANT
+        a coefficient; all others take two values.
     outputs : (n,), the values that become the states.
     coefficients : number of coefficients.
     groups : (o,), operations whose rounding errors have the same effect on the result share a number.
     roots : for each group, an operation in it.
+    wide : (o,), whether a result stays in the accumulator, if the processor has one: a result that only sums and
+        differences use, unless it is the output of a section. Any other result is stored in the format of the data,
+        with one rounding.
+    p : number of outputs of the system. The last p states hold them, and no operation reads these.
+    state_names, coefficient_names : (n,) and (coefficients,), names for generated code.
+    guards : (o,), for each operation a value that must not be zero for it to run, or -1; empty if all run always.
+    checks : values and what they should be, such as :data:`POSITIVE`.
     """
 
     n: int
@@ -51,11 +98,27 @@ class Program:
     coefficients: int
     groups: NDArray[np.int64]
     roots: NDArray[np.int64]
+    wide: NDArray[np.bool_]
+    p: int = 0
+    state_names: tuple[str, ...] = ()
+    coefficient_names: tuple[str, ...] = ()
+    guards: tuple[int, ...] = ()
+    checks: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def compiled(self) -> Operations:
+        """The operations as the compiled loops of the bounds take them."""
+        return Operations(self.operations, self.outputs, self.groups, self.roots)
 
     @property
     def roundings(self) -> NDArray[np.int64]:
         """Number of operations that share each effect, (groups,)."""
         return np.bincount(self.groups, minlength=len(self.roots))
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether every operation is a linear function of its values."""
+        return bool(np.isin(self.operations[:, 0], LINEAR).all())
 
 
 class Builder:
@@ -64,7 +127,12 @@ class Builder:
     def __init__(self, n: int, m: int) -> None:
         self.n, self.m = n, m
         self._operations: list[tuple[int, int, int]] = []
-        self._signs: dict[tuple[int, int], int] = {}
+        self._guards: list[int] = []
+        self._stored = set[int]()
+        #: The value that must not be zero for the following operations to run; -1 for none.
+        self.guard = -1
+        #: Values and what they should be.
+        self.checks: list[tuple[int, int]] = []
 
     @property
     def states(self) -> list[int]:
@@ -94,35 +162,75 @@ class Builder:
         """Add the product of a matrix of coefficients and a column; see :meth:`row` for each entry."""
         return [self.row([int(c) for c in row], values) for row in matrix]
 
-    def finish(self, outputs: Sequence[int], coefficients: int) -> Program:
+    def at_least(self, coefficient: int, value: int) -> int:
+        return self._append(AT_LEAST, coefficient, value)
+
+    def at_most(self, coefficient: int, value: int) -> int:
+        return self._append(AT_MOST, coefficient, value)
+
+    def append(self, code: int, a: int, b: int = 0) -> int:
+        """Add an operation by its code."""
+        return self._append(code, a, b)
+
+    def stored(self, value: int) -> int:
+        """Store a value in the format of the data even if only sums use it."""
+        self._stored.add(value)
+        return value
+
+    def finish(
+        self,
+        outputs: Sequence[int],
+        coefficients: int,
+        p: int = 0,
+        state_names: Sequence[str] = (),
+        coefficient_names: Sequence[str] = (),
+    ) -> Program:
         operations = np.array(self._operations, dtype=np.int64).reshape(-1, 3)
-        groups, roots = _grouped(operations, list(outputs), self.n + self.m)
+        users = _users(operations, self.n + self.m)
+        groups, roots = _grouped(operations, users, list(outputs), self.n + self.m)
+        sums = [bool(used) and all(operations[o][0] in (ADD, SUBTRACT) for o in used) for used in users]
+        stored = self._stored | set(outputs)
+        wide = [each and self.n + self.m + o not in stored for o, each in enumerate(sums)]
         return Program(
             self.n,
             self.m,
             operations,
             np.array(outputs, dtype=np.int64),
             coefficients,
-            np.array(groups),
-            np.array(roots),
+            np.array(groups, dtype=np.int64),
+            np.array(roots, dtype=np.int64),
+            np.array(wide, dtype=np.bool_),
+            p,
+            tuple(state_names),
+            tuple(coefficient_names),
+            tuple(self._guards) if max(self._guards, default=-1) >= 0 else (),
+            tuple(self.checks),
         )
 
     def _append(self, code: int, a: int, b: int) -> int:
         self._operations.append((code, a, b))
+        self._guards.append(self.guard)
         return self.n + self.m + len(self._operations) - 1
 
 
-def _grouped(operations: NDArray[np.int64], outputs: list[int], first: int) -> tuple[list[int], list[int]]:
-    """Number the effects: an operation used once, as a term of a sum, has the effect of that sum, up to its sign."""
+def _users(operations: NDArray[np.int64], first: int) -> list[list[int]]:
+    """List the operations that use the result of each operation."""
     users: list[list[int]] = [[] for _ in operations]
-    for o, (code, a, b) in enumerate(operations):
-        for value in (b,) if code == MULTIPLY else (a, b):
+    for o, (code, a, b) in enumerate(operations.tolist()):
+        for value in values_of(code, a, b):
             if value >= first:
                 users[value - first].append(o)
+    return users
+
+
+def _grouped(
+    operations: NDArray[np.int64], users: list[list[int]], outputs: list[int], first: int
+) -> tuple[list[int], list[int]]:
+    """Number the effects: an operation used once, as a term of a sum, has the effect of that sum, up to its sign."""
     groups, roots = [-1] * len(operations), list[int]()
     for o in range(len(operations) - 1, -1, -1):
         used = users[o]
-        if len(used) == 1 and operations[used[0]][0] != MULTIPLY and first + o not in outputs:
+        if len(used) == 1 and operations[used[0]][0] in (ADD, SUBTRACT) and first + o not in outputs:
             groups[o] = groups[used[0]]
         else:
             groups[o] = len(roots)
@@ -147,15 +255,25 @@ def loop_program(n: int, m: int) -> Program:
     return build.finish([build.add(a, b) for a, b in zip(u, v, strict=True)], count)
 
 
-def innovation_program(n: int, m: int) -> Program:
-    r"""Innovation form, (98): :math:`u + \hat K(z - Hu)`, :math:`u = \Phi x`; coefficients Φ (n, n), H (m, n), K."""
+def innovation_program(n: int, m: int, p: int = 0) -> Program:
+    r"""Innovation form, (98): :math:`u + \hat K(z - Hu)`, :math:`u = \Phi x`; coefficients Φ (n, n), H (m, n), K.
+
+    The first p states are outputs as well.
+    """
     (Phi, H, K), count = coefficient_matrices((n, n), (m, n), (n, m))
-    build = Builder(n, m)
-    u = build.product(Phi, build.states)
+    build = Builder(n + p, m)
+    u = build.product(Phi, build.states[:n])
     y = build.product(H, u)
     g = [build.subtract(z, a) for z, a in zip(build.inputs, y, strict=True)]
     v = build.product(K, g)
-    return build.finish([build.add(a, b) for a, b in zip(u, v, strict=True)], count)
+    x = [build.add(a, b) for a, b in zip(u, v, strict=True)]
+    names = entries("Phi", n, n) + entries("H", m, n) + entries("K", n, m)
+    return build.finish([*x, *x[:p]], count, p, [*entries("x", n), *entries("y", p)], names)
+
+
+def entries(letter: str, *shape: int) -> list[str]:
+    """Name the entries of a matrix as C does, from 0."""
+    return [letter + "".join(f"[{i}]" for i in index) for index in np.ndindex(shape)]
 
 
 def sequential_program(n: int, m: int) -> Program:
@@ -179,44 +297,12 @@ def sequential_program(n: int, m: int) -> Program:
     return build.finish(x, count)
 
 
-def state_space_program(n: int, m: int) -> Program:
-    """Program of a filter :math:`Ax + Bz`, each row one sum from left to right; coefficients A (n, n), B (n, m)."""
-    (A, B), count = coefficient_matrices((n, n), (n, m))
-    build = Builder(n, m)
-    inputs = [*build.states, *build.inputs]
-    return build.finish(build.product(np.hstack([A, B]), inputs), count)
-
-
-def biquad_program() -> Program:
-    """Program of a second-order section, transposed direct form II; states s1, s2, output; b0, b1, b2, a1, a2."""
-    build = Builder(3, 1)
-    (s1, s2, _), (z,) = build.states, build.inputs
-    y = build.add(build.multiply(0, z), s1)
-    first = build.subtract(build.add(build.multiply(1, z), s2), build.multiply(3, y))
-    second = build.subtract(build.multiply(2, z), build.multiply(4, y))
-    return build.finish([first, second, y], 5)
-
-
-def controller_program() -> Program:
-    """Program of a PID controller with a decaying integral; the states are integral, last error and output.
-
-    The coefficients are ``leak, Ki, Kp, Kd``. The integral becomes leak · integral + Ki e, and the output
-    Kp e + integral + Kd (e - last e).
-    """
-    build = Builder(3, 1)
-    (integral, last, _), (error,) = build.states, build.inputs
-    integral = build.add(build.multiply(0, integral), build.multiply(1, error))
-    steep = build.multiply(3, build.subtract(error, last))
-    output = build.add(build.add(build.multiply(2, error), integral), steep)
-    return build.finish([integral, error, output], 4)
-
-
 # -- execution --------------------------------------------------------------------------------------------------------
 
 
 @inner
 def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, z: Any, values: Any) -> None:
-    """Take one step in the arithmetic of a tag: x becomes the next state; `values` is a workspace."""
+    """Take one step in the arithmetic that the tag selects, and overwrite x and the workspace `values`."""
     n, m = x.shape[0], z.shape[0]
     for i in range(n):
         put(fmt, values, i, load(fmt, x, i))
@@ -229,8 +315,12 @@ def execute(fmt: Any, operations: Any, outputs: Any, coefficients: Any, x: Any, 
             put(fmt, values, n + m + o, multiply(fmt, load(fmt, coefficients, a), right))
         elif code == ADD:
             put(fmt, values, n + m + o, add(fmt, load(fmt, values, a), right))
-        else:
+        elif code == SUBTRACT:
             put(fmt, values, n + m + o, subtract(fmt, load(fmt, values, a), right))
+        else:
+            limit = load(fmt, coefficients, a)
+            beyond = less(fmt, right, limit) if code == AT_LEAST else less(fmt, limit, right)
+            put(fmt, values, n + m + o, limit if beyond else right)
     for i in range(n):
         store(fmt, x, i, load(fmt, values, outputs[i]))
 
@@ -256,14 +346,59 @@ def steps_in_python(
 ) -> list[Any]:
     """Take one step with numbers of any type, each result rounded by a function; slow and obvious."""
     values = [*x, *z]
-    for code, a, b in program.operations.tolist():
-        left = coefficients[a] if code == MULTIPLY else values[a]
-        exactly = left * values[b] if code == MULTIPLY else left + values[b] if code == ADD else left - values[b]
-        values.append(round_(exactly))
+    for (code, a, b), guard in zip(
+        program.operations.tolist(), program.guards or (-1,) * len(program.operations), strict=True
+    ):
+        chosen = guard < 0 or values[guard] != 0
+        if code == CHOOSE:
+            values.append(values[a] if chosen else values[b])
+        elif not chosen:
+            values.append(None)
+        elif code in _EXACT:
+            values.append(round_(_EXACT[code](values[a], values[b])))
+        elif code == MULTIPLY:
+            values.append(round_(coefficients[a] * values[b]))
+        elif code == CONSTANT:
+            values.append(coefficients[a])
+        else:
+            values.append(max(coefficients[a], values[b]) if code == AT_LEAST else min(coefficients[a], values[b]))
     return [values[i] for i in program.outputs]
 
 
+_EXACT = {ADD: operator.add, SUBTRACT: operator.sub, PRODUCT: operator.mul, DIVIDE: operator.truediv}
+
+
 # -- linear functions -------------------------------------------------------------------------------------------------
+
+
+def exact_functionals(program: Program, coefficients: Sequence[Any] | NDArray[Any]) -> list[dict[int, Fraction]]:
+    """Return the exact linear function of (x, z) that each value approximates, as its nonzero coefficients.
+
+    A value with limits is treated as if it stayed within them.
+    """
+    rows = [{i: Fraction(1)} for i in range(program.n + program.m)]
+    for code, a, b in program.operations.tolist():
+        if code == MULTIPLY:
+            factor = coefficients[a]
+            rows.append({j: factor * c for j, c in rows[b].items()} if factor else {})
+        elif code in (ADD, SUBTRACT):
+            row = dict(rows[a])
+            for j, c in rows[b].items():
+                row[j] = row.get(j, 0) + (c if code == ADD else -c)
+            rows.append({j: c for j, c in row.items() if c})
+        else:
+            rows.append(rows[b])
+    return rows
+
+
+def matrices(program: Program, coefficients: Sequence[Any] | NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return the exact A, (n, n), and B, (n, m), of a step; see :func:`exact_functionals`."""
+    rows = exact_functionals(program, coefficients)
+    whole = np.full((program.n, program.n + program.m), Fraction(0), dtype=object)
+    for i, value in enumerate(program.outputs.tolist()):
+        for j, c in rows[value].items():
+            whole[i, j] = c
+    return whole[:, : program.n], whole[:, program.n :]
 
 
 @compiled

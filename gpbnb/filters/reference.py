@@ -6,6 +6,8 @@ The innovation form subtracts most of a large variance when a sensor is precise.
 
 from __future__ import annotations
 
+import operator
+from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -13,7 +15,11 @@ import numpy as np
 from flint import arb, arb_mat, ctx, fmpq
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import Algebra, Inverse
+from gpbnb.arithmetic.conversion import exact_fraction
 from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel, corrected, gain, predicted, updated
 from gpbnb.filters.model import LinearModel
 
 BITS = 256
@@ -47,19 +53,35 @@ def precise_steps(model: LinearModel, z: Any) -> list[Step]:
     ------
     ArithmeticError : results that depend on the number of bits, up to :data:`MOST_BITS`; too many steps.
     """
-    if len(z) > MOST_STEPS:
+    measured = exact(z)
+    return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
+
+
+def agreed(name: str, count: int, steps: Callable[[int], list[Step] | None]) -> list[Step]:
+    """Return steps in bits that agree with twice as many.
+
+    Parameters
+    ----------
+    name : name of the model. count : number of steps.
+    steps : function that returns all steps in a number of bits, or None if they cannot be computed in them.
+
+    Raises
+    ------
+    ArithmeticError : results that depend on the number of bits, up to :data:`MOST_BITS`; too many steps.
+    """
+    if count > MOST_STEPS:
         raise ArithmeticError(
-            f"{model.name}: its reference needs more than double-double, and {len(z):,} steps; needed at most "
+            f"{name}: its reference needs more than double-double, and {count:,} steps; needed at most "
             f"{MOST_STEPS:,}: R is very small beside H P H', or P0 very large; scale or correct the model"
         )
-    measured, bits, found = exact(z), BITS, None
+    bits, found = BITS, None
     while bits <= MOST_BITS:
-        before, found = found, _steps(model, measured, bits)
+        before, found = found, steps(bits)
         if before and found and _agree(before, found):
             return found
         bits *= 2
     raise ArithmeticError(
-        f"{model.name}: its reference is not determined in {MOST_BITS} bits; the innovation covariance may be "
+        f"{name}: its reference is not determined in {MOST_BITS} bits; the innovation covariance may be "
         "singular: scale or correct the model"
     )
 
@@ -77,31 +99,56 @@ def _steps(model: LinearModel, z: NDArray[Any], bits: int) -> list[Step] | None:
     """Return all steps in some bits; None if an innovation covariance is singular in them."""
     found: list[Step] = []
     with ctx.workprec(bits):
-        Phi, H, Q, R = ([_matrix(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R))
-        x, P = _matrix(model.x0[:, None]), _matrix(model.P0)
+        cycles = [[_Balls.of(each) for each in cycle] for cycle in (model.Phi, model.H, model.Q, model.R)]
+        x, P = _Balls.of(model.x0[:, None]), _Balls.of(model.P0)
         for k, measured in enumerate(z):
-            phi, h = Phi[k % len(Phi)], H[k % len(H)]
+            Phi, H, Q, R = (cycle[k % len(cycle)] for cycle in cycles)
             state, offset = model.known(k)
-            predicted = (phi * P * phi.transpose() + Q[k % len(Q)]).mid()
-            PH = predicted * h.transpose()
+            V = predicted(_ALGEBRA, Phi, P, Q)
             try:
-                K = (PH * (h * PH + R[k % len(R)]).mid().inv()).mid()
+                K = gain(_ALGEBRA, H, R, V).K
             except ZeroDivisionError:
                 return None
-            P = (predicted - K * h * predicted).mid()
-            ahead = phi * x + _matrix(state[:, None])
-            x = (ahead + K * (_matrix((measured - offset)[:, None]) - h * ahead)).mid()
-            found.append((_fractions(x)[:, 0], _fractions(K), _fractions(P)))
+            P = updated(_ALGEBRA, Form.INNOVATION, StepModel(Phi, H, Q, R), V, K)
+            ahead = Phi @ x + _Balls.of(state[:, None])
+            x = corrected(_ALGEBRA, H, K, ahead, _Balls.of((measured - offset)[:, None]))
+            found.append((_fractions(x.matrix)[:, 0], _fractions(K.matrix), _fractions(P.matrix)))
     return found
 
 
-def _matrix(entries: NDArray[Any]) -> arb_mat:
-    return arb_mat([[arb(fmpq(each.numerator, each.denominator)) for each in row] for row in entries])
+class _Balls:
+    """A matrix of python-flint's numbers; only the midpoint of each result is kept."""
+
+    def __init__(self, matrix: arb_mat) -> None:
+        self.matrix, self.shape = matrix, (matrix.nrows(), matrix.ncols())
+
+    @classmethod
+    def of(cls, entries: NDArray[Any]) -> _Balls:
+        return cls(arb_mat([[arb(fmpq(each.numerator, each.denominator)) for each in row] for row in entries]))
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    @property
+    def T(self) -> _Balls:
+        return _Balls(self.matrix.transpose())
+
+    def __add__(self, other: _Balls) -> _Balls:
+        return _Balls((self.matrix + other.matrix).mid())
+
+    def __sub__(self, other: _Balls) -> _Balls:
+        return _Balls((self.matrix - other.matrix).mid())
+
+    def __matmul__(self, other: _Balls) -> _Balls:
+        return _Balls((self.matrix * other.matrix).mid())
+
+
+_ALGEBRA = Algebra(
+    lambda n: _Balls(arb_mat(n, n, [int(i == j) for i in range(n) for j in range(n)])),
+    operator.matmul,
+    lambda a, identity: Inverse(_Balls(a.matrix.inv().mid()), []),
+)
 
 
 def _fractions(matrix: arb_mat) -> NDArray[Any]:
-    def entry(value: arb) -> Fraction:
-        mantissa, exponent = value.mid().man_exp()
-        return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
-
-    return np.array([[entry(value) for value in row] for row in matrix.tolist()], dtype=object)
+    return np.array([[exact_fraction(value.mid()) for value in row] for row in matrix.tolist()], dtype=object)

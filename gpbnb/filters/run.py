@@ -1,4 +1,4 @@
-"""A resumable filter run with every operation rounded, or in double-double as the reference."""
+"""A resumable filter run with every operation rounded, or in double-double as the reference, of one record or many."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,30 @@ from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled, double_doubles
-from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Tag
+from gpbnb.arithmetic.kernels.tags import Decimal, DoubleDouble, Free, Hardware32, Hardware64, Tag
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Order
+from gpbnb.filters.blocks import BlockFormats
+from gpbnb.filters.bounded_steps import Bounds, CarriedBound, Taken
+from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.factors import combined_gain, covariance_of_factors
 from gpbnb.filters.forms import Form
 from gpbnb.filters.kernels.bounded import widen
-from gpbnb.filters.kernels.step import DONE, INDEFINITE, NEXT_CHECKPOINT, QUANTITIES, STOPPED, advance, advance_ud
+from gpbnb.filters.kernels.records import pairs_as_floats
+from gpbnb.filters.kernels.step import (
+    DONE,
+    INDEFINITE,
+    NEXT_CHECKPOINT,
+    QUANTITIES,
+    STOPPED,
+    FactorArrays,
+    StepArrays,
+    advance,
+    advance_ud,
+)
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import compiled_form
-from gpbnb.filters.opening import as_packed, opening
+from gpbnb.filters.opening import Opening, as_packed, opening, step_arrays
 from gpbnb.filters.reference import precise_steps
 
 LEAST_SHARE = 2.0**-60
@@ -34,44 +48,80 @@ BLOCK = 256
 """Number of steps whose results are kept at a time."""
 
 
+RECORDS_BLOCK = 1024
+"""Number of steps whose estimates of all records are kept at a time."""
+
+
+class Sums(NamedTuple):
+    """How a filter adds up the terms of its matrix products.
+
+    Parameters
+    ----------
+    fused : whether products are added by fused multiply-add; base 2 or 16.
+    fmt : the format that keeps a sum until it is stored; by default that of the run.
+    order, block : order of the additions, as for :func:`gpbnb.arithmetic.linalg.matmul`. Orders other than "left" need
+        base 2 or 16, and a form other than UD, which has few matrix products.
+    """
+
+    fused: bool = False
+    fmt: FloatFormat | FixedFormat | None = None
+    order: Order = "left"
+    block: int = 32
+
+
+LEFT_TO_RIGHT = Sums()
+"""Each product and each sum is rounded in the format of the run, from left to right."""
+
+
 class Run:
     """A resumable run of a filter: inputs, state and checkpoints.
 
     Parameters
     ----------
     model : n states, m measurements.
-    fmt : the format in which everything is stored and computed; None for double-double.
+    fmt : the format in which everything is stored and computed, or formats for its blocks; None for double-double.
     form : form in which a step is computed, or its name, such as "UD".
     checkpoint_steps : steps, 1 or more, after which estimate, gain and covariance are saved, in ascending order.
-    fused : whether products are added by fused multiply-add; base 2 or 16.
-    sums : the format that keeps the sums of matrix products until they are stored; `fmt` itself by default.
+    sums : how the terms of matrix products are added up.
     compensated : whether the estimate is updated by Kahan's compensated summation, which carries the rounding error of
         a step over to the next; only for the innovation form and Joseph's.
-    order, block : order of the additions in matrix products, as for :func:`gpbnb.arithmetic.linalg.matmul`. Orders
-        other than "left" need base 2 or 16, and a form other than UD, which has few matrix products.
+    bounded : whether to compute the contraction bound, :mod:`gpbnb.filters.contraction`, along with the run: a bound of
+        its errors or, in double-double, of its distance from the exact filter.
+    records : number of measurement records. Covariance and gain do not depend on the measurements and are computed
+        once; the estimates of all records are the columns of one matrix, and have the same digits as in separate runs.
+        Many records
+        need :meth:`carry` and a form other than UD, which computes gain and estimate together.
 
     Raises
     ------
-    ValueError : a format or form without compiled loops; checkpoint steps that do not ascend; compensation or another
-        order of additions in a form that does not have it; covariances that lose their definiteness when they are
-        factored or inverted in this format, see :mod:`gpbnb.filters.opening`.
-    TypeError : `sums` is not a format.
+    ValueError : a format or form without compiled loops; a bound in a format whose overflow raises no error; checkpoint
+        steps that do not ascend; formats of blocks with other sums, compensation, a bound or many records;
+        compensation or another order of additions in a form that does not have it; covariances that lose their
+        definiteness when they are factored or inverted in this format, see :mod:`gpbnb.filters.opening`; many records
+        with the UD form, a bound or checkpoints.
+    TypeError : the format in `sums` is not a format.
     OverflowError : the model has entries beyond the range of the format's backend.
     """
 
     def __init__(
         self,
         model: LinearModel,
-        fmt: FloatFormat | None,
+        fmt: FloatFormat | BlockFormats | None,
         form: Form | str,
         checkpoint_steps: Sequence[int],
-        fused: bool = False,
-        sums: FloatFormat | FixedFormat | None = None,
+        sums: Sums = LEFT_TO_RIGHT,
         compensated: bool = False,
-        order: Order = "left",
-        block: int = 32,
+        bounded: bool = False,
+        records: int = 1,
     ) -> None:
         model.refuse_inputs("a run in compiled loops")
+        #: Formats of the blocks, if they have their own; `fmt` is then that of the model.
+        self.block_formats = fmt if isinstance(fmt, BlockFormats) else None
+        if self.block_formats is not None and (sums != LEFT_TO_RIGHT or compensated or bounded or records != 1):
+            raise ValueError(
+                "got formats of blocks with sums, compensated, bounded or many records; needed none of them"
+            )
+        fmt = fmt.model if isinstance(fmt, BlockFormats) else fmt
         self.model, self.fmt, self.form = model, fmt, compiled_form(form)
         steps = np.array(checkpoint_steps).reshape(-1)
         if steps.size and steps.dtype.kind not in "iu":
@@ -83,35 +133,86 @@ class Run:
             )
         if fmt is not None:
             fmt.check_compiled()
-        if sums is not None and not isinstance(sums, (FloatFormat, FixedFormat)):
-            raise TypeError(f"sums: got {sums!r}; needed a FloatFormat or a FixedFormat")
+            if bounded and fmt.overflow != "raise":
+                raise ValueError(
+                    f"got a bound along with a run in {fmt}; needed overflow 'raise': a result that leaves the range "
+                    "would be wrong by more than any rounding"
+                )
+        if not isinstance(sums, Sums):
+            raise TypeError(f"sums: got {sums!r}; needed Sums(...), such as Sums(fmt=BINARY32)")
+        if sums.fmt is not None and not isinstance(sums.fmt, (FloatFormat, FixedFormat)):
+            raise TypeError(f"sums: got {sums.fmt!r}; needed a FloatFormat or a FixedFormat")
         if compensated and self.form not in (Form.INNOVATION, Form.JOSEPH):
             raise ValueError(
                 f"got compensated summation in the {self.form} form; needed the innovation form or Joseph's"
             )
-        if order != "left" and self.form is Form.UD:
-            raise ValueError(f"got {order} sums in the UD form; needed another form")
+        if sums.order != "left" and self.form is Form.UD:
+            raise ValueError(f"got {sums.order} sums in the UD form; needed another form")
+        if records != 1 and (records < 1 or self.form is Form.UD or bounded or len(steps)):
+            raise ValueError(
+                f"got the {self.form} form and {records} records; needed at least one record, and for many no "
+                "bound, no checkpoints, and a form whose gain does not depend on the measurements: any but UD"
+            )
         #: The arithmetic of the compiled loops.
-        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(fused, sums, order, block)
+        self.tag: Tag = DoubleDouble() if fmt is None else fmt.run_tag(*sums)
         start = opening(model, fmt, self.form, self.tag)
+        if self.block_formats is not None:
+            self.tag, start = self.block_formats.run_tag(), self._in_blocks(start, self.block_formats)
         #: Changes of the covariances, including those of the model.
         self.repairs = list(start.repairs)
-        PhiT, HT = (np.ascontiguousarray(np.swapaxes(each, 1, 2)) for each in (start.Phi, start.H))
         n, m, count = model.n, model.m, len(self.checkpoint_steps)
-        identity = self.as_packed(np.eye(n, dtype=int))
-        self.x = np.ascontiguousarray(start.x0[:, np.newaxis])
+        self.records = records
+        self.x = np.ascontiguousarray(np.repeat(start.x0[:, np.newaxis], records, axis=1))
         self.P = start.U0 if self.form is Form.UD else start.P0
         self.UQ, self.UR = start.UQ, start.UR
         self.X, self.G, self.C = (
-            np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, 1), (n, m), (n, n))
+            np.zeros((count, *shape, *self.x.shape[2:]), self.x.dtype) for shape in ((n, records), (n, m), (n, n))
         )
         self.notes = np.zeros(4, dtype=np.int64)
-        increment = self.as_packed(model.Phi - np.eye(n, dtype=int) if compensated else np.zeros((0, n, n)))
-        self._place = np.zeros(1, dtype=np.int64)  # of QUANTITIES
-        rest = (identity, increment, np.zeros_like(self.x), self._place)
-        self.matrices = (start.Phi, PhiT, start.H, HT, start.Q, start.R, start.RI, *rest)
+        identity = np.eye(n, dtype=int)
+        increment = self.as_packed(model.Phi - identity) if compensated else None
+        self.matrices = step_arrays(start, self.as_packed(identity), increment)
+        self._step_tag: Tag = Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
+        self._stepped = self._as_stepped(self.matrices)
         #: Why the run stopped, if it did.
         self.reason = ""
+        self._carried: CarriedBound | None = None
+        if bounded:
+            stored = model if fmt is None else model.rounded(fmt)
+            first = covariance_of_factors(self.exactly(self.P)) if self.form is Form.UD else None
+            self._carried = CarriedBound(stored, self.form, first, self.checkpoint_steps)
+
+    def _in_blocks(self, start: Opening, formats: BlockFormats) -> Opening:
+        """Return a start whose state and covariance are rounded into the formats of their blocks."""
+        x0, P0, U0 = map(self.exactly, (start.x0, start.P0, start.U0))
+        covariance = formats.covariance
+        return start._replace(
+            x0=as_packed(formats.state, x0), P0=as_packed(covariance, P0), U0=as_packed(covariance, U0)
+        )
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the run also computes its contraction bound."""
+        return self._carried is not None
+
+    @property
+    def bounds(self) -> Bounds:
+        """Bounds of the errors at the checkpoint steps."""
+        return self._bound_taken_along().saved
+
+    @property
+    def bound(self) -> Contraction:
+        """The contraction bound after the last step; set it to continue from another one."""
+        return self._bound_taken_along().now
+
+    @bound.setter
+    def bound(self, value: Contraction) -> None:
+        self._bound_taken_along().now = value
+
+    def _bound_taken_along(self) -> CarriedBound:
+        if self._carried is None:
+            raise ValueError("got a run without its bound; needed bounded=True")
+        return self._carried
 
     @property
     def steps(self) -> int:
@@ -128,10 +229,20 @@ class Run:
         """The step at which a division by zero, or a number beyond the range of the backend, ended the run."""
         return int(self.notes[STOPPED]) or None
 
+    def _as_stepped(self, matrices: StepArrays) -> StepArrays:
+        """The matrices as the compiled step takes them: those of the processor's binary32 as float32."""
+        if not isinstance(self.tag, Hardware32) or self.form is Form.UD:
+            return matrices
+        floats = [each.astype(np.float32) for each in matrices[:-1]]
+        return StepArrays._make([*floats, matrices.place])
+
     def take(self, z: Any) -> None:
         """Continue by as many steps as there are measurements, (steps, m); a run that has stopped does not continue."""
         self.model.check_measurements(z, self.steps)
         if self.stopped:
+            return
+        if self._carried is not None:
+            self._take_bounded(self._carried, self.pack_measurements(z))
             return
         try:
             self.advance(self.pack_measurements(z), (self.checkpoint_steps, self.X, self.G, self.C), self.notes)
@@ -141,6 +252,69 @@ class Run:
         else:
             if self.stopped:
                 self.reason = f"a zero pivot in the innovation covariance at step {self.stopped}"
+
+    def _take_bounded(self, carried: CarriedBound, z: NDArray[Any]) -> None:
+        """Take steps with packed measurements, keep the results of a block at a time, and take the bound over it."""
+        exact_z = widened(z) if z.dtype == np.float64 else double_doubles(self.exactly(z))
+        for begin in range(0, len(z), BLOCK):
+            first, end = self.steps, begin + BLOCK
+            x, K, P = self.take_block(z[begin:end])
+            if done := len(x) - 1:
+                each = (widened(part) for part in (x, P, K[1:], self.UR))
+                carried.take(first, Taken(exact_z[begin : begin + done], *each))
+            if self.stopped:
+                return
+
+    def carry(self, z: NDArray[np.float64], states: int) -> NDArray[np.float64]:
+        """Take the next measurements of all records.
+
+        Parameters
+        ----------
+        z : (steps, m, records).
+        states : number of first states to return.
+
+        Returns
+        -------
+        estimates : (steps, states, records), the nearest float64; NaN from the step at which the filter stopped.
+        """
+        if np.ndim(z) != 3 or np.shape(z)[1:] != (self.model.m, self.records):
+            raise ValueError(f"got measurements of shape {np.shape(z)}; needed (steps, {self.model.m}, {self.records})")
+        out = np.full((len(z), states, self.records), np.nan)
+        for begin in range(0, len(z), RECORDS_BLOCK):
+            if self.stopped:
+                break
+            x = self.take_block(self.as_packed(z[begin : begin + RECORDS_BLOCK]))[0][1:, :states]
+            some = out[begin : begin + len(x)]
+            if x.dtype == np.float64:
+                some[:] = x if x.ndim == 3 else x[..., 0]
+            else:
+                pairs_as_floats(x, some)
+        return out
+
+    def use_measurement_matrices(self, H: NDArray[np.float64], decimals: int | None = None) -> None:
+        """Replace the cycle of measurement matrices, (p, m, n), whose entries are rounded into the format.
+
+        Parameters
+        ----------
+        decimals : if given, entries are first rounded to this number of decimals, which is exact in base 10 and fast.
+        """
+        if np.shape(H)[1:] != (self.model.m, self.model.n):
+            raise ValueError(f"got H of shape {np.shape(H)}; needed (p, {self.model.m}, {self.model.n})")
+        if decimals is not None and self.fmt is not None and self.fmt.base == 10:
+            packed = self.as_packed(np.rint(H * 10.0**decimals))
+            packed[..., 1] -= np.where(packed[..., 0] == 0, 0, decimals)
+        else:
+            packed = self.as_packed(H)
+        self.matrices = self.matrices._replace(H=packed, HT=np.ascontiguousarray(np.swapaxes(packed, 1, 2)))
+        new = self._as_stepped(self.matrices)
+        self._stepped = self._stepped._replace(H=new.H, HT=new.HT)
+
+    def save_at(self, checkpoint_steps: NDArray[np.int64]) -> None:
+        """Save the results of other steps, at most as many as before, in place of all results saved so far."""
+        self.checkpoint_steps = checkpoint_steps
+        self.notes[NEXT_CHECKPOINT] = 0
+        if self._carried is not None:
+            self._carried.checkpoint_steps = checkpoint_steps
 
     def states(self, z: Any) -> NDArray[np.float64]:
         """Continue by as many steps as there are measurements, (steps, m), and return all estimates.
@@ -164,13 +338,14 @@ class Run:
 
     def pack_measurements(self, z: Any) -> NDArray[Any]:
         """Round measurements (steps, m) into the format, as :meth:`advance` expects them."""
-        packed = self.as_packed(z)
+        packed = as_packed(self.fmt if self.block_formats is None else self.block_formats.state, z)
         return packed.reshape(len(packed), self.model.m, 1, *packed.shape[2:])
 
     def take_block(self, z: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
         """Take some steps with packed measurements; return estimates, gains and covariances, or factors.
 
-        The first of each is that before these steps, for the gain zeros; one follows for each step done.
+        The first entry of each is the value before these steps (zeros for the gain), followed by one entry for each
+        step done.
         """
         first, at = self.steps, int(self.notes[NEXT_CHECKPOINT])
         x, K, P = (np.zeros((len(z) + 1, *each.shape[1:]), each.dtype) for each in (self.X, self.G, self.C))
@@ -202,20 +377,31 @@ class Run:
 
         Raises
         ------
-        OverflowError, ZeroDivisionError : one more step than are noted as done came to that.
+        OverflowError, ZeroDivisionError : the step after the last one noted as done overflowed or divided by zero.
         """
         if self.form is Form.UD:
-            Phi, _, H, HT, *_ = self.matrices
-            factors = Phi, H, HT, self.UQ, self.UR, self._place
+            each = self.matrices
+            factors = FactorArrays(each.Phi, each.H, each.HT, self.UQ, self.UR, each.place)
             advance_ud(self.tag, factors, z, self.steps, self.x, self.P, kept, notes)
-        else:
-            repeated = kept[1][:0], kept[3][:0], self.UR[:0]
-            advance(self.tag, int(self.form), self.matrices, z, self.steps, self.x, self.P, repeated, kept, notes)
+            return
+        steps, *results = kept
+        given = [z, self.x, self.P, self.UR[:0], *results]
+        used = [each.astype(self._stepped.Phi.dtype, copy=False) for each in given]
+        z, x, P, none, *found = used
+        try:
+            repeated = found[0][:0], found[2][:0], none
+            advance(
+                self._step_tag, int(self.form), self._stepped, z, self.steps, x, P, repeated, (steps, *found), notes
+            )
+        finally:
+            for old, new in zip(given[1:], used[1:], strict=True):
+                if old is not new:
+                    old[...] = new
 
     def stopped_by(self, error: ArithmeticError) -> str:
         """Name the cause that ended the last step, as in "overflow in the gain at step 812"."""
         kind = "overflow" if isinstance(error, OverflowError) else "a division by zero"
-        return f"{kind} in {QUANTITIES[int(self._place[0])]} at step {self.stopped}"
+        return f"{kind} in {QUANTITIES[int(self.matrices.place[0])]} at step {self.stopped}"
 
     def as_packed(self, values: Any) -> NDArray[Any]:
         """Round numbers into the format, and return them as the compiled loops expect them."""
@@ -242,7 +428,7 @@ class Run:
     def _from_factors(self, K: NDArray[Any], U: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return gains and covariances from factors and from the gains of one measurement after the other."""
         gains, covariances = np.empty_like(K), np.empty_like(U)
-        H, UR = self.exactly(self.matrices[2]), self.exactly(self.UR)
+        H, UR = self.exactly(self.matrices.H), self.exactly(self.UR)
         for at, step in enumerate(self.checkpoint_steps[: len(K)] - 1):
             gains[at] = combined_gain(list(K[at].T), UR[step % len(UR)], H[step % len(H)])
             covariances[at] = covariance_of_factors(U[at])
@@ -277,11 +463,11 @@ class Checkpoints:
 
 
 def log_spaced(steps: int, per_decade: int = 4) -> tuple[int, ...]:
-    """Return steps from 1 to the last, at equal ratios.
+    """Return steps from 1 to the last one, each larger than the one before by about the same factor.
 
     Raises
     ------
-    ValueError : no steps, or none per decade.
+    ValueError : the number of steps, or of steps per decade, is less than 1.
     """
     if steps < 1 or per_decade < 1:
         raise ValueError(f"got {steps} steps, {per_decade} per decade; needed both at least 1")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.filters.covariance import factor
+from gpbnb.arithmetic.definiteness import factor
 from gpbnb.filters.kernels.simulation import measured
 from gpbnb.filters.model import LinearModel
 
@@ -19,6 +19,13 @@ BLOCK = 4096
 
 #: Bits by which the resolution is finer than the noise.
 FINE_BITS = 30
+
+
+MOST_SIMULATED = 10**8
+"""Largest number of steps to simulate. A small model takes about a second for a million steps."""
+
+SINE_PERIOD = 100
+"""Steps in a period of a simulated sine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +37,7 @@ class Simulation:
     model : model of the truth and of its measurement.
     start : (n,), the truth at step 0.
     seed : seed of the noise; ``default_rng([seed, b])`` draws block b.
-    resolution : unit to whose multiples measurements are rounded, as in an analogue-to-digital converter; one number,
+    resolution : measurements are rounded to multiples of this unit, as in an analogue-to-digital converter; one number,
         or (m,).
     """
 
@@ -52,18 +59,20 @@ class Simulation:
     @cached_property
     def _given(self) -> tuple[NDArray[np.float64], ...]:
         given = self.model.to_float()
-        roots = (np.array([_root(each) for each in covariances]) for covariances in (self.model.Q, self.model.R))
+        roots = (
+            np.array([covariance_root(each) for each in covariances]) for covariances in (self.model.Q, self.model.R)
+        )
         return given["Phi"], given["H"], *roots
 
     def block(
         self, number: int, truth: NDArray[np.float64], steps: int = BLOCK
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return measurements of at most 4096 steps after `number` blocks, given the truth there.
+        """Return the measurements of block `number`, at most 4096 steps, given the truth before its first step.
 
         Returns
         -------
         z : (steps, m), multiples of the resolution.
-        truth : (n,), after these steps.
+        truth : (n,), the truth after these steps.
         """
         rng = np.random.default_rng([self.seed, number])
         w = rng.standard_normal((BLOCK, self.model.n))
@@ -85,14 +94,83 @@ class Simulation:
 def fine_resolution(model: LinearModel) -> tuple[float, ...]:
     r"""Return a resolution far below the noise, in the units of each measurement, (m,).
 
-    It is :math:`2^{\lfloor\log_2\sqrt{R_{ii}}\rfloor - 30}` for the least variance of a cycle. A change of units by
-    powers of two changes it by the same powers, so it changes no answer.
+    It is :math:`2^{\lfloor\log_2\sqrt{R_{ii}}\rfloor - 30}` for the least variance of a cycle. If units change by
+    powers of two, so does the resolution; no answer depends on the choice.
     """
     least = [min(float(R[i, i]) for R in model.R) for i in range(model.m)]
     return tuple(2.0 ** ((math.frexp(variance)[1] - 1) // 2 - FINE_BITS) for variance in least)
 
 
-def _root(covariance: NDArray[Any]) -> NDArray[np.float64]:
+def covariance_root(covariance: NDArray[Any]) -> NDArray[np.float64]:
     """Return a square root, computed by plain float64 operations that give the same result everywhere."""
     lower, d = factor(covariance)
     return lower.astype(np.float64) * np.sqrt(d.astype(np.float64))
+
+
+def simulated_measurements(model: LinearModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
+    """Simulate measurements (steps, m) of a process that starts at the first estimate and has the known inputs.
+
+    They are rounded to :func:`fine_resolution`. The response to inputs and offsets is added to
+    measurements that are simulated without them.
+
+    Raises
+    ------
+    ValueError : more steps than :data:`MOST_SIMULATED`, or than the model describes.
+    """
+    if steps > MOST_SIMULATED:
+        raise ValueError(
+            f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}: more take hours; try fewer, and see "
+            "how the answer grows with gpbnb.report.wordlengths.study.required_precision_by_steps"
+        )
+    model.check_steps(steps)
+    start, resolution = tuple(map(float, model.x0)), fine_resolution(model)
+    z = Simulation(model.without_inputs(), start, seed, resolution).measurements(steps)
+    if not model.has_inputs:
+        return z
+    given, response, unit = model.to_float(), np.zeros(model.n), np.asarray(resolution)
+    for k in range(steps):
+        Phi, H = given["Phi"][k % len(given["Phi"])], given["H"][k % len(given["H"])]
+        state, measurement = (part.astype(np.float64) for part in model.known(k))
+        response = _times(Phi, response) + state
+        z[k] += _times(H, response) + measurement
+    return np.asarray(np.rint(z / unit) * unit)
+
+
+def _times(a: NDArray[np.float64], x: NDArray[np.float64]) -> NDArray[Any]:
+    """Multiply with sums from left to right, which are the same on every machine."""
+    total = np.zeros(len(a))
+    for column, value in zip(a.T, x, strict=True):
+        total = total + column * value
+    return total
+
+
+def simulated_inputs(kind: str, level: Any, steps: int, m: int, seed: int = 0) -> NDArray[np.float64]:
+    """Simulate inputs (steps, m) of a linear system.
+
+    They are multiples of the smallest power of two that is at least the level over 2**16, like the readings of a 16-bit
+    converter.
+
+    Parameters
+    ----------
+    kind : "step", constant from the first step on; "sine", with a period of :data:`SINE_PERIOD` steps; or "noise",
+        white and normal.
+    level : height of the step or sine, or standard deviation of the noise; one number, or (m,).
+
+    Raises
+    ------
+    ValueError : an unknown kind; a level that is not finite or not above 0, or not one for each input; too many steps.
+    """
+    if kind not in ("step", "sine", "noise"):
+        raise ValueError(f'got inputs {kind!r}; needed "step", "sine" or "noise"')
+    if steps > MOST_SIMULATED:
+        raise ValueError(f"got {steps:,} steps to simulate; needed at most {MOST_SIMULATED:,}")
+    given = np.asarray(level, dtype=np.float64)
+    if given.shape not in ((), (m,)) or not (np.isfinite(given) & (given > 0)).all():
+        raise ValueError(f"got level {level}; needed a finite number above 0, or one for each of the {m} inputs")
+    shapes = {
+        "step": lambda: np.ones((steps, m)),
+        "sine": lambda: np.tile(np.sin(2 * np.pi * np.arange(1, steps + 1) / SINE_PERIOD)[:, np.newaxis], m),
+        "noise": lambda: np.random.default_rng(seed).standard_normal((steps, m)),
+    }
+    unit = 2.0 ** np.ceil(np.log2(given) - 16)
+    return np.asarray(np.rint(shapes[kind]() * given / unit) * unit)

@@ -22,7 +22,7 @@ import numpy as np
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.sweeps.record import read_record, write_record
-from gpbnb.sweeps.table import Column, DamagedFileError, Record, Table, read, write
+from gpbnb.sweeps.table import Column, DamagedFileError, Record, StoredTable, read, write
 
 C = TypeVar("C")
 
@@ -36,6 +36,10 @@ class Difference(NamedTuple):
     cell: str
     stored: Record | None
     computed: Record
+
+
+def _no_faults(file: Path) -> list[str]:
+    return []
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,7 @@ class Sweep(Generic[C]):
         generator.
     same : function that tells whether a stored and a recomputed row agree; by default they must be equal.
     packages : packages whose versions the provenance lists.
+    faults : function that lists results in a table that must not occur.
     """
 
     name: str
@@ -76,6 +81,7 @@ class Sweep(Generic[C]):
     sample: Callable[[C, np.random.Generator], list[Record]] | None = None
     same: Callable[[Record, Record], bool] = operator.eq
     packages: tuple[str, ...] = ("numpy", "numba", "llvmlite")
+    faults: Callable[[Path], list[str]] = _no_faults
 
     # -- computing --------------------------------------------------------------------------------------
 
@@ -121,9 +127,54 @@ class Sweep(Generic[C]):
         saved = ((cell, self._saved(cell, directory)) for cell in self.cells())
         return [(cell, each["result"]) for cell, each in saved if each is not None]
 
-    def store(self, results: Sequence[tuple[C, Any]], seconds: float | None = None, file: Path | None = None) -> None:
-        """Write the table of results, with its provenance."""
+    def recompute(
+        self,
+        folder: Path,
+        executor: Executor | None = None,
+        *,
+        count: int | None = None,
+        only: Sequence[str] = (),
+        store: bool = False,
+    ) -> Path:
+        """Compute cells, save them in a subfolder with the name of the sweep, write the table and return its file.
+
+        Parameters
+        ----------
+        folder : folder for the table and for saved progress.
+        count : number of cells to compute, the first ones; all by default.
+        only : words, one of which must be in the text of a cell; the table keeps the stored rows of other cells.
+        store : whether to write the finished cells without computing more.
+
+        Raises
+        ------
+        ValueError : no cell has one of the words; words for a sweep with sums over all cells.
+        """
+        if only and self.summary is not None:
+            raise ValueError(
+                f"{self.name}: got words {' '.join(only)}; needed all cells, because the table has their sums"
+            )
+        chosen = [cell for cell in self.cells() if not only or any(word in str(cell) for word in only)][:count]
+        if only and not chosen:
+            raise ValueError(f"{self.name}: got no cell with {' or '.join(only)}; needed words of {self.cells()[0]}")
+        progress, file = folder / self.name, folder / f"{self.name}.csv"
+        if not store:
+            self.run(progress, executor, cells=chosen)
+        found = [(cell, result) for cell, result in self.finished(progress) if not only or cell in chosen]
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self.store(found, self.seconds(progress), file, kept=self.load().rows if only else ())
+        return file
+
+    def store(
+        self,
+        results: Sequence[tuple[C, Any]],
+        seconds: float | None = None,
+        file: Path | None = None,
+        kept: Sequence[Record] = (),
+    ) -> None:
+        """Write the table of results, with its provenance; a new row replaces a kept row with the same key."""
         lines = [row for cell, result in results for row in self.rows(cell, result)]
+        if kept:
+            lines = list(({row[: self.key]: row for row in kept} | {row[: self.key]: row for row in lines}).values())
         if self.summary is not None:
             lines += self.summary(results)
         write(file or self.file, self.columns, lines, self.provenance(len(results), seconds))
@@ -145,7 +196,7 @@ class Sweep(Generic[C]):
 
     # -- reading ----------------------------------------------------------------------------------------
 
-    def load(self, file: Path | None = None) -> Table:
+    def load(self, file: Path | None = None) -> StoredTable:
         """Read the stored table.
 
         Raises

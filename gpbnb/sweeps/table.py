@@ -10,14 +10,15 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from gpbnb.sweeps.numbers import plain_integer, plain_number
 
 Record = tuple[str, ...]
+T = TypeVar("T")
 
 
 class DamagedFileError(ValueError):
@@ -58,7 +59,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Table:
+class StoredTable:
     """Rows of text with their columns and provenance."""
 
     columns: tuple[Column, ...]
@@ -70,6 +71,14 @@ class Table:
         names = [column.name for column in self.columns]
         found = (dict(zip(names, row, strict=True)) for row in self.rows)
         return [each for each in found if all(each[name] == value for name, value in where.items())]
+
+    def tuples(self, kind: Callable[..., T]) -> tuple[T, ...]:
+        """Return the rows as named tuples whose fields are the columns: integers as int, other values as text."""
+        whole = [column.kind == "integer" for column in self.columns]
+        return tuple(
+            kind(*(plain_integer(text) if is_whole else text for text, is_whole in zip(row, whole, strict=True)))
+            for row in self.rows
+        )
 
 
 def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provenance: Mapping[str, str]) -> None:
@@ -97,7 +106,7 @@ def write(file: Path, columns: Sequence[Column], rows: Iterable[Record], provena
     draft.replace(file)
 
 
-def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
+def read(file: Path, columns: Sequence[Column], cure: str) -> StoredTable:
     """Read a table and check all of it.
 
     Parameters
@@ -161,7 +170,7 @@ def read(file: Path, columns: Sequence[Column], cure: str) -> Table:
         rows.append(tuple(row))
     if len(rows) < expected:
         raise damaged(len(lines), f"the file ends after {len(rows)} of {expected} rows")
-    return Table(tuple(columns), tuple(rows), provenance)
+    return StoredTable(tuple(columns), tuple(rows), provenance)
 
 
 def _fault(columns: Sequence[Column], row: Sequence[str]) -> str | None:

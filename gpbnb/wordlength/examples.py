@@ -104,7 +104,7 @@ def tracker(origin: str = "0") -> LinearModel:
         R=exact([["4"]]),
         x0=exact([origin, "0"]),
         P0=exact([["100", "0"], ["0", "100"]]),
-        name=f"tracker, {origin} m from its zero",
+        name=f"tracker, {origin} m from its origin",
     )
 
 
@@ -158,7 +158,7 @@ def cyclic(n: int, m: int, cycle: int = 1, decay: float = 0.95, seed: int = 7) -
     ----------
     n, m : numbers of states and of measurements.
     cycle : steps after which the measurement matrix is the same again.
-    decay : of each state in a step, about.
+    decay : approximate factor by which each state decays in a step.
     """
     rng = np.random.default_rng([seed, n, m])
     Phi = decay * np.eye(n) + 0.03 * rng.standard_normal((n, n))

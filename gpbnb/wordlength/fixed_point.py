@@ -1,41 +1,46 @@
-r"""Filters with constant coefficients in fixed point: how to scale them, and how accurate each fraction bit makes them.
+r"""Fixed point: how to scale a filter, how accurate each fraction bit makes it, and how many it needs.
 
-A signal processor computes :math:`Ax + Bz` with integers. Sums are exact. Only products are rounded, each to a
-multiple of one unit, whatever its size. So the error has a bound that needs no limit on the measurements,
-
-.. math:: |e_i| \le \tfrac{q}{2} \sum_{l\ge0}\sum_o |(A^l G)_{io}|,
-
-where q is the unit and column o of G holds the effect of the rounding in operation o on the states. The integers behind
-the formula are exact, and the infinite sum is enclosed in ball arithmetic.
-
-References
-----------
-Volkova, Hilaire and Lauter, IEEE Trans. Computers 69 (2020).
+A signal processor computes with integers. Sums are exact. Only products are rounded, or sums when they are stored, each
+to a multiple of one unit, whatever its size; see :mod:`gpbnb.filters.words`. So the error has a bound that needs no
+limit on the measurements; see :mod:`gpbnb.bounds.words`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.rational import exact
-from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.linear import LinearFilter, peak_gain
+from gpbnb.arithmetic.rounding import Rounding, rounding_named
+from gpbnb.arithmetic.search import Outcome, Search
+from gpbnb.bounds.words import WordGuarantee, bounded_rounding, largest_rounding
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.program import MULTIPLY, SUBTRACT, Program, innovation_program
+from gpbnb.filters.program import innovation_program, matrices
 from gpbnb.filters.run import log_spaced, reference
-from gpbnb.wordlength.system import is_stable
+from gpbnb.filters.system import LinearFilter, LinearSystem, is_stable, system_inputs
+from gpbnb.filters.words import (
+    WordFormats,
+    integer_program,
+    integers_of,
+    largest_values,
+    run_integers,
+    run_words,
+)
+from gpbnb.wordlength.recursion import Recursion, recursion_strategy
+from gpbnb.wordlength.requirement import largest_ratio
 
 Basis = Literal["emulation", "guarantee"]
 LARGEST_FRACTION = 60  # bits
+_MORE_INTEGER_BITS = 16
+"""Integer bits beyond those of a run that a guarantee may need."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,18 +69,23 @@ class FixedAnswer:
     fmt : the format; None if no format tried meets the tolerance.
     tried : fraction bits, and largest error or bound / tolerance, infinite if a number overflows.
     why : why the next smaller format was rejected.
+    words : the formats of data, coefficients and sums; None for a function, or if there is no answer.
+    steps : number of steps for which a guarantee holds, of a system that keeps its errors; None if it holds for ever.
     """
 
-    fmt: FixedFormat | None
+    fmt: FixedFormat | MaybeNone
     basis: Basis
     tried: tuple[tuple[int, float], ...]
     why: str
+    words: WordFormats | None = None
+    steps: int | None = None
 
     def __str__(self) -> str:
+        basis = self.basis if self.steps is None else f"{self.basis} for {self.steps} steps"
         if self.fmt is None:
-            return f"no format, by {self.basis}: {self.why}"
+            return f"no format, by {basis}: {self.why}"
         word = 1 + self.fmt.precision
-        return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {self.basis}; {self.why}"
+        return f"{self.fmt.fraction_bits} fraction bits in a word of {word} bits, by {basis}; {self.why}"
 
 
 def constant_gain(model: LinearModel, z: Any, margin: float = 2.0) -> ScaledFilter:
@@ -121,7 +131,8 @@ def unscaled(made: LinearFilter) -> ScaledFilter:
 
 def integer_bits(given: ScaledFilter, z: Any) -> int:
     """Return the number of integer bits that all intermediate values of a run need, as advice for scaling."""
-    return _bits_for(_largest(given, z))
+    scaled = np.asarray(z, dtype=np.float64) / 2.0 ** given.measurement.astype(float)
+    return _bits_for(float(largest_values(given.filter, scaled).max()))
 
 
 def emulated(
@@ -139,29 +150,23 @@ def emulated(
     ------
     OverflowError : a number overflows and the format neither saturates nor wraps; names operation and step.
     """
-    coefficients = stored_coefficients(given.filter, coefficient_bits)
-    seen = _stored_measurements(given, z, fmt)
-    program = given.filter.program
-    take = _integer_step(program, coefficients, fmt, wide)
-    state, true = [0] * program.n, np.zeros(program.n)
-    A, B = _state_space(program, coefficients)
-    A, B = A.astype(np.float64), B.astype(np.float64)
-    unit, scale = float(fmt.unit), 2.0 ** given.state.astype(float)
-    errors = np.empty((len(seen), program.n))
-    for k, row in enumerate(seen):
-        try:
-            state = take(state, row)
-        except OverflowError as error:
-            raise OverflowError(f"overflow in {error} at step {k + 1}") from None
-        true = A @ true + B @ (np.array(row, dtype=np.float64) * unit)
-        errors[k] = (np.array(state, dtype=np.float64) * unit - true) * scale
-    return errors
+    made = integer_program(given.filter, _words(given.filter, fmt, coefficient_bits, wide))
+    program, unit = given.filter.program, float(fmt.unit)
+    scaled = np.asarray(z, dtype=np.float64) / 2.0 ** given.measurement.astype(float)
+    seen = integers_of(scaled, replace(fmt, rounding=Rounding.NEAREST, overflow="saturate"))
+    states = run_integers(made, seen, np.zeros(program.n, np.int64)).astype(np.float64) * unit
+    A, B = (each.astype(np.float64) for each in matrices(program, made.coefficients))
+    true, errors = np.zeros(program.n), np.empty(states.shape)
+    for k, row in enumerate(seen.astype(np.float64) * unit):
+        true = A @ true + B @ row
+        errors[k] = states[k] - true
+    return errors * 2.0 ** given.state.astype(float)
 
 
 def guaranteed(
     given: ScaledFilter, fmt: FixedFormat, coefficient_bits: int = 15, wide: bool = False
 ) -> NDArray[np.float64]:
-    """Bound the error of each state, (n,), in the units of the model, for all time and all measurements.
+    """Bound the error of each state, (n,), in the units of the model, for ever and for all measurements.
 
     The bound holds as long as nothing overflows. For the parameters, see :func:`emulated`.
 
@@ -172,82 +177,315 @@ def guaranteed(
     return bound_per_unit(given, coefficient_bits, wide) * (largest_rounding(fmt.rounding) * float(fmt.unit))
 
 
-def largest_rounding(rounding: Rounding) -> float:
-    """Return the largest rounding error, in units of the last bit."""
-    return 0.5 if rounding in (Rounding.NEAREST, Rounding.EVEN) else 1.0
-
-
 def bound_per_unit(given: ScaledFilter, coefficient_bits: int = 15, wide: bool = False) -> NDArray[np.float64]:
     """Return the bound of :func:`guaranteed` for rounding errors of at most one; the bound is proportional to them."""
-    program = given.filter.program
-    coefficients = stored_coefficients(given.filter, coefficient_bits)
-    A, _ = _state_space(program, coefficients)
-    sums = _peak_sums(A, _effects(program, coefficients, wide))
-    return np.asarray(sums * 2.0 ** given.state.astype(float))
+    ones = FixedFormat(1, 0, Rounding.DOWN)
+    made = integer_program(given.filter, _words(given.filter, ones, coefficient_bits, wide))
+    return np.asarray(bounded_rounding(made) * 2.0 ** given.state.astype(float))
 
 
 def required_fraction_bits(
-    given: ScaledFilter,
+    given: ScaledFilter | LinearSystem | Recursion,
     z: Any,
     tolerance: Sequence[float] | float,
     basis: Basis = "emulation",
-    rounding: Rounding = Rounding.NEAREST,
+    rounding: Rounding | str = Rounding.NEAREST,
     coefficient_bits: int = 15,
     wide: bool = False,
+    like: FixedFormat | WordFormats | None = None,
 ) -> FixedAnswer:
-    """Find the smallest number of fraction bits with which rounding errors stay within a tolerance.
+    """Find the smallest number of fraction bits with which errors stay within a tolerance.
 
-    As for floating point, a format qualifies only if the next one meets the tolerance, too. The integer bits are those
-    that the run needs.
+    As in floating point, a format qualifies only if the format with one more bit also meets the tolerance. Without
+    `like`, the word has as many integer bits as the run needs; for a guarantee, as many as every admissible run needs.
 
     Parameters
     ----------
-    tolerance : for each state, in the units of the model; infinite if the state does not matter.
-    basis : "emulation" of these measurements, or "guarantee" for all measurements that do not overflow.
+    given : a linear system in any structure; a function of a format and `z`, as in
+        :func:`gpbnb.wordlength.recursion.required_recursion_precision`; or a scaled filter. The error of a system is
+        the difference between its outputs and those of the system as given, and includes the error of storing
+        coefficients and inputs. The error of a scaled filter is due only to rounding its states.
+    z : (steps, m), inputs or measurements.
+    tolerance : largest acceptable error of each output, or of each state of a scaled filter, in its unit; infinite if
+        its accuracy does not matter.
+    basis : "emulation" of these measurements; or "guarantee", for a system for all inputs that are never larger than
+        the largest of `z`, with a proof that nothing overflows, and for a scaled filter for all measurements that do
+        not overflow.
     rounding, coefficient_bits, wide : as for :func:`emulated`.
+    like : formats for a system or a function, in place of `rounding`, `coefficient_bits` and `wide`. They set the
+        integer bits, the rounding and the overflow. The search changes the fraction bits of the data, and those of the
+        sums by the same number. Coefficients change with the data if they have the format of the data; otherwise they
+        keep their own format. A function requires `like`.
 
     Raises
     ------
-    ValueError : a tolerance is not above 0, no tolerance is finite, or the basis is neither of the two.
+    TypeError : another kind of filter.
+    ValueError : a tolerance is not above 0, no tolerance is finite, or the basis is neither of the two; inputs that do
+        not fit; a guarantee for a function; a function without `like`.
+    OverflowError : an output of a system as given is beyond the range of float64.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from gpbnb import LinearSystem
+    >>> system = LinearSystem.from_coefficients(["0.1"], [1, "-0.9"])
+    >>> print(required_fraction_bits(system, np.ones((50, 1)), 0.001))
+    11 fraction bits in a word of 13 bits, by emulation; 10 fraction bits give 4.95 times the tolerance
     """
     if basis not in ("emulation", "guarantee"):
         raise ValueError(f'got basis {basis!r}; needed "emulation" or "guarantee"')
-    goal = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (given.filter.program.n,))
+    rounding = rounding_named(rounding)
+    strategy: _Strategy
+    if isinstance(given, ScaledFilter):
+        goal = _goal(tolerance, given.filter.program.n)
+        strategy = _States(given, z, goal, rounding, (coefficient_bits, wide), basis)
+    elif isinstance(given, LinearSystem):
+        words = WordFormats(like) if isinstance(like, FixedFormat) else like
+        strategy = _of_system(given, z, _goal(tolerance, given.p), basis, rounding, (coefficient_bits, wide), words)
+    elif not callable(given):
+        raise TypeError(
+            f"got a {type(given).__name__}; needed a LinearSystem or a function; for a LinearModel in one fixed-point "
+            "format, use emulate or guarantee"
+        )
+    elif isinstance(like, FixedFormat):
+        strategy = _Function(given, z, tolerance, basis, like)
+    else:
+        raise ValueError(f"got like={like!r} for a function; needed a FixedFormat, with integer bits for its numbers")
+    largest = LARGEST_FRACTION - 1
+    found = Search(strategy.error, strategy.like, (), largest=largest, least=strategy.least)
+    ratios = dict(found.tried)
+    if cause := strategy.cause():
+        return FixedAnswer(None, basis, (), cause)
+
+    def rejection(bits: int) -> str:
+        refused = found.reasons[bits]
+        return f"{bits} fraction bits " + (refused or f"give {ratios[bits]:.3g} times the tolerance")
+
+    if found.fmt is None:
+        why = f"{rejection(largest)}; {largest} fraction bits are the most tried"
+        return FixedAnswer(None, basis, found.tried, why, None, strategy.steps)
+    bits = found.fmt.fraction_bits
+    why = rejection(bits - 1 if bits > strategy.least else min(bits + 1, largest))
+    words = strategy.words(found.fmt)
+    return FixedAnswer(found.fmt if words is None else words.data, basis, found.tried, why, words, strategy.steps)
+
+
+def words_error(
+    system: LinearSystem, z: Any, tolerance: Any, basis: Basis = "emulation"
+) -> Callable[[WordFormats], Outcome]:
+    """Return the function from formats of a system's words to its largest error or bound over the tolerance."""
+    made: dict[str, _Outputs] = {}
+
+    def error(words: WordFormats) -> Outcome:
+        if not made:
+            goal = _goal(tolerance, system.p)
+            made["known"] = _of_system(system, z, goal, basis, words.data.rounding, (1, False), words)
+        return made["known"].of_words(words)
+
+    return error
+
+
+def exact_sums(system: LinearSystem, data: FixedFormat, coefficient_bits: int) -> WordFormats:
+    """Return formats whose sums are exact and are rounded once, when they are stored."""
+    return _words(system.as_filter(), data, coefficient_bits, wide=True)
+
+
+class _Strategy:
+    """How an error follows from a format: the base of the classes below.
+
+    Parameters
+    ----------
+    like : a format with the integer bits, the rounding and the overflow of those to try. goal : tolerances.
+    least : lowest number of fraction bits.
+    steps : number of steps for which a guarantee holds; None if it holds for ever.
+    """
+
+    steps: int | None = None
+
+    def __init__(self, like: FixedFormat, goal: NDArray[np.float64]) -> None:
+        self.like, self.goal = like, goal
+        self.least = max(0, 1 - like.integer_bits)
+
+    def error(self, fmt: FixedFormat) -> Outcome:
+        """Return the largest error over its tolerance, or infinity and why a run is refused."""
+        try:
+            return Outcome(largest_ratio(self.errors(fmt), self.goal))
+        except (OverflowError, ValueError) as error:
+            return Outcome(math.inf, f"are refused: {error}")
+
+    def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
+        """Return the largest error of each state or output."""
+        raise NotImplementedError
+
+    def words(self, fmt: FixedFormat) -> WordFormats | None:
+        """Return the formats of data, coefficients and sums for a format of the data."""
+        return None
+
+    def cause(self) -> str:
+        """Return in words why there is no answer in any format; empty if there may be one."""
+        return ""
+
+
+class _States(_Strategy):
+    """Errors of a scaled filter in a run, or with `bounds` their bound, to which every other is proportional."""
+
+    def __init__(
+        self,
+        given: ScaledFilter,
+        z: Any,
+        goal: NDArray[np.float64],
+        rounding: Rounding,
+        options: tuple[int, bool],
+        basis: Basis,
+    ) -> None:
+        super().__init__(FixedFormat(integer_bits(given, z), LARGEST_FRACTION, rounding), goal)
+        self._given, self._z, self._options = given, z, options
+        self._bounds: NDArray[np.float64] | None = None
+        self._cause = ""
+        if basis == "guarantee":
+            try:
+                self._bounds = bound_per_unit(given, *options)
+            except ValueError:
+                self._cause = _without_bound(given, options[0])
+                self._bounds = np.full(len(goal), math.inf)
+
+    def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
+        if self._bounds is not None:
+            return self._bounds * (float(fmt.unit) * largest_rounding(fmt.rounding))
+        return np.asarray(abs(emulated(self._given, self._z, fmt, *self._options)).max(axis=0))
+
+    def words(self, fmt: FixedFormat) -> WordFormats | None:
+        return _words(self._given.filter, fmt, *self._options)
+
+    def cause(self) -> str:
+        return self._cause
+
+
+class _Outputs(_Strategy):
+    """Errors of the outputs of a system in a run, or with a proof of its range their bounds."""
+
+    def __init__(
+        self,
+        system: LinearSystem,
+        inputs: NDArray[Any],
+        goal: NDArray[np.float64],
+        words_of: Callable[[FixedFormat], WordFormats],
+        like: FixedFormat,
+        basis: Basis,
+        widens: bool,
+    ) -> None:
+        super().__init__(like, goal)
+        self._system, self._inputs, self._words_of, self._widens = system, inputs, words_of, widens
+        self._true = system.outputs(inputs)
+        largest = np.abs(inputs.astype(np.float64)).max(axis=0)
+        if basis == "guarantee" and not is_stable(system.A):
+            self.steps = len(inputs)
+        self._proof = WordGuarantee(system, largest, self.steps) if basis == "guarantee" else None
+        self._more = dict[int, int]()
+
+    def errors(self, fmt: FixedFormat) -> NDArray[np.float64]:
+        if self._proof is None:
+            found = run_words(self._system, self._inputs, self._words_of(fmt)).outputs(self._system.p)
+            error = (found[..., 0] - self._true[..., 0]) + (found[..., 1] - self._true[..., 1])
+            return np.asarray(np.abs(error).max(axis=0))
+        more = 0
+        while True:
+            try:
+                wider = replace(fmt, integer_bits=fmt.integer_bits + more)
+                bounds = self._proof.errors(self._words_of(wider))
+                self._more[fmt.fraction_bits] = more
+                return bounds
+            except OverflowError:
+                if not self._widens or more == _MORE_INTEGER_BITS:
+                    raise
+                more += 1
+
+    def of_words(self, words: WordFormats) -> Outcome:
+        """Return the largest error or bound over its tolerance in these formats, or infinity and the reason."""
+        self._words_of = lambda fmt: words
+        return self.error(words.data)
+
+    def words(self, fmt: FixedFormat) -> WordFormats | None:
+        return self._words_of(replace(fmt, integer_bits=fmt.integer_bits + self._more.get(fmt.fraction_bits, 0)))
+
+
+class _Function(_Strategy):
+    """Errors of a function, against its reference in floating point."""
+
+    def __init__(self, run: Recursion, z: Any, tolerance: Any, basis: Basis, like: FixedFormat) -> None:
+        super().__init__(like, np.ones(1))
+        most = LARGEST_FRACTION + max(like.integer_bits, 0)
+        self._strategy = recursion_strategy(run, None, tolerance, z, 2, basis, most)
+
+    def error(self, fmt: FixedFormat) -> Outcome:
+        ratio, why = self._strategy.error(fmt)
+        return Outcome(ratio, why and f"are refused: {why}")
+
+
+def _of_system(
+    system: LinearSystem,
+    z: Any,
+    goal: NDArray[np.float64],
+    basis: Basis,
+    rounding: Rounding,
+    options: tuple[int, bool],
+    like: WordFormats | None,
+) -> _Outputs:
+    """Return the strategy for a system: in formats such as `like`, or with integer bits that its numbers need."""
+    inputs, made = system_inputs(system, z), system.as_filter()
+    if like is not None:
+        given = like
+        return _Outputs(
+            system, inputs, goal, lambda fmt: with_fraction_bits(given, fmt.fraction_bits), like.data, basis, False
+        )
+    start = np.concatenate([system.x0.astype(np.float64), np.zeros(system.p)])
+    before = _bits_for(_largest_stored(made, inputs.astype(np.float64), start, options[1]))
+    fmt = FixedFormat(before, LARGEST_FRACTION, rounding)
+    return _Outputs(system, inputs, goal, lambda fmt: _words(made, fmt, *options), fmt, basis, True)
+
+
+def with_fraction_bits(words: WordFormats, fraction: int) -> WordFormats:
+    """Return formats whose data have other fraction bits; those of the sums move by the same number."""
+    moved = fraction - words.data.fraction_bits
+    sums = words.sums
+    return replace(
+        words,
+        data=replace(words.data, fraction_bits=fraction),
+        sums=None if sums is None else replace(sums, fraction_bits=sums.fraction_bits + moved),
+    )
+
+
+def _goal(tolerance: Any, count: int) -> NDArray[np.float64]:
+    goal = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (count,))
     if not (goal > 0).all() or not np.isfinite(goal).any():
         raise ValueError(f"got tolerance {tolerance}; needed errors above 0, one of them finite")
-    asked, before = np.isfinite(goal), integer_bits(given, z)
-    tried: list[tuple[int, float]] = []
-    why = last = ""
-    bound: NDArray[np.float64] | None = None
-    for fraction in range(max(1, 1 - before), LARGEST_FRACTION):
-        fmt = FixedFormat(before, fraction, rounding)
-        try:
-            if basis == "guarantee":
-                if bound is None:
-                    bound = bound_per_unit(given, coefficient_bits, wide)
-                error = bound * (float(fmt.unit) * largest_rounding(fmt.rounding))
-            else:
-                error = abs(emulated(given, z, fmt, coefficient_bits, wide)).max(axis=0)
-            ratio = float((error[asked] / goal[asked]).max())
-            last = f"{fraction} fraction bits give {ratio:.3g} times the tolerance"
-        except OverflowError as error_:
-            ratio, last = math.inf, f"{fraction} fraction bits are refused: {error_}"
-        except ValueError:
-            return FixedAnswer(None, basis, tuple(tried), _without_bound(given, coefficient_bits))
-        tried.append((fraction, ratio))
-        if len(tried) > 1 and ratio <= 1 and tried[-2][1] <= 1:
-            return FixedAnswer(FixedFormat(before, fraction - 1, rounding), basis, tuple(tried), why or last)
-        if ratio > 1:
-            why = last
-    return FixedAnswer(None, basis, tuple(tried), f"{why}; {LARGEST_FRACTION - 1} fraction bits are the most tried")
+    return goal
+
+
+def _words(made: LinearFilter, fmt: FixedFormat, coefficient_bits: int, wide: bool) -> WordFormats:
+    """Return formats for coefficients with a binary point each, and with `wide` for sums without roundings."""
+    if not wide:
+        return WordFormats(fmt, coefficient_bits)
+    longest = max(each.denominator.bit_length() - 1 for each in stored_coefficients(made, coefficient_bits))
+    fraction = fmt.fraction_bits + longest
+    return WordFormats(
+        fmt, coefficient_bits, FixedFormat(max(63 - fraction, fmt.integer_bits + 8), fraction, overflow="wrap")
+    )
+
+
+def _largest_stored(made: LinearFilter, z: NDArray[np.float64], start: NDArray[np.float64], wide: bool) -> float:
+    """Return the largest value of a run that must fit the data; with `wide`, sums need not."""
+    sizes = largest_values(made, z, start)
+    kept = np.concatenate([np.ones(made.program.n + made.program.m, np.bool_), ~made.program.wide])
+    return float(sizes[kept].max() if wide else sizes.max())
 
 
 def _without_bound(given: ScaledFilter, coefficient_bits: int) -> str:
-    """Return in words why a filter has no bound for all time."""
+    """Return in words why a filter has no bound that holds for ever."""
     program, coefficients = given.filter.program, given.filter.coefficients
-    if not is_stable(_state_space(program, coefficients)[0]):
+    if not is_stable(matrices(program, coefficients)[0]):
         return "the filter as given is not stable, so that errors of rounding never decay, whatever the word"
-    if not is_stable(_state_space(program, stored_coefficients(given.filter, coefficient_bits))[0]):
+    if not is_stable(matrices(program, stored_coefficients(given.filter, coefficient_bits))[0]):
         stored = f"stored in {coefficient_bits} bits"
         return f"the filter is stable, but not with its coefficients {stored}; raise coefficient_bits"
     return "the filter is stable, but decays too slowly for its peak gain to be enclosed in balls of 8192 bits"
@@ -265,151 +503,3 @@ def _exponents(sizes: NDArray[np.float64]) -> NDArray[np.int64]:
 
 def _bits_for(largest: float) -> int:
     return int(_exponents(np.array([largest]))[0])
-
-
-def _stored_measurements(given: ScaledFilter, z: Any, fmt: FixedFormat) -> list[list[int]]:
-    scaled = np.asarray(z, dtype=np.float64) / 2.0 ** given.measurement.astype(float)
-    counts = np.floor(scaled / float(fmt.unit) + 0.5)
-    low, high = float(fmt.lowest / fmt.unit), float(fmt.largest / fmt.unit)
-    return [[int(each) for each in row] for row in np.clip(counts, low, high)]
-
-
-def _largest(given: ScaledFilter, z: Any) -> float:
-    """Return the largest intermediate value of the unrounded filter."""
-    program = given.filter.program
-    coefficients = given.filter.coefficients.astype(np.float64)
-    state, largest = [0.0] * program.n, 0.0
-    scaled = np.asarray(z, dtype=np.float64) / 2.0 ** given.measurement.astype(float)
-    operations = program.operations.tolist()
-    for row in scaled.tolist():
-        values = [*state, *row]
-        for code, a, b in operations:
-            if code == MULTIPLY:
-                values.append(coefficients[a] * values[b])
-            else:
-                values.append(values[a] - values[b] if code == SUBTRACT else values[a] + values[b])
-        state = [values[i] for i in program.outputs]
-        largest = max(largest, max(map(abs, values)))
-    return largest
-
-
-def _integer_step(
-    program: Program, coefficients: NDArray[Any], fmt: FixedFormat, wide: bool
-) -> Callable[[list[int], list[int]], list[int]]:
-    """Return one step on integers, multiples of the unit; if `wide`, sums are exact and rounded once when used."""
-    pairs = [(c.numerator, c.denominator.bit_length() - 1) for c in coefficients]
-    extra = max((shift for _, shift in pairs), default=0) if wide else 0
-    low, high = (int(each / fmt.unit) for each in (fmt.lowest, fmt.largest))
-    operations = program.operations.tolist()
-    used = _factors(program)
-
-    def stored(n: int, shift: int, operation: int) -> int:
-        m = _shifted(n, shift, fmt.rounding)
-        if low <= m <= high:
-            return m
-        if fmt.overflow == "saturate":
-            return high if m > 0 else low
-        if fmt.overflow == "wrap":
-            return (m - low) % (high - low + 1) + low
-        kind = "a product" if operations[operation][0] == MULTIPLY else "a sum"
-        raise OverflowError(f"{kind}, operation {operation + 1} of {len(operations)},")
-
-    def take(state: list[int], row: list[int]) -> list[int]:
-        # With a long accumulator, values have `extra` more bits until they are used as a factor or as a state.
-        values = [n << extra for n in (*state, *row)]
-        for o, (code, a, b) in enumerate(operations):
-            if code == MULTIPLY:
-                n, shift = pairs[a]
-                exactly = n * (values[b] >> extra)
-                found = exactly << (extra - shift) if wide else stored(exactly, shift, o)
-            else:
-                found = values[a] - values[b] if code == SUBTRACT else values[a] + values[b]
-                if not wide:
-                    found = stored(found, 0, o)
-            if wide and o in used:
-                found = stored(found, extra, o) << extra
-            values.append(found)
-        return [values[i] >> extra for i in program.outputs]
-
-    return take
-
-
-def _factors(program: Program) -> frozenset[int]:
-    """List the operations whose result becomes a state or a factor, which a long accumulator must store."""
-    first = program.n + program.m
-    found = {int(b) - first for code, _, b in program.operations if code == MULTIPLY and b >= first}
-    return frozenset(found | {int(o) - first for o in program.outputs if o >= first})
-
-
-def _shifted(n: int, shift: int, rounding: Rounding) -> int:
-    """Return ``n / 2**shift``, rounded."""
-    if shift <= 0:
-        return n << -shift
-    m = n >> shift
-    rest, unit = n - (m << shift), 1 << shift
-    if rest == 0 or rounding is Rounding.DOWN:
-        return m
-    if rounding is Rounding.NEAREST:
-        return m + (2 * rest > unit or (2 * rest == unit and n > 0))
-    if rounding is Rounding.EVEN:
-        return m + (2 * rest > unit or (2 * rest == unit and m % 2 == 1))
-    if rounding is Rounding.ODD:
-        return m | 1
-    return m + (rounding is Rounding.UP or n < 0)
-
-
-def _state_space(program: Program, coefficients: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return the exact A and B of a step."""
-    n, m = program.n, program.m
-    rows = [np.array([Fraction(int(i == j)) for j in range(n + m)], dtype=object) for i in range(n + m)]
-    for code, a, b in program.operations.tolist():
-        if code == MULTIPLY:
-            rows.append(coefficients[a] * rows[b])
-        else:
-            rows.append(rows[a] - rows[b] if code == SUBTRACT else rows[a] + rows[b])
-    whole = np.array([rows[i] for i in program.outputs], dtype=object)
-    return whole[:, :n], whole[:, n:]
-
-
-def _peak_sums(A: NDArray[Any], G: NDArray[Any]) -> NDArray[np.float64]:
-    """Return upper bounds (n,) of the sums over l and o of ``abs(A**l G)``; enclosures omit zeros."""
-    n = len(A)
-    identity, sums = exact(np.eye(n, dtype=int)), np.zeros(n)
-    reached = (np.linalg.matrix_power((A != 0) + np.eye(n), n) @ (G != 0)) > 0
-    for pattern in {tuple(row) for row in reached.tolist() if any(row)}:
-        rows, columns = (reached == pattern).all(axis=1), np.array(pattern)
-        sums[rows] = peak_gain(A, G[:, columns], identity[rows]).high.sum(axis=1)
-    return sums * (1 + 2.0**-40)
-
-
-def _effects(program: Program, coefficients: NDArray[Any], wide: bool) -> NDArray[Any]:
-    """Return the effect of each rounding error on the states after the step, (n, roundings)."""
-    n, first = program.n, program.n + program.m
-    count = first + len(program.operations)
-    effects = [[Fraction(0)] * n for _ in range(count)]
-    for i, o in enumerate(program.outputs.tolist()):
-        effects[o][i] += 1
-    for o in range(len(program.operations) - 1, -1, -1):
-        code, a, b = program.operations[o].tolist()
-        g = effects[first + o]
-        for i in range(n):
-            if code == MULTIPLY:
-                effects[b][i] += coefficients[a] * g[i]
-            else:
-                effects[a][i] += g[i]
-                effects[b][i] += -g[i] if code == SUBTRACT else g[i]
-    columns = [effects[first + o] for o in _rounding(program, coefficients, wide) if any(effects[first + o])]
-    return np.array(columns, dtype=object).reshape(-1, n).T
-
-
-def _rounding(program: Program, coefficients: NDArray[Any], wide: bool) -> list[int]:
-    """List the operations whose stored results are rounded because they are not multiples of the unit."""
-    first, used = program.n + program.m, _factors(program)
-    whole, found = [True] * first, list[int]()
-    for o, (code, a, b) in enumerate(program.operations.tolist()):
-        exactly = whole[b] and (coefficients[a].denominator == 1 if code == MULTIPLY else whole[a])
-        if not exactly and (not wide or o in used):
-            found.append(o)
-            exactly = True
-        whole.append(exactly)
-    return found

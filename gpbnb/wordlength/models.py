@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import csv
+import io
+import math
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.conversion import Numbers
+from gpbnb.filters.design import FilterDesign
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.nonlinear import NonlinearModel
+from gpbnb.filters.structures import structure_named
+from gpbnb.filters.system import LinearSystem
 from gpbnb.sweeps import plain_number
-from gpbnb.wordlength.system import LinearSystem
 
 KALMAN = ("Phi", "H", "Q", "R", "x0", "P0")
 """Keys of a Kalman filter in a TOML file."""
@@ -25,6 +31,11 @@ INPUTS = ("B", "u", "b", "d", "steps")
 SYSTEM = ("A", "B")
 """Keys of a linear system in a TOML file; ``C``, ``D`` and ``x0`` are optional. Each model may have a ``name``."""
 
+DESIGN = ("b", "a", "sos", "structure", "pairing", "order", "scale")
+"""Keys of a digital filter in a TOML file, with ``b`` or ``sos``; see :class:`gpbnb.filters.design.FilterDesign`."""
+
+NAMES = {f"{kind}s": f"{kind}_names" for kind in ("state", "measurement", "input", "output")}
+"""Keys that list names in a TOML file, each perhaps with a unit, and the arguments of the models for them."""
 
 FILTERS = ("KalmanFilter", "SquareRootKalmanFilter", "FadingKalmanFilter")
 """Classes of FilterPy that are read; their estimates after ``predict()`` and ``update(z)`` are those of the model."""
@@ -33,26 +44,54 @@ SYSTEMS = {"scipy": ("StateSpace", "TransferFunction", "ZerosPolesGain"), "contr
 """Classes of ``scipy.signal`` and python-control that are read."""
 
 
-def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
+class Discrete(Protocol):
+    """A system of ``scipy.signal`` or python-control."""
+
+    @property
+    def dt(self) -> Any:
+        """Its time step."""
+
+
+class Estimator(Protocol):
+    """A filter of FilterPy."""
+
+    @property
+    def dim_x(self) -> Any:
+        """Number of states."""
+
+
+ModelSource: TypeAlias = str | Path | Mapping[str, Any] | LinearModel | LinearSystem | Discrete | Estimator
+"""What a model is read from."""
+
+
+def read_model(
+    source: ModelSource, u: Numbers | None = None, structure: str | None = None
+) -> LinearModel | LinearSystem:
     """Read a model from a TOML file, a mapping of its matrices, or an object of another library.
 
-    The answer for an object holds for its estimates or outputs. Whatever else it holds that changes them is refused. Of
-    a class derived from one of these, nobody knows what it computes, so it is refused as well.
+    The model that is read computes the same estimates or outputs as the object of the other library. An object with
+    settings that a model cannot express is therefore rejected, and so is an object of a derived class, which may
+    compute something else.
 
     Parameters
     ----------
-    source : a path to a TOML file with :data:`KALMAN` or :data:`SYSTEM`; a mapping with the same keys; a discrete
-        system of ``scipy.signal`` or python-control, one of :data:`SYSTEMS`, read as a linear system from rest; or a
-        filter of FilterPy, one of :data:`FILTERS`, whose current estimate becomes the initial one. A step is then
-        ``predict()`` or ``predict(u)``, and ``update(z)``, without other arguments.
-    u : known inputs of a Kalman filter, (steps, p), in place of those in `source`, which must have B.
+    source : the path of a TOML file, or a mapping with the same keys: those in :data:`KALMAN` for a Kalman filter, in
+        :data:`SYSTEM` for a linear system or in :data:`DESIGN` for a digital filter, and optionally those in
+        :data:`NAMES`. Or a discrete system of ``scipy.signal`` or python-control, of a class in :data:`SYSTEMS`; it is
+        read as a linear system that starts at rest. Or a filter of FilterPy, of a class in :data:`FILTERS`; its current
+        estimate becomes the first estimate, and a step means ``predict()`` or ``predict(u)``, then ``update(z)``,
+        without other arguments.
+    u : (steps, p), known inputs of a Kalman filter, in place of those in `source`; the source must have B.
+    structure : structure of a digital filter, or of a TransferFunction or ZerosPolesGain of ``scipy.signal``; one of
+        :data:`gpbnb.filters.structures.STRUCTURES`. By default, the structure that the file names; for an object, state
+        space.
 
     Raises
     ------
     ValueError : a key is missing or unknown; a system is continuous, or has no time step; a filter of FilterPy has a
         fading memory ``alpha``, correlated noise ``M``, another inverse ``inv``, inputs ``B`` without `u`, or other
-        changes; or the class of the model rejects a matrix.
-    TypeError : an object of another class.
+        changed settings; or the class of the model rejects a matrix.
+    TypeError : the class of the object is not supported.
     OSError : the file cannot be read.
 
     Examples
@@ -62,9 +101,9 @@ def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
     ('halves', 1)
     """
     if isinstance(source, (str, Path)):
-        return _from_toml(Path(source), u)
+        return _from_mapping(_toml(Path(source)), Path(source).name, u, structure)
     if isinstance(source, Mapping):
-        return _from_mapping(source, "the mapping", u)
+        return _from_mapping(source, "the mapping", u, structure)
     library, kind = type(source).__module__.partition(".")[0], type(source).__name__
     if library == "filterpy" and kind in FILTERS:
         return _from_filterpy(source, u)
@@ -73,7 +112,7 @@ def read_model(source: Any, u: Any = None) -> LinearModel | LinearSystem:
     if isinstance(source, (LinearModel, LinearSystem)):
         return source
     if kind.removesuffix("Continuous").removesuffix("Discrete") in SYSTEMS.get(library, ()):
-        return _from_system(source, library)
+        return _from_system(source, library, structure)
     raise TypeError(
         f"got a {kind}; needed the path of a TOML file, a mapping, a discrete {', '.join(SYSTEMS['scipy'])} of "
         f"scipy.signal or python-control, or a {', '.join(FILTERS)} of FilterPy; write the matrices of another class, "
@@ -123,7 +162,54 @@ def _from_filterpy(given: Any, u: Any) -> LinearModel:
     return LinearModel(F, H, Q, R, x.reshape(-1), P, kind, B=B, u=u)
 
 
-def _from_system(given: Any, library: str) -> LinearSystem:
+def read_structures(source: str | Path | Mapping[str, Any]) -> dict[str, LinearSystem]:
+    """Read a digital filter in several structures, beginning with the one that its file names.
+
+    The others are those in :data:`gpbnb.filters.design.SIDE_BY_SIDE` or, with ``structure = "all"``, all that the
+    filter has.
+
+    Returns
+    -------
+    systems : by the name of their structure; empty for another model.
+
+    Raises
+    ------
+    ValueError, OSError : as for :func:`read_model`.
+    """
+    given, where = (source, "the mapping") if isinstance(source, Mapping) else (_toml(Path(source)), Path(source).name)
+    if not _is_design(given):
+        return {}
+    design, structure = _design(given, where)
+    try:
+        if structure == "all":
+            return design.systems("all")
+        first = structure_named(design.usual if structure is None else structure)
+        return {first: design.system(first), **{name: each for name, each in design.systems().items() if name != first}}
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: {error}") from None
+
+
+def _is_design(given: Mapping[str, Any]) -> bool:
+    return "sos" in given or ("b" in given and not any(key in given for key in (*KALMAN, *SYSTEM)))
+
+
+def _design(given: Mapping[str, Any], where: str) -> tuple[FilterDesign, str | None]:
+    """Return a design, and the structure that a file names, perhaps "all"."""
+    own = {name: NAMES[name] for name in ("inputs", "outputs")}
+    if unknown := sorted(map(str, set(given) - {*DESIGN, *own, "name"})):
+        allowed = ", ".join((*DESIGN[3:], *own, "name"))
+        raise ValueError(f"{where}: {', '.join(unknown)} unknown; needed b and a, or sos, and perhaps {allowed}")
+    arguments = {"name": where.removesuffix(".toml")} | {own.get(key, key): value for key, value in given.items()}
+    structure = arguments.pop("structure", None)
+    if not isinstance(arguments["name"], str):
+        raise ValueError(f"{where}: got name {arguments['name']!r}; needed text")
+    try:
+        return FilterDesign(**arguments), structure
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: {error}") from None
+
+
+def _from_system(given: Any, library: str, structure: str | None) -> LinearSystem:
     kind, dt = type(given).__name__, given.dt
     if (dt is None) if library == "scipy" else (dt == 0):
         raise ValueError(
@@ -132,6 +218,8 @@ def _from_system(given: Any, library: str) -> LinearSystem:
         )
     if dt is None or not 0 < dt < np.inf:
         raise ValueError(f"got a {kind} with dt = {dt}; needed a discrete system; set dt to its time step, or to True")
+    if structure is not None:
+        return _in_structure(given, kind, library, structure)
     try:
         system = given if hasattr(given, "A") else given.to_ss()
     except (NotImplementedError, ImportError, ValueError) as error:
@@ -142,20 +230,71 @@ def _from_system(given: Any, library: str) -> LinearSystem:
     return LinearSystem(system.A, system.B, system.C, system.D, name=name)
 
 
-def _from_toml(path: Path, u: Any) -> LinearModel | LinearSystem:
+def _in_structure(given: Any, kind: str, library: str, structure: str) -> LinearSystem:
+    if library == "scipy" and hasattr(given, "num"):
+        b, a = (np.atleast_1d(np.squeeze(each)) for each in (given.num, given.den))
+        return LinearSystem.from_coefficients([0] * (len(a) - len(b)) + list(b), a, structure)  # both in powers of 1/z
+    if library == "scipy" and hasattr(given, "gain"):
+        return LinearSystem.from_zeros(given.zeros, given.poles, given.gain, structure)
+    raise ValueError(
+        f"got structure={structure!r} for a {kind} of {library}; needed a TransferFunction or a ZerosPolesGain of "
+        "scipy.signal; or use LinearSystem.from_coefficients"
+    )
+
+
+def model_or_function(
+    given: ModelSource | NonlinearModel | Callable[..., Any],
+) -> LinearModel | NonlinearModel | LinearSystem | Callable[..., Any]:
+    """Return a model, an object of another library read as one, or a function as it is.
+
+    Raises
+    ------
+    ValueError, TypeError, OSError : as for :func:`read_model`.
+    """
+    if isinstance(given, NonlinearModel):
+        return given
+    library = type(given).__module__.partition(".")[0]
+    return given if callable(given) and library not in SYSTEMS else read_model(cast(ModelSource, given))
+
+
+def _text(path: Path) -> str:
+    """Read a file in UTF-8, with or without a byte-order mark."""
     content = path.read_bytes()
     try:
-        found = tomllib.loads(content.decode("utf-8-sig"), parse_float=Decimal)
-    except ValueError as error:  # also text that is not UTF-8, and an integer too long for Python
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ValueError(
+            f"{path.name}, line {line}: got the byte {content[error.start]:#04x}, which is not UTF-8; needed a file in "
+            "UTF-8; save it in this encoding"
+        ) from None
+
+
+def _toml(path: Path) -> dict[str, Any]:
+    text = _text(path)
+    try:
+        return tomllib.loads(text, parse_float=Decimal)
+    except ValueError as error:  # also an integer too long for Python
         raise ValueError(f"{path.name} is not TOML: {error}") from None
     except ArithmeticError:
         raise ValueError(f"{path.name}: got an exponent that is too long; needed numbers such as 1e-3") from None
     except RecursionError:
         raise ValueError(f"{path.name} is not TOML: its lists are nested too deeply") from None
-    return _from_mapping(found, path.name, u)
 
 
-def _from_mapping(given: Mapping[str, Any], where: str, u: Any) -> LinearModel | LinearSystem:
+def _from_mapping(given: Mapping[str, Any], where: str, u: Any, structure: str | None) -> LinearModel | LinearSystem:
+    if _is_design(given):
+        if u is not None:
+            raise ValueError(
+                f"{where}: got known inputs for a digital filter; needed none: its measurements are inputs"
+            )
+        design, named = _design(given, where)
+        try:
+            return design.system(structure or (None if named == "all" else named))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{where}: {error}") from None
+    if structure is not None:
+        raise ValueError(f"{where}: got structure={structure!r}; needed none: only a digital filter has structures")
     kalman = any(key in given for key in ("Phi", "H", "Q", "R", "P0"))
     if u is not None:
         if not kalman:
@@ -164,17 +303,20 @@ def _from_mapping(given: Mapping[str, Any], where: str, u: Any) -> LinearModel |
             )
         given = {**given, "u": u}
     needed = KALMAN if kalman else SYSTEM
-    allowed = {*needed, *INPUTS, "name", "repair"} if kalman else {*needed, "C", "D", "x0", "name"}
+    own = ("states", "measurements", "inputs") if kalman else ("states", "inputs", "outputs")
+    allowed = {*needed, *own, *INPUTS, "name", "repair"} if kalman else {*needed, *own, "C", "D", "x0", "name"}
     missing, unknown = [key for key in needed if key not in given], sorted(map(str, set(given) - allowed))
     if missing or unknown:
         problems = [f"{', '.join(missing)} missing"] if missing else []
         problems += [f"{', '.join(unknown)} unknown"] if unknown else []
+        more = f", with {', '.join((*INPUTS, *own, 'name'))} if it has them" if kalman else ""
         raise ValueError(
-            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter, or "
-            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system"
+            f"{where}: {'; '.join(problems)}; needed {', '.join(KALMAN)} for a Kalman filter{more}, "
+            f"{', '.join(SYSTEM)} and optionally C, D, x0 for a linear system, or b and a, or sos, for a digital filter"
         )
     arguments: dict[str, Any] = {"repair": True} if kalman else {}
-    arguments |= {"name": where.removesuffix(".toml")} | dict(given)
+    arguments |= {"name": where.removesuffix(".toml")}
+    arguments |= {NAMES.get(key, key): value for key, value in given.items()}
     if not isinstance(arguments["name"], str):
         raise ValueError(f"{where}: got name {arguments['name']!r}; needed text")
     try:
@@ -186,33 +328,73 @@ def _from_mapping(given: Mapping[str, Any], where: str, u: Any) -> LinearModel |
 def read_measurements(path: str | Path) -> NDArray[np.float64]:
     """Read measurements (steps, m) from a CSV file with a row for each step and a column for each measurement.
 
-    Lines of text before the first numbers are headers. An empty cell or ``nan`` is a missing measurement.
+    Lines of text before the first numbers are headers, such as ``tilt (°)``. An empty cell or ``nan`` is a missing
+    measurement.
 
     Raises
     ------
-    ValueError : a cell is not a number, or rows differ in length; the message has file and line.
+    ValueError : a cell is not a number, rows differ in length, every cell of a column is empty, or the file is not in
+        UTF-8; the message has file and line.
     OSError : the file cannot be read.
     """
-    path, rows = Path(path), list[list[float]]()
-    with path.open(encoding="utf-8-sig", newline="") as stream:
-        reader = csv.reader(stream)
-        try:
-            for cells in reader:
-                if not cells or cells[0].startswith("#"):
-                    continue
-                try:
-                    row = [plain_number(cell.strip()) if cell.strip() else np.nan for cell in cells]
-                except ValueError:
-                    if not rows and all(cell.strip()[:1].isalpha() for cell in cells):
-                        continue  # a header
-                    raise
-                if rows and len(row) != len(rows[0]):
-                    raise ValueError(f"got {len(row)} cells; needed {len(rows[0])}, as in the rows above")
-                rows.append(row)
-        except UnicodeDecodeError as error:
-            raise ValueError(f"{path.name} is not UTF-8: {error}") from None
-        except (ValueError, csv.Error) as error:
-            raise ValueError(f"{path.name}, line {reader.line_num}: {error}") from None
+    path, rows, first, begin = Path(path), list[list[float]](), list[str](), 0
+    written = set[int]()  # columns in which a cell is not empty
+    reader = csv.reader(io.StringIO(_text(path), newline=""))
+    try:
+        for cells in ([cell.strip() for cell in each] for each in reader):
+            if not cells or cells[0].startswith("#"):
+                continue
+            _check_separator(cells)
+            if not rows and _is_header(cells):
+                continue
+            row = [_number(cell) for cell in cells]
+            if not rows:
+                first, begin = cells, reader.line_num
+            elif len(cells) != len(first):
+                cure = "" if max(cells, first, key=len)[-1] else "; remove the comma at the end of the longer row"
+                raise ValueError(f"got {len(cells)} cells; needed {len(first)}, as in the rows above{cure}")
+            rows.append(row)
+            written |= {i for i, cell in enumerate(cells) if cell}
+    except (ValueError, csv.Error) as error:
+        raise ValueError(f"{path.name}, line {reader.line_num}: {error}") from None
     if not rows:
         raise ValueError(f"{path.name}: got no rows of numbers; needed one for each step")
+    for i in range(len(first)):
+        if i not in written:
+            cure = "remove the comma at the end of each row, or " if 0 < i == len(first) - 1 else ""
+            raise ValueError(
+                f"{path.name}, line {begin}: got an empty cell in column {i + 1} of this row and every other; needed "
+                f"numbers; {cure}write nan where a measurement is missing"
+            )
     return np.array(rows)
+
+
+def _check_separator(cells: list[str]) -> None:
+    """Reject a row that another character than a comma separates; decimal commas may split it as well."""
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if any(separator in cell for cell in cells) and (len(cells) == 1 or not _is_header(cells)):
+            raise ValueError(
+                f"got {name} between the cells; needed commas, and a point as decimal mark; replace them, or "
+                "export with commas"
+            )
+
+
+def _is_header(cells: list[str]) -> bool:
+    """Whether a row names its columns: no cell begins as a number does, and one is not a word for a missing number."""
+    named = [cell.lower() for cell in cells if cell]
+    if not all(cell[0] not in "0123456789+-." and cell not in _WORDS for cell in named):
+        return False
+    return any(cell not in _MISSING for cell in named)
+
+
+_WORDS = ("nan", "inf")
+_MISSING = ("n/a", "na", "#n/a", "none", "null", "nil", "missing")
+
+
+def _number(cell: str) -> float:
+    word = cell.lower()
+    try:
+        return plain_number(word if word in _WORDS else cell) if cell else math.nan
+    except ValueError as error:
+        cure = "; write nan, or leave the cell empty, where a measurement is missing" if word in _MISSING else ""
+        raise ValueError(f"{error}{cure}") from None

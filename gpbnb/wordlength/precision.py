@@ -3,49 +3,61 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb.arithmetic.conversion import Numbers
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import Compiled
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.arithmetic.search import CHECKED, Search, largest_compiled
-from gpbnb.bounds.bounded_run import BoundedRun
-from gpbnb.bounds.envelope import Limits
+from gpbnb.arithmetic.search import CHECKED, Outcome, Search, largest_by_default, largest_compiled
+from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.gains import check_deterministic
-from gpbnb.bounds.guarantee import check_limits, guarantee
+from gpbnb.bounds.guarantee import Guarantee, check_limits, guarantee
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.array_forms import AnyForm, ArrayForm
 from gpbnb.filters.array_run import ArrayRun
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.forms import Form
-from gpbnb.filters.inputs import simulated_measurements
-from gpbnb.filters.missing import without_missing
+from gpbnb.filters.missing import stored_measurements, without_missing
 from gpbnb.filters.model import LinearModel
-from gpbnb.filters.named import form_named, rounding_named, whole_number
-from gpbnb.filters.run import Run, reference_states
+from gpbnb.filters.named import form_named, named, rounding_named, whole_number
+from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
+from gpbnb.filters.nonlinear_run import NonlinearRun, check_form, complete, opened, simulated, true_states
+from gpbnb.filters.run import Run
+from gpbnb.filters.system import LinearSystem, unobserved
+from gpbnb.wordlength.models import ModelSource, model_or_function
 from gpbnb.wordlength.recursion import Recursion, required_recursion_precision, survey_recursion
-from gpbnb.wordlength.requirement import Basis, Requirement, checked_tolerance, format_like, largest_ratio, listed
-from gpbnb.wordlength.system import LinearSystem, required_system_precision, unobserved
+from gpbnb.wordlength.requirement import (
+    Asked,
+    Basis,
+    Requirement,
+    Strategy,
+    checked_tolerance,
+    format_like,
+    has_no_bound,
+    largest_ratio,
+)
+from gpbnb.wordlength.system import required_system_precision
 
 
 def required_precision(
-    model: LinearModel | LinearSystem | Recursion,
+    model: ModelSource | NonlinearModel | Recursion,
     steps: int,
-    tolerance: float | Sequence[float],
+    tolerance: Numbers,
     base: int = 2,
     rounding: Rounding | str = Rounding.NEAREST,
     form: AnyForm | str = Form.INNOVATION,
     basis: Basis = "emulation",
-    z: Any = None,
+    z: Numbers | None = None,
     seed: int = 0,
     progress: bool = False,
-    within: Limits | None = None,
+    within: FilterLimits | None = None,
     emin: int | None = None,
     emax: int | None = None,
     subnormal: bool = True,
@@ -53,131 +65,160 @@ def required_precision(
 ) -> Requirement:
     """Find the smallest precision with which a filter stays within a tolerance.
 
-    The search is a bisection, and checks its own assumption: the answer, the next two precisions, and those of binary32
-    and binary64 above it (:data:`gpbnb.arithmetic.search.CHECKED`) were run and meet the tolerance; the next lower one,
-    if any, was run and does not qualify. If a higher precision misses the tolerance, every precision up to the largest
-    is run, the answer lies above the highest that misses it, and the other forms are tried.
+    The search is a bisection that checks its own assumption. It runs the answer, the next two precisions, and the
+    precisions of binary32 and binary64 if they are higher (:data:`gpbnb.arithmetic.search.CHECKED`); all of these meet
+    the tolerance. It also runs the next lower precision, which does not qualify. If a higher precision misses the
+    tolerance, the search runs every precision up to the largest and the other forms; the answer is then above the
+    highest precision that misses.
 
     Parameters
     ----------
-    model : a Kalman filter; with repaired covariances, the answer lists the repairs. Or a linear system, whose inputs
-        are `z`; see :func:`gpbnb.wordlength.system.required_system_precision`. Or a function of a format and `z`,
-        written with arrays of the format; see :func:`gpbnb.wordlength.recursion.required_recursion_precision`.
-    tolerance : largest error of each state due to rounding in any step, in its unit; one number, or (n,). Give states
-        whose accuracy does not matter an infinite tolerance. For a linear system, of each output.
+    model : a Kalman filter; a linear system, whose inputs are `z`; anything that
+        :func:`gpbnb.wordlength.models.read_model` reads, such as a ``scipy.signal.dlti``; or a function of a format and
+        `z`, written with arrays of the format; or a
+        :class:`gpbnb.filters.smoothing.FixedIntervalSmoother`; or a nonlinear filter, which only the basis
+        "emulation" covers. See
+        :func:`gpbnb.wordlength.system.required_system_precision` for systems and
+        :func:`gpbnb.wordlength.recursion.required_recursion_precision` for functions. If covariances of a Kalman filter
+        were repaired, the answer lists the repairs.
+    tolerance : largest acceptable error due to rounding of each state in any step, in the unit of the state; one
+        number, or (n,). Give states whose accuracy does not matter an infinite tolerance. For a linear system, it is
+        the largest acceptable error of each output.
     base : 2, 10 or 16.
     rounding, form : values or their names, such as "nearest" and "UD"; see :class:`gpbnb.filters.forms.Form` and
         :class:`gpbnb.filters.array_forms.ArrayForm`.
-    basis : "emulation" compares each precision with double-double and the model as given, so that the errors of storing
-        the model are among those of the arithmetic; the answer is for these measurements. "bound" uses the
-        contraction bound of :mod:`gpbnb.filters.contraction`, which is proved for the arithmetic of this run and
-        requires more digits. "guarantee" bounds the error for every measurement sequence within limits, and forever
-        (``guarantee``); "probable" takes three standard deviations of the error that independent
-        roundings would cause. Neither depends on `z` or `steps`, and only neighbours of the answer are checked. Both
-        assume sums from left to right without fused multiply-add, and refuse stochastic rounding of a Kalman filter.
+    basis : "emulation" compares a run in each precision with a run in double-double of the model as given, so the
+        errors include those of storing the model. The answer holds for these measurements. "bound" uses the contraction
+        bound of :mod:`gpbnb.filters.contraction`, which is proved for the arithmetic of this run and requires more
+        digits. "guarantee" bounds the error for every measurement sequence within limits, and for ever, or for `steps`
+        if the filter keeps its errors; "probable" takes three standard deviations of the error that independent
+        roundings would cause. The last two do not depend on `z`, and for them only the neighbours of the answer are
+        checked. Both assume sums from left to right without fused multiply-add, and refuse stochastic rounding of a
+        Kalman filter.
     within : limits on the filter without rounding, for "guarantee" and "probable"; see
         :func:`gpbnb.bounds.guarantee.limits`.
-    emin, emax, subnormal : range of the formats, as of a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
+    emin, emax, subnormal : range of the formats, as in a :class:`gpbnb.arithmetic.formats.FloatFormat`; by default
         unlimited. A format in which a number overflows does not meet the tolerance; the answer names the quantity and
         the step.
     z : (steps, m), measurements, NaN or masked if missing; by default simulated with the model, from its first
         estimate, and rounded to :func:`gpbnb.filters.simulation.fine_resolution`.
     seed : seed of the simulation.
     progress : show a progress bar that counts precisions.
-    largest : highest precision to try. By default, and at most, it is the largest with compiled loops: 53 bits, 18
-        decimal or 13 hexadecimal digits, fewer with some roundings. A function runs in any precision; by default
-        those up to 200 bits, 60 decimal or 50 hexadecimal digits are tried.
+    largest : highest precision to try. For a linear model, the default is also the maximum: the highest precision with
+        compiled loops, which is 53 bits, 18 decimal digits or 13 hexadecimal digits, and lower for some roundings. A
+        function or a nonlinear filter runs in any precision; its default is 200 bits, 60 decimal digits or 50
+        hexadecimal digits.
 
     Raises
     ------
-    ValueError : a tolerance that is not positive; another basis, form or rounding; a base without compiled loops, or
-        for a model a largest precision without them; more or fewer measurements than steps; a model with known inputs,
-        or an ``ArrayForm``, where a basis does not cover them; limits for another filter, or that the first estimate
-        exceeds; stochastic rounding with a basis that holds for ever.
-    TypeError : another kind of model, or of limits.
+    ValueError : a tolerance that is not positive; an unknown basis, form or rounding; a base without compiled loops;
+        for a model, a `largest` beyond the precision of the compiled loops; more or fewer measurements than steps; a
+        model with known inputs, or an ``ArrayForm``, together with a basis that does not cover it; limits for another
+        filter; a first estimate beyond its limit; stochastic rounding with a basis that holds for ever.
+    TypeError : an unknown kind of model, or limits that are not a result of :func:`~gpbnb.bounds.guarantee.limits`.
     OverflowError : an output of a linear system, or its reference, leaves the range of float64; the entries of a model
         are too large or too small for compiled loops.
     ArithmeticError : the filter is degenerate even without rounding; see :func:`gpbnb.filters.run.reference`.
     """
-    form, rounding = form_named(form), rounding_named(rounding)
-    like = format_like(base, rounding, emin, emax, subnormal)
-    if within is not None and not isinstance(within, Limits):
+    form, like = form_named(form), format_like(base, rounding_named(rounding), emin, emax, subnormal)
+    if within is not None and not isinstance(within, FilterLimits):
         raise TypeError(f"got within={within!r}; needed the result of limits(...)")
-    if not isinstance(model, LinearModel) and form is not Form.INNOVATION:
-        raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+    model = model_or_function(model)
+    if not isinstance(model, LinearModel | NonlinearModel) and form is not Form.INNOVATION:
+        raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
+    asked = Asked(whole_number("steps", steps), basis, like, largest, progress)
     if callable(model):
         if within is not None:
             raise ValueError("got limits for a function; needed none: they are for models")
-        steps = whole_number("steps", steps)
-        return required_recursion_precision(model, steps, tolerance, z, like, basis, progress, largest)
-    largest = _checked_largest(largest, like)
+        return required_recursion_precision(model, asked, tolerance, z)
+    asked = asked._replace(largest=_checked_largest(model, largest, like))
     if isinstance(model, LinearSystem):
-        return required_system_precision(model, steps, tolerance, z, like, basis, within, progress, largest)
+        return required_system_precision(model, asked, tolerance, z, within)
     tolerances = _checked(model, tolerance, base, basis)
     if like.limits is None:
         model.check_sizes()
-    steps = whole_number("steps", steps)
-    for_ever = basis in ("guarantee", "probable")
-    if for_ever and within is None:
-        raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
-    if for_ever:
-        model.refuse_inputs(f'basis "{basis}"')
-        check_deterministic(like)
-        check_limits(within, model.n, model.m, model.x0)
-        if isinstance(form, ArrayForm):
-            raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
-        if model.steps is not None:
-            raise ValueError(
-                f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever'
-            )
+    if isinstance(model, NonlinearModel):
+        if within is not None:
+            raise ValueError(f"got limits for {model.name}; needed none: {NO_GUARANTEE}")
+    elif basis in ("guarantee", "probable"):
+        return _for_ever(model, asked, tolerances, form, z, within)
     if z is None:
-        z = simulated_measurements(model, steps, whole_number("seed", seed, 0))
-    repairs = tuple(str(each) for each in model.repairs)
-    given = model
-    model, z = without_missing(model, z)
-    if for_ever and model is not given:
-        raise ValueError(f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record')
-    measured = _measured(model, z, steps)
-    model.check_steps(steps)
-    true = reference_states(model, measured) if basis == "emulation" else None
-
-    def errors_of(chosen: AnyForm) -> Callable[[FloatFormat], tuple[float, str]]:
-        if within is not None and for_ever and isinstance(chosen, Form):
-            compiled = chosen
-            return lambda fmt: _guaranteed(model, fmt, compiled, within, tolerances, basis)
-        return lambda fmt: _error_over_tolerance(model, measured, fmt, chosen, true, tolerances)
-
-    checks = () if for_ever else CHECKED[base]
-    with tqdm(desc="precisions", unit="run", disable=not progress) as bar:
-        search = partial(Search, like=like, checks=checks, tick=bar.update, bounds=basis == "bound", largest=largest)
-        found = search(errors_of(form))
-        advice = f"no bound exists in {listed(found.undecided)} digits" if found.undecided else ""
-        if not for_ever and (found.irregular or found.fmt is None):
-            advice = _better_form(errors_of, form, search)
-    if found.fmt is not None:
-        repairs += tuple(map(str, _opened(model, found.fmt, form, (), False).repairs[len(model.repairs) :]))
-    cause = "" if found.fmt is not None or model.cycle != 1 else unobserved(model.Phi[0], model.H[0])
-    if cause and not for_ever:
-        cause, advice = "", "; ".join([*filter(None, [advice]), f"{cause}, so that its errors never decay"])
-    return Requirement(
-        found.fmt, basis, steps, found.tried, found.why, form, found.irregular, advice, repairs, found.limit, cause
-    )
+        z = simulated(model, asked.steps, whole_number("seed", seed, 0))
+    return _for_record(model, asked, tolerances, form, z)
 
 
-def _better_form(
-    errors_of: Callable[[AnyForm], Callable[[FloatFormat], tuple[float, str]]],
+def _for_record(model: AnyModel, asked: Asked, tolerances: NDArray[np.float64], form: AnyForm, z: Any) -> Requirement:
+    """Find the answer for one measurement record, by emulation or by the bound of each run."""
+    strategy = recorded_strategy(model, asked, tolerances, form, z)
+    sound = strategy.model
+    with asked.search(CHECKED[asked.like.base], bounds=asked.basis == "bound") as search:
+        found = search(strategy)
+        irregular = found.irregular or found.fmt is None
+        advice = _better_form(strategy, search) if irregular else ""
+    if found.fmt is None and isinstance(sound, LinearModel) and sound.cycle == 1:
+        cause = unobserved(sound.Phi[0], sound.H[0], sound.state_names)
+        advice = "; ".join(filter(None, [advice, cause and f"{cause}, so that its errors never decay"]))
+    return asked.answer(found, form, advice, _repairs(model, sound, found.fmt, form))
+
+
+def _for_ever(
+    model: LinearModel,
+    asked: Asked,
+    tolerances: NDArray[np.float64],
     form: AnyForm,
-    search: Callable[[Callable[[FloatFormat], tuple[float, str]]], Search],
-) -> str:
+    z: Any,
+    within: FilterLimits | None,
+) -> Requirement:
+    """Find the answer for all measurements within limits, by the guarantee or by the probable error."""
+    basis = asked.basis
+    if within is None:
+        raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
+    model.refuse_inputs(f'basis "{basis}"')
+    check_deterministic(asked.like)
+    check_limits(within, model.n, model.m, model.x0)
+    if isinstance(form, ArrayForm):
+        raise ValueError(f'got the {form} form and basis "{basis}"; needed one of {", ".join(map(str, Form))}')
+    if model.steps is not None:
+        raise ValueError(f'got a model of {model.steps} steps and basis "{basis}"; needed one that goes on for ever')
+    if z is not None:
+        sound, filled = without_missing(model, z)
+        if sound is not model:
+            raise ValueError(
+                f'got missing measurements and basis "{basis}"; needed none: it does not depend on a record'
+            )
+        _measured(model, filled, asked.steps)
+    kind = Guaranteed if basis == "guarantee" else Probable
+    strategy = kind(model, form, within, tolerances)
+    with asked.search(checks=()) as search:
+        found = search(strategy)
+        if kind is Guaranteed and has_no_bound(found):
+            ended = search(replace(strategy, steps=asked.steps))
+            if ended.fmt is not None or not has_no_bound(ended):
+                return asked.answer(ended, form, repairs=_repairs(model, model, ended.fmt, form), ends=True)
+    cause = "" if found.fmt is not None or model.cycle != 1 else unobserved(model.Phi[0], model.H[0], model.state_names)
+    if cause:
+        cause += '; ask with basis "bound" for a number of steps instead'
+    return asked.answer(found, form, repairs=_repairs(model, model, found.fmt, form), cause=cause)
+
+
+def _repairs(given: AnyModel, sound: AnyModel, fmt: FloatFormat | None, form: AnyForm) -> tuple[str, ...]:
+    """Return the changes of the covariances of a model and, if there is an answer, of its run in the format."""
+    more = [] if fmt is None else opened(sound, fmt, form).repairs[len(sound.repairs) :]
+    return tuple(map(str, (*given.repairs, *more)))
+
+
+def _better_form(strategy: Recorded, search: Callable[[Strategy], Search[FloatFormat]]) -> str:
     """Name the form that meets the tolerance with the fewest digits, as advice; empty if there is none."""
-    others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not form]
-    answers = [(other, search(errors_of(other)).fmt) for other in others]
+    if isinstance(strategy.model, NonlinearModel) and strategy.model.method == "unscented":
+        return ""
+    others = [each for each in (Form.UD, Form.JOSEPH, Form.INNOVATION) if each is not strategy.form]
+    answers = [(other, search(replace(strategy, form=other)).fmt) for other in others]
     met = [(fmt.precision, str(other)) for other, fmt in answers if fmt is not None]
     return f"the form {min(met)[1]} needs {min(met)[0]} digits" if met else ""
 
 
 def survey(
-    model: LinearModel | Recursion,
+    model: AnyModel | Recursion,
     z: Any,
     tolerance: float | Sequence[float],
     precisions: Sequence[int],
@@ -189,7 +230,7 @@ def survey(
     emax: int | None = None,
     subnormal: bool = True,
 ) -> tuple[tuple[int, float], ...]:
-    """Run a filter in each of some precisions; for the arguments, see :func:`required_precision`.
+    """Run a filter in each of the given precisions; the arguments are those of :func:`required_precision`.
 
     Returns
     -------
@@ -203,46 +244,49 @@ def survey(
     formats = [replace(like, precision=precision) for precision in precisions]
     if not formats:
         raise ValueError("got no precisions; needed at least one")
-    if not isinstance(model, LinearModel) and callable(model):
+    if callable(model):
         if form is not Form.INNOVATION:
-            raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+            raise ValueError(f"got the {form} form; needed none: only a LinearModel or a NonlinearModel has forms")
         return survey_recursion(model, z, tolerance, formats, basis)
-    if beyond := [fmt.precision for fmt in formats if not isinstance(fmt.backend, Compiled)]:
+    compiled = [isinstance(model, NonlinearModel) or isinstance(fmt.backend, Compiled) for fmt in formats]
+    if beyond := [fmt.precision for fmt, has_loops in zip(formats, compiled, strict=True) if not has_loops]:
         raise ValueError(f"got {beyond} digits of base {base}; needed at most {largest_compiled(like)}")
     found = survey_formats(model, z, tolerance, formats, form, basis)
     return tuple((fmt.precision, ratio) for fmt, (ratio, _) in zip(formats, found, strict=True))
 
 
 def survey_formats(
-    model: LinearModel,
+    model: AnyModel,
     z: Any,
     tolerance: Any,
     formats: Sequence[FloatFormat],
     form: AnyForm = Form.INNOVATION,
     basis: Basis = "emulation",
-) -> list[tuple[float, str]]:
+) -> list[Outcome]:
     """Run a filter in each format; return largest error or bound / tolerance, and why it is infinite."""
     tolerances = _checked(model, tolerance, formats[0].base, basis)
     if any(fmt.limits is None for fmt in formats):
         model.check_sizes()
-    model, z = without_missing(model, z)
+    model, z = complete(model, z)
     measured = _measured(model, z)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"; the other bases do not depend on a run')
-    true = reference_states(model, measured) if basis == "emulation" else None
-    return [_error_over_tolerance(model, measured, fmt, form, true, tolerances) for fmt in formats]
+    strategy = _recorded(model, measured, tolerances, form, basis)
+    return [strategy.error(fmt) for fmt in formats]
 
 
 def largest_errors(
-    model: LinearModel, z: Any, fmt: FloatFormat, form: AnyForm | str = Form.INNOVATION
+    model: AnyModel, z: Any, fmt: FloatFormat, form: AnyForm | str = Form.INNOVATION
 ) -> NDArray[np.float64]:
     """Return the largest error of each state in any step, (n,), of a run that :func:`survey` found finite."""
-    run = _opened(model, fmt, form_named(form), (), False)
-    return np.abs((run.states(fmt.array(z)) - reference_states(model, z)).sum(axis=2)).max(axis=0)
+    run = opened(model, fmt, form_named(form))
+    return np.abs((run.states(fmt.array(z)) - true_states(model, z)).sum(axis=2)).max(axis=0)
 
 
-def _checked_largest(largest: int | None, like: FloatFormat) -> int | None:
+def _checked_largest(model: AnyModel | LinearSystem, largest: int | None, like: FloatFormat) -> int | None:
     """Check the highest precision to try for a model; None stands for the largest with compiled loops."""
+    if isinstance(model, NonlinearModel):
+        return largest_by_default(like.base) if largest is None else whole_number("largest", largest, 2)
     if largest is None:
         return None
     largest, most = whole_number("largest", largest, 2), largest_compiled(like)
@@ -254,14 +298,17 @@ def _checked_largest(largest: int | None, like: FloatFormat) -> int | None:
     return largest
 
 
-def _checked(model: LinearModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
+def _checked(model: AnyModel, tolerance: Any, base: int, basis: str) -> NDArray[np.float64]:
     """Check the question, and return the tolerance of each state."""
-    if not isinstance(model, LinearModel):
-        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel or a LinearSystem")
-    return checked_tolerance(tolerance, model.n, "states", base, basis)
+    if not isinstance(model, LinearModel | NonlinearModel):
+        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel, NonlinearModel or LinearSystem")
+    tolerances = checked_tolerance(tolerance, model.n, "states", base, basis)
+    if basis != "emulation" and isinstance(model, NonlinearModel):
+        raise ValueError(f'got basis "{basis}" for {model.name}; needed "emulation": {NO_GUARANTEE}')
+    return tolerances
 
 
-def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[Any]:
+def _measured(model: AnyModel, z: Any, steps: int | None = None) -> NDArray[Any]:
     """Return measurements (steps, m) that are all numbers."""
     measured = np.asarray(z)
     if measured.ndim != 2 or measured.shape[1] != model.m or not len(measured) or steps not in (None, len(measured)):
@@ -271,71 +318,135 @@ def _measured(model: LinearModel, z: Any, steps: int | None = None) -> NDArray[A
         raise ValueError(f"got {length}; needed one measurement for each of the {count}, of shape ({model.m},){column}")
     if measured.dtype.kind == "f" and not np.isfinite(measured).all():
         k, i = np.argwhere(~np.isfinite(measured))[0]
+        which = named("measurement", int(i), model.measurement_names)
         raise ValueError(
-            f"got {measured[k, i]} for measurement {i} of step {k + 1}; needed finite numbers, or NaN where "
-            "one is missing"
+            f"got {measured[k, i]} for {which} of step {k + 1}; needed finite numbers, or NaN where one is missing"
         )
     return measured
 
 
-def _error_over_tolerance(
-    model: LinearModel,
-    z: NDArray[Any],
-    fmt: FloatFormat,
-    form: AnyForm,
-    true: NDArray[np.float64] | None,
-    tolerances: NDArray[np.float64],
-) -> tuple[float, str]:
-    """Return the largest error, or without `true` the largest bound, over tolerance; or infinity and the reason."""
-    asked = np.isfinite(tolerances)
-    try:
-        measured = fmt.array(z)
-        run = _opened(model, fmt, form, range(1, len(z) + 1) if true is None else (), true is None)
-    except ValueError as error:  # with so few digits, a covariance is not definite
-        return math.inf, str(error)
-    except OverflowError as error:
-        return math.inf, f"overflow in the model or the measurements: {error}"
-    if true is None:
-        run.take(measured)
-    else:
-        states = run.states(measured)
-    if run.stopped is not None:
-        return math.inf, f"the run is refused: {run.reason}"
-    if true is None and isinstance(run, (BoundedRun, ArrayRun)):
-        errors = run.bounds[0]
-    elif true is not None:
-        errors = (states - true).sum(axis=2)
-        if run.indefinite is not None:
+# -- strategies -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded(ABC):
+    """The errors of one run with a measurement record, z (steps, m), in a form; each state has its tolerance, (n,)."""
+
+    model: AnyModel
+    z: NDArray[Any]
+    form: AnyForm
+    tolerances: NDArray[np.float64]
+    bounded: ClassVar[bool] = False
+
+    def error(self, fmt: FloatFormat | BlockFormats) -> Outcome:
+        """Return the largest error, or its bound, over the tolerance; or infinity and the reason."""
+        asked = np.isfinite(self.tolerances)
+        try:
+            measured = stored_measurements(self.z, fmt)
+            steps = range(1, len(self.z) + 1) if self.bounded else ()
+            run = opened(self.model, fmt, self.form, steps, self.bounded)
+        except ValueError as error:  # with so few digits, a covariance is not definite
+            return Outcome(math.inf, str(error))
+        except OverflowError as error:
+            return Outcome(math.inf, f"overflow: {error}")
+        errors = self._errors(run, measured)
+        if run.stopped is not None:
+            return Outcome(math.inf, f"the run is refused: {run.reason}")
+        if run.indefinite is not None and not self.bounded:
             lost = f"a computed variance was not positive at step {run.indefinite}"
-            return math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0"
-    ratio = largest_ratio(np.abs(errors[:, asked]), tolerances[asked])
-    return ratio, "the bound says nothing" if math.isinf(ratio) else ""
+            return Outcome(math.inf, f"{lost}; if the model leaves a state without any, give it a little in P0")
+        ratio = largest_ratio(np.abs(errors[:, asked]), self.tolerances[asked])
+        return Outcome(ratio, "the bound says nothing" if math.isinf(ratio) else "")
+
+    @abstractmethod
+    def _errors(self, run: Run | ArrayRun | NonlinearRun, z: Any) -> NDArray[np.float64]:
+        """Take all steps, and return errors, or bounds, of each state after the steps done, (steps, n)."""
 
 
-def _opened(
-    model: LinearModel, fmt: FloatFormat, form: AnyForm, checkpoint_steps: Sequence[int], bounded: bool
-) -> Run | BoundedRun | ArrayRun:
-    """Return a run in compiled loops if the form has them and the model has no inputs, else in array operations."""
-    if model.has_inputs or isinstance(form, ArrayForm):
-        return ArrayRun(model, fmt, form, checkpoint_steps, bounded)
-    return (BoundedRun if bounded else Run)(model, fmt, form, checkpoint_steps)
+@dataclass(frozen=True, eq=False)
+class Emulated(Recorded):
+    """Errors against `true`, (steps, n, 2), the estimates of the filter without rounding."""
+
+    true: NDArray[np.float64]
+
+    def _errors(self, run: Run | ArrayRun | NonlinearRun, z: Any) -> NDArray[np.float64]:
+        states = run.states(z)
+        return np.asarray((states - self.true[: len(states)]).sum(axis=2))
 
 
-def _guaranteed(
-    model: LinearModel,
-    fmt: FloatFormat,
-    form: Form,
-    within: Limits,
-    tolerances: NDArray[np.float64],
-    basis: Basis,
-) -> tuple[float, str]:
-    """Return the guaranteed error, or three times the probable error, over tolerance; or infinity and the reason."""
-    asked = np.isfinite(tolerances)
-    try:
-        found = guarantee(model, fmt, within, form, horizon=1)
-    except ValueError as error:
-        return math.inf, str(error)
-    if not found.for_ever:
-        return math.inf, found.why
-    errors = found.bound if basis == "guarantee" else 3 * probable_error(found)
-    return largest_ratio(errors[asked], tolerances[asked]), ""
+class Bounded(Recorded):
+    """The contraction bound of each step of the run."""
+
+    bounded = True
+
+    def _errors(self, run: Any, z: Any) -> NDArray[np.float64]:
+        run.take(z)
+        return run.bounds[0]
+
+
+def recorded_strategy(model: AnyModel, asked: Asked, tolerance: Any, form: AnyForm, z: Any) -> Recorded:
+    """Check a question about one measurement record, (steps, m), and return the strategy that answers it.
+
+    Raises
+    ------
+    ValueError, TypeError : for a reason given in :func:`required_precision`.
+    """
+    tolerances = _checked(model, tolerance, asked.like.base, asked.basis)
+    if asked.like.limits is None:
+        model.check_sizes()
+    sound, filled = complete(model, z)
+    measured = _measured(sound, filled, asked.steps)
+    sound.check_steps(asked.steps)
+    return _recorded(sound, measured, tolerances, form, asked.basis)
+
+
+def _recorded(
+    model: AnyModel, z: NDArray[Any], tolerances: NDArray[np.float64], form: AnyForm, basis: Basis
+) -> Recorded:
+    """Return the strategy of a basis that depends on a record."""
+    if basis == "bound":
+        return Bounded(model, z, form, tolerances)
+    if isinstance(model, NonlinearModel):
+        check_form(model, form)
+    return Emulated(model, z, form, tolerances, true_states(model, z))
+
+
+@dataclass(frozen=True, eq=False)
+class Guaranteed:
+    """The guarantee for all measurements within limits, over some steps or for ever."""
+
+    model: LinearModel
+    form: Form
+    within: FilterLimits
+    tolerances: NDArray[np.float64]
+    #: None if it holds for ever.
+    steps: int | None = None
+
+    def error(self, fmt: FloatFormat) -> Outcome:
+        """Return the largest error over the tolerance, or infinity and the reason."""
+        asked = np.isfinite(self.tolerances)
+        try:
+            if self.steps is None:
+                found = guarantee(self.model, fmt, self.within, self.form, horizon=1)
+            else:
+                found = guarantee(self.model, fmt, self.within, self.form, max(self.steps, 1), self.steps)
+        except ValueError as error:
+            return Outcome(math.inf, str(error))
+        except OverflowError as error:
+            if isinstance(fmt, FloatFormat) and fmt.limits is None:
+                raise
+            return Outcome(math.inf, f"overflow: {error}")
+        if not found.for_ever and found.steps != self.steps:
+            return Outcome(math.inf, found.why)
+        return Outcome(largest_ratio(self._errors(found)[asked], self.tolerances[asked]))
+
+    def _errors(self, found: Guarantee) -> NDArray[np.float64]:
+        """Return the error of each state, (n,)."""
+        return found.bound
+
+
+class Probable(Guaranteed):
+    """Three standard deviations of the error that independent roundings would cause."""
+
+    def _errors(self, found: Guarantee) -> NDArray[np.float64]:
+        return 3 * probable_error(found)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -15,12 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
+from gpbnb.arithmetic.search import Outcome, least_from_which_on
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.inputs import simulated_measurements
 from gpbnb.filters.missing import real_numbers
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named, whole_number
+from gpbnb.filters.nonlinear import NO_GUARANTEE, AnyModel, NonlinearModel
+from gpbnb.filters.nonlinear_run import simulated
 from gpbnb.sweeps import Column, Sweep
 from gpbnb.wordlength.precision import survey_formats
 from gpbnb.wordlength.requirement import Basis, checked_tolerance
@@ -48,32 +51,42 @@ class RecordSurvey(NamedTuple):
     #: For each record and format, why the ratio is infinite; otherwise an empty text.
     reasons: tuple[tuple[str, ...], ...]
 
+    def __repr__(self) -> str:
+        """Return a table with a row for each format."""
+        rows = [
+            (format_text(fmt), f"{share:.0%}", f"{worst:.3g}")
+            for fmt, share, worst in zip(self.formats, self.shares, self.ratios.max(axis=0).tolist(), strict=True)
+        ]
+        header = ("format", "within the tolerance", "largest error / tolerance")
+        width = max(len(name) for name, _, _ in (header, *rows))
+        lines = [
+            f"{name:<{width}}  {share:>{len(header[1])}}  {worst:>{len(header[2])}}" for name, share, worst in rows
+        ]
+        count = f"{len(self.ratios)} record{'s' * (len(self.ratios) != 1)}"
+        return "\n".join([f"{count} in each format", f"{header[0]:<{width}}  {header[1]}  {header[2]}", *lines])
+
     @property
     def shares(self) -> tuple[float, ...]:
         """For each format, the share of records that stay within the tolerance."""
         return tuple(float(share) for share in (self.ratios <= 1).mean(axis=0))
 
     def enough(self) -> tuple[FloatFormat, ...]:
-        """For each base, rounding and range, the format of fewest digits with which all records meet the tolerance.
+        """For each base, rounding and range, the format with the fewest digits in which all records meet the tolerance.
 
         A format counts only if the formats with more digits in the survey also meet the tolerance.
         """
         met = {fmt: bool((self.ratios[:, i] <= 1).all()) for i, fmt in enumerate(self.formats)}
         found = []
-        kinds = {fmt: replace(fmt, precision=1, largest=None) for fmt in self.formats}
+        kinds = {fmt: replace(fmt, precision=1, given_largest=None) for fmt in self.formats}
         for kind in dict.fromkeys(kinds.values()):
-            least = None
-            falling = sorted((fmt for fmt in met if kinds[fmt] == kind), key=lambda fmt: -fmt.precision)
-            for fmt in falling:
-                if not met[fmt]:
-                    break
-                least = fmt
-            found += [] if least is None else [least]
+            alike = {fmt.precision: fmt for fmt in self.formats if kinds[fmt] == kind}
+            least = least_from_which_on({precision: met[fmt] for precision, fmt in alike.items()})
+            found += [] if least is None else [alike[least]]
         return tuple(found)
 
 
 def survey_records(
-    model: LinearModel,
+    model: AnyModel,
     records: Any,
     tolerance: float | Sequence[float],
     formats: Sequence[FloatFormat],
@@ -86,14 +99,14 @@ def survey_records(
     chunk: int = 1,
     progress: bool = False,
 ) -> RecordSurvey:
-    """Run a filter on many records in many formats; see :func:`gpbnb.wordlength.precision.survey`.
+    """Run a filter on many measurement records in many formats, as :func:`gpbnb.wordlength.precision.survey`.
 
     Parameters
     ----------
-    records : (records, steps, m), or a list of (steps, m) of any lengths, NaN where a measurement is missing. Or the
-        number of records to simulate, with the seeds 0, 1, …, of `steps` steps each.
+    records : (records, steps, m), or a list of records (steps, m) of any lengths, with NaN where a measurement is
+        missing. A whole number requests that many simulated records of `steps` steps each, with the seeds 0, 1, ….
     tolerance, form, basis : as for :func:`gpbnb.wordlength.precision.required_precision`; basis "emulation" or "bound".
-    formats : formats of any base, rounding and range, with compiled loops.
+    formats : formats of any base, rounding and range; for a linear model, with compiled loops.
     executor : any executor of concurrent.futures, or Dask's ``Client.get_executor()``; by default this process.
     directory : folder for finished records. After an interruption, the same call resumes; other arguments start a new
         survey. By default nothing is saved.
@@ -111,17 +124,33 @@ def survey_records(
     >>> found = survey_records(walk, 3, 0.01, [FloatFormat(2, 4), FloatFormat(2, 24)], steps=20)
     >>> found.shares
     (0.0, 1.0)
+    >>> found
+    3 records in each format
+    format   within the tolerance  largest error / tolerance
+    4 bits                     0%                       15.7
+    24 bits                  100%                   1.13e-05
     """
-    if not isinstance(model, LinearModel):
-        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel")
+    if not isinstance(model, LinearModel | NonlinearModel):
+        raise TypeError(f"got a model {type(model).__name__}; needed a LinearModel or a NonlinearModel")
+    if isinstance(model, NonlinearModel):
+        if basis != "emulation":
+            raise ValueError(f'got basis "{basis}" for {model.name}; needed "emulation": {NO_GUARANTEE}')
+        if directory is not None:
+            raise ValueError(
+                "got directory= for a nonlinear filter; needed none: a later call cannot tell whether its functions "
+                "are still the same"
+            )
     form, chunk = form_named(form), whole_number("chunk", chunk)
+    if not isinstance(formats, Iterable):
+        raise TypeError(f"got formats {formats!r}; needed a list of FloatFormats")
     given = tuple(formats)
     if not given or len(set(given)) != len(given):
         raise ValueError(f"got {len(given)} formats, {len(set(given))} different; needed different ones, at least one")
     for fmt in given:
         if not isinstance(fmt, FloatFormat):
             raise ValueError(f"got {fmt!r}; needed a FloatFormat")
-        fmt.check_compiled()
+        if isinstance(model, LinearModel):
+            fmt.check_compiled()
     tolerances = checked_tolerance(tolerance, model.n, "states", given[0].base, basis)
     if basis not in ("emulation", "bound"):
         raise ValueError(f'got basis "{basis}"; needed "emulation" or "bound"')
@@ -149,16 +178,18 @@ def survey_records(
     return RecordSurvey(given, ratios, tuple(tuple(reason for _, reason in each) for _, each in found))
 
 
-def _data(model: LinearModel, records: Any, steps: int | None) -> tuple[Any, ...]:
+def _data(model: AnyModel, records: Any, steps: int | None) -> tuple[Any, ...]:
     """Return the measurements of each record."""
     if isinstance(records, (int, np.integer)):
         count = whole_number("records", records)
         if steps is None:
             raise ValueError(f"got {count} records to simulate without steps; needed steps=, how many each has")
         length = whole_number("steps", steps)
-        return tuple(simulated_measurements(model, length, seed) for seed in range(count))
+        return tuple(simulated(model, length, seed) for seed in range(count))
     if steps is not None:
         raise ValueError("got steps with records; needed steps only for records to simulate")
+    if not isinstance(records, Iterable):
+        raise TypeError(f"got records {records!r}; needed a list of records (steps, m), or a whole number and steps=")
     data = tuple(z if isinstance(z, np.ma.MaskedArray) else real_numbers(z) for z in records)
     if not data:
         raise ValueError("got no records; needed at least one")
@@ -169,7 +200,7 @@ def _data(model: LinearModel, records: Any, steps: int | None) -> tuple[Any, ...
 
 
 def _ratios(
-    model: LinearModel,
+    model: AnyModel,
     data: tuple[Any, ...],
     tolerances: NDArray[np.float64],
     formats: tuple[FloatFormat, ...],
@@ -177,13 +208,13 @@ def _ratios(
     basis: Basis,
     cell: RecordCell,
     directory: Path | None,
-) -> list[tuple[float, str]]:
+) -> list[Outcome]:
     """Return the error / tolerance of one record in each format, and why it is infinite."""
     return survey_formats(model, data[cell.record], tolerances.tolist(), formats, form, basis)
 
 
 def _digest(
-    model: LinearModel,
+    model: AnyModel,
     z: Any,
     tolerances: NDArray[np.float64],
     formats: tuple[FloatFormat, ...],
@@ -191,6 +222,8 @@ def _digest(
     basis: Basis,
 ) -> str:
     """Return a name for everything that a result depends on."""
+    if isinstance(model, NonlinearModel):
+        model = model.noise  # its functions stay the same within one call, and only there
     letters = ("Phi", "H", "Q", "R", "x0", "P0", "B", "u", "b", "d")
     matrices = [None if each is None else each.tolist() for each in (getattr(model, letter) for letter in letters)]
     measured = z.filled(np.nan) if isinstance(z, np.ma.MaskedArray) else z

@@ -5,27 +5,42 @@ from __future__ import annotations
 import html
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from gpbnb.bounds.envelope import Limits
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
+from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.filters.array_forms import AnyForm
 from gpbnb.filters.forms import Form
-from gpbnb.filters.inputs import simulated_measurements
 from gpbnb.filters.missing import without_missing
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import form_named
+from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.filters.system import LinearSystem
 from gpbnb.sweeps import machine
+from gpbnb.wordlength.blocks import (
+    BlockRequirement,
+    WordRequirement,
+    required_block_precisions,
+    required_word_formats,
+)
+from gpbnb.wordlength.fixed_point import Basis as FixedBasis
+from gpbnb.wordlength.fixed_point import FixedAnswer, required_fraction_bits
+from gpbnb.wordlength.judging import Judgement, judge
 from gpbnb.wordlength.precision import largest_errors, required_precision
 from gpbnb.wordlength.ranges import binary_ranges
 from gpbnb.wordlength.requirement import Basis, Requirement
-from gpbnb.wordlength.system import LinearSystem
 
 SIDE_BY_SIDE = (Form.INNOVATION, Form.JOSEPH, Form.UD)
 """Forms that a report compares; the requested form comes first."""
+
+DEFAULT_STEPS = 1000
+"""Steps that are simulated if no number is given."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +70,13 @@ class Report:
     command : the command that reproduces the report. versions : versions of the machine and packages.
     limits : for the bases "guarantee" and "probable", the limits on each state, innovation and measurement of the
         filter without rounding; None if there is no limit.
+    format : the one format that was judged; empty for a search. met : whether an answer meets the tolerance.
+    names : names of the states, or of the outputs of a linear system.
+    measurement_names : names of the measurements, or of the inputs of a linear system.
+    exponents : the range of the exponents; empty if it is unlimited.
+    fixed : whether digits are fraction bits of fixed point.
+    mixed : the answer for the blocks of a Kalman filter in words; empty if it was not asked for.
+    blocks : name of each block, its digits together with the others, and alone; None if there is no answer.
     """
 
     name: str
@@ -72,6 +94,14 @@ class Report:
     command: str
     versions: dict[str, str]
     limits: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    format: str = ""
+    met: bool = True
+    names: tuple[str, ...] = ()
+    measurement_names: tuple[str, ...] = ()
+    exponents: str = ""
+    fixed: bool = False
+    mixed: str = ""
+    blocks: tuple[tuple[str, int | None, int | None], ...] = ()
 
     @property
     def limiting(self) -> int | None:
@@ -88,109 +118,252 @@ class Report:
         return page(self)
 
 
-def study(
-    model: LinearModel | LinearSystem,
-    tolerance: float | Sequence[float],
-    z: Any = None,
-    steps: int | None = None,
-    base: int = 2,
-    rounding: str = "nearest",
-    form: str = "innovation",
-    bases: Sequence[Basis] = ("emulation", "bound"),
-    source: str = "",
-    command: str = "",
-    tell: Callable[[str], Any] = lambda text: None,
-    progress: bool = False,
-    within: Limits | None = None,
-) -> Report:
-    """Find the answer for each basis and form, and collect what explains it.
+@dataclass(frozen=True)
+class Question:
+    """What is asked about one filter, by the command or by a script.
 
     Parameters
     ----------
+    tolerance : as in :func:`gpbnb.wordlength.precision.required_precision`, as are base, rounding and form.
     z : (steps, m), measurements or inputs; by default simulated, for a Kalman filter.
-    steps : number of steps to simulate; by default the number of measurements, or 1000.
+    steps : number of steps to simulate; by default the number of measurements, or :data:`DEFAULT_STEPS`.
     bases : as in :func:`gpbnb.wordlength.precision.required_precision`; the first gives the answer.
-    tell : function called with a line of text before each search.
     within : result of :func:`gpbnb.bounds.guarantee.limits`, for the bases "guarantee" and "probable".
-
-    Raises ------ ValueError : for a reason given in :func:`gpbnb.wordlength.precision.required_precision`; missing
-    measurements with a
-        basis that holds for all of them.
-    OverflowError : for a reason given there.
+    emin, emax : range of the formats, as in ``FloatFormat``; by default unlimited.
+    fmt : the one format to judge, in place of a search; it replaces base, rounding and range.
+    structures : structures of a digital filter to compare, by their names; the first gives the answer, in place of the
+        model. See :func:`gpbnb.wordlength.models.read_structures`.
+    mixed : whether to find the digits of each block of a Kalman filter as well; see
+        :func:`gpbnb.wordlength.blocks.required_block_precisions`. In fixed point, the formats of data, coefficients
+        and sums of a linear system.
+    fixed : whether to count fraction bits of fixed point, of a linear system.
     """
-    given = z is not None
-    count = steps if steps is not None else 1000 if z is None else len(z)
-    if isinstance(model, LinearSystem):
-        if form_named(form) is not Form.INNOVATION:
-            raise ValueError(f"got the {form_named(form)} form; needed none: only a LinearModel has forms")
-        questions: list[tuple[str, Basis, AnyForm | None]] = [(basis, basis, None) for basis in bases]
-    else:
-        first = form_named(form)
-        forms = [first, *(each for each in SIDE_BY_SIDE if each is not first)]
-        questions = [(f"{each}, {basis}", basis, each) for each in forms for basis in bases]
+
+    model: LinearModel | LinearSystem
+    tolerance: float | Sequence[float]
+    z: Any = None
+    steps: int | None = None
+    base: int = 2
+    rounding: str = "nearest"
+    form: str = "innovation"
+    bases: Sequence[Basis] = ("emulation", "bound")
+    within: FilterLimits | None = None
+    emin: int | None = None
+    emax: int | None = None
+    fmt: FloatFormat | FixedFormat | None = None
+    structures: Mapping[str, LinearSystem] = field(default_factory=dict)
+    mixed: bool = False
+    fixed: bool = False
+
+    @property
+    def count(self) -> int:
+        """Number of steps."""
+        if self.steps is not None:
+            return self.steps
+        return DEFAULT_STEPS if self.z is None else len(self.z)
+
+    def parts(self) -> list[_Part]:
+        """Return the single questions, one for each basis and form or structure.
+
+        Raises
+        ------
+        ValueError : a form for a linear system; a model whose matrices are too large.
+        """
+        model, form = self.model, form_named(self.form)
+        if isinstance(model, LinearSystem):
+            if form is not Form.INNOVATION:
+                raise ValueError(f"got the {form} form; needed none: only a LinearModel has forms")
+            systems = [(f"{name}, ", each) for name, each in self.structures.items()] or [("", model)]
+            return [_Part(f"{prefix}{basis}", basis, each, form) for prefix, each in systems for basis in self.bases]
         model.check_sizes()
-        if given and {*bases} & {"guarantee", "probable"} and without_missing(model, z)[0] is not model:
+        forms = [form, *(each for each in SIDE_BY_SIDE if each is not form)]
+        return [_Part(f"{each}, {basis}", basis, model, each) for each in forms for basis in self.bases]
+
+    def measured(self) -> Any:
+        """Return the measurements or inputs; those of a Kalman filter are simulated if there are none.
+
+        Raises
+        ------
+        ValueError : missing measurements with a basis that holds for all of them.
+        """
+        if isinstance(self.model, LinearSystem):
+            return self.z
+        if self.z is None:
+            return simulated_measurements(self.model, self.count)
+        if {*self.bases} & {"guarantee", "probable"} and without_missing(self.model, self.z)[0] is not self.model:
             raise ValueError(
                 "got measurements of which some are missing, and a basis that holds for ever; needed measurements "
                 "without gaps; leave them out for this basis, which does not depend on them"
             )
-        if not given:
-            z = simulated_measurements(model, count)
-    found: list[tuple[str, Requirement]] = []
-    for label, basis, chosen in questions:
-        tell(f"{label} …")
-        chosen = Form.INNOVATION if chosen is None else chosen
-        answer = required_precision(
-            model, count, tolerance, base, rounding, chosen, basis, z, within=within, progress=progress
+        return self.z
+
+    def answer(self, part: _Part, z: Any, progress: bool = False) -> Requirement | Judgement | FixedAnswer:
+        """Answer one of the single questions, by a search or by judging the one format."""
+        if self.fixed and isinstance(part.model, LinearSystem):
+            basis = cast(FixedBasis, part.basis)
+            return required_fraction_bits(part.model, z, self.tolerance, basis, self.rounding)
+        if self.fmt is not None:
+            return judge(part.model, self.fmt, self.count, self.tolerance, part.form, part.basis, z, self.within)
+        return required_precision(
+            part.model,
+            self.count,
+            self.tolerance,
+            self.base,
+            self.rounding,
+            part.form,
+            part.basis,
+            z,
+            within=self.within,
+            progress=progress,
+            emin=self.emin,
+            emax=self.emax,
         )
-        found.append((label, answer))
-        tell(f"{label}: {answer}")
+
+    def blocks(self, z: Any) -> BlockRequirement | WordRequirement | None:
+        """Find the digits of each block of a Kalman filter, or of words in fixed point, if they are asked for."""
+        if not self.mixed:
+            return None
+        if isinstance(self.model, LinearSystem):
+            system = next(iter(self.structures.values()), self.model)
+            basis = cast(FixedBasis, self.bases[0])
+            return required_word_formats(system, z, self.tolerance, basis, self.rounding)
+        given = (self.model, self.count, self.tolerance, self.base, self.rounding, self.form, z)
+        return required_block_precisions(*given, emin=self.emin, emax=self.emax)
+
+
+class _Part(NamedTuple):
+    """One basis, and one form or structure, of a question."""
+
+    label: str
+    basis: Basis
+    model: LinearModel | LinearSystem
+    form: AnyForm
+
+
+def study(
+    asked: Question,
+    source: str = "",
+    command: str = "",
+    tell: Callable[[str], Any] = lambda text: None,
+    progress: bool = False,
+) -> Report:
+    """Find the answer for each basis and form or structure, and collect what explains it.
+
+    Parameters
+    ----------
+    source : origin of the measurements; by default whether they were given or simulated.
+    command : the command that reproduces the report.
+    tell : function called with a line of text before and after each search.
+    progress : show a progress bar that counts precisions.
+
+    Raises
+    ------
+    ValueError : for a reason given in :func:`gpbnb.wordlength.precision.required_precision`; missing measurements
+        with a basis that holds for all of them.
+    OverflowError : for a reason given there.
+    """
+    parts, z = asked.parts(), asked.measured()
+    found: list[tuple[str, Requirement | Judgement | FixedAnswer]] = []
+    for part in parts:
+        tell(f"{part.label} …")
+        answer = asked.answer(part, z, progress)
+        found.append((part.label, answer))
+        tell(f"{part.label}: {answer}")
+    if (blocks := asked.blocks(z)) is not None:
+        tell(f"blocks: {blocks}")
     main = found[0][1]
+    met = main.met if isinstance(main, Judgement) else main.fmt is not None
+    model, fmt, within = asked.model, asked.fmt, asked.within
+    is_filter = isinstance(model, LinearModel)
     width = model.p if isinstance(model, LinearSystem) else model.n
-    tolerances = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), (width,))
-    errors: tuple[float | None, ...] = ()
-    ranges: tuple[tuple[str, int, int], ...] = ()
-    if isinstance(model, LinearModel):
-        errors = _errors(model, z, main, form_named(form), tolerances)
-        sound, filled = without_missing(model, z)
-        ranges = tuple((each.name, each.least, each.largest) for each in binary_ranges(sound, filled))
+    tolerances = np.broadcast_to(np.asarray(asked.tolerance, dtype=np.float64), (width,))
+    origin = "given" if asked.z is not None else "simulated by the model, seed 0" if z is not None else "none"
     return Report(
-        model.name,
-        "Kalman filter" if isinstance(model, LinearModel) else "linear system",
-        main.precision,
-        str(main),
-        base,
-        str(rounding),
-        count,
-        tuple(_finite(float(each)) for each in tolerances),
-        source or ("given" if given else "simulated by the model, seed 0" if z is not None else "none"),
-        tuple(_plain(label, answer) for label, answer in found),
-        errors,
-        ranges,
-        command,
-        machine(),
-        {} if within is None else {name: tuple(map(_finite, each.tolist())) for name, each in within._asdict().items()},
+        name=model.name,
+        kind="Kalman filter" if is_filter else "linear system",
+        digits=_digits(main) if met else None,
+        text=str(main),
+        base=asked.base if fmt is None else fmt.base,
+        rounding=str(asked.rounding) if fmt is None else fmt.rounding.value,
+        steps=asked.count,
+        tolerance=tuple(_finite(float(each)) for each in tolerances),
+        source=source or origin,
+        answers=tuple(_plain(label, answer) for label, answer in found),
+        errors=_errors(model, z, main.fmt if met else None, form_named(asked.form), tolerances),
+        ranges=_ranges(model, z),
+        command=command,
+        versions=machine(),
+        limits={} if within is None else {key: tuple(map(_finite, each)) for key, each in within._asdict().items()},
+        format="" if fmt is None else format_text(fmt),
+        met=met,
+        names=model.state_names if isinstance(model, LinearModel) else model.output_names,
+        measurement_names=model.measurement_names if isinstance(model, LinearModel) else model.input_names,
+        exponents=_exponents(fmt, asked.emin, asked.emax),
+        fixed=asked.fixed,
+        mixed="" if blocks is None else str(blocks),
+        blocks=_digits_of_blocks(blocks) if isinstance(blocks, BlockRequirement) else (),
     )
 
 
-def _errors(
-    model: LinearModel, z: Any, answer: Requirement, form: AnyForm, tolerances: np.ndarray
-) -> tuple[float | None, ...]:
-    """Return the largest error / tolerance of each state at the answer."""
-    if answer.fmt is None:
+def _digits_of_blocks(found: BlockRequirement) -> tuple[tuple[str, int | None, int | None], ...]:
+    """Return the digits of each block, together with the others and alone."""
+    formats = found.formats
+    return tuple(
+        (name, None if formats is None else getattr(formats, name).precision, digits)
+        for name, digits in found.alone.items()
+    )
+
+
+def _ranges(model: LinearModel | LinearSystem, z: Any) -> tuple[tuple[str, int, int], ...]:
+    """Return name, smallest and largest power of two of the quantities of a Kalman filter."""
+    if isinstance(model, LinearSystem):
         return ()
     sound, filled = without_missing(model, z)
-    largest = largest_errors(sound, filled, answer.fmt, form)
+    return tuple((each.name, each.least, each.largest) for each in binary_ranges(sound, filled))
+
+
+def _errors(
+    model: LinearModel | LinearSystem,
+    z: Any,
+    fmt: FloatFormat | FixedFormat | None,
+    form: AnyForm,
+    tolerances: np.ndarray,
+) -> tuple[float | None, ...]:
+    """Return the largest error / tolerance of each state of a Kalman filter at the answer."""
+    if fmt is None or isinstance(model, LinearSystem):
+        return ()
+    sound, filled = without_missing(model, z)
+    largest = largest_errors(sound, filled, cast(FloatFormat, fmt), form)
     return tuple(_finite(float(e / t)) if math.isfinite(t) else None for e, t in zip(largest, tolerances, strict=True))
+
+
+def _exponents(fmt: FloatFormat | FixedFormat | None, emin: int | None, emax: int | None) -> str:
+    """Describe the range of the exponents; empty if it is unlimited."""
+    if isinstance(fmt, FixedFormat):
+        return f"none: fixed point, from {float(fmt.lowest):.6g} to {float(fmt.largest):.6g}"
+    if fmt is not None:
+        emin, emax = fmt.emin, fmt.emax
+    return "" if emin is None else f"{emin} to {emax}"
 
 
 def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _plain(label: str, answer: Requirement) -> Answer:
+def _digits(answer: Requirement | Judgement | FixedAnswer) -> int | None:
+    """Return digits, or in fixed point fraction bits."""
+    if isinstance(answer, FixedAnswer):
+        return None if answer.fmt is None else answer.fmt.fraction_bits
+    return None if answer.fmt is None else answer.fmt.precision
+
+
+def _plain(label: str, answer: Requirement | Judgement | FixedAnswer) -> Answer:
+    if isinstance(answer, Judgement):
+        digits = answer.fmt.precision
+        ratio = ((digits, _finite(answer.ratio)),)
+        return Answer(label, answer.basis, digits if answer.met else None, str(answer), ratio)
     tried = tuple((digits, _finite(ratio)) for digits, ratio in answer.tried)
-    return Answer(label, answer.basis, answer.precision, str(answer), tried)
+    return Answer(label, answer.basis, _digits(answer), str(answer), tried)
 
 
 # -- the page -------------------------------------------------------------------------------------------------
@@ -211,6 +384,7 @@ td:first-child { min-width: 6rem } td:last-child { overflow-wrap: anywhere }
 pre { background: var(--soft); padding: .6rem; white-space: pre-wrap; overflow-wrap: anywhere; font-size: .85rem }
 svg { display: block; width: 100%; height: auto; fill: var(--text) }
 .legend { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; padding: 0; list-style: none; font-size: .9rem }
+.legend .mark { display: inline-block; width: 1.3rem; height: 1.3rem; vertical-align: middle }
 .legend i { display: inline-block; width: 1.4rem; border-top: .2rem solid; margin-right: .4rem; vertical-align: middle }
 .answer { font-size: 1.25rem; border-left: .3rem solid var(--c0); padding-left: .8rem }
 @media (max-width: 34rem) { svg { font-size: 20px } th, td { padding-right: .5rem } }
@@ -218,9 +392,9 @@ svg { display: block; width: 100%; height: auto; fill: var(--text) }
 
 
 _MEANINGS = {
-    "emulation": "An emulation holds for these measurements.",
+    "emulation": "An emulation holds for these {}.",
     "bound": "A bound holds for the arithmetic of this run, whatever its roundings.",
-    "guarantee": "A guarantee holds for ever, for all measurements within the limits.",
+    "guarantee": "A guarantee holds for ever, for all {} within the limits.",
     "probable": "A probable error is three standard deviations, if roundings are independent of each other and values "
     "are as large as the limits allow.",
 }
@@ -228,20 +402,27 @@ _MEANINGS = {
 
 def page(report: Report) -> str:
     """Return a report as a self-contained HTML page."""
-    unit = "bits" if report.base == 2 else f"digits of base {report.base}"
+    unit = {2: "bits", 10: "decimal digits", 16: "hexadecimal digits"}[report.base]
+    unit = "fraction bits" if report.fixed else unit
     answer = f"{report.digits} {unit}" if report.digits is not None else "no precision that can be run"
+    verdict = f"needs <strong>{html.escape(answer)}</strong> to keep rounding errors within the tolerance"
+    if report.format:
+        verdict = f"{'keeps' if report.met else 'does not keep'} rounding errors within the tolerance in "
+        verdict += f"<strong>{html.escape(report.format)}</strong>"
     limiting = ""
     if report.limiting is not None:
-        ratio = report.errors[report.limiting]
-        limiting = (
-            f"<p>State {report.limiting + 1} of {len(report.errors)} limits the answer: its error is {ratio:.2g} of "
-            "its tolerance.</p>"
-        )
+        i, ratio = report.limiting, report.errors[report.limiting]
+        state = f"State {html.escape(report.names[i])}" if report.names else f"State {i + 1} of {len(report.errors)}"
+        limiting = f"<p>{state} limits the answer: its error is {ratio:.2g} of its tolerance.</p>"
+    of = {"state": report.names, "innovation": report.measurement_names, "measurement": report.measurement_names}
+    what, given = ("Form", "measurements") if report.kind == "Kalman filter" else ("Structure", "inputs")
+    meant = [_MEANINGS[each].format(given) for each in dict.fromkeys(each.basis for each in report.answers)]
+    if report.ranges and not report.exponents:
+        meant.append("These runs have unlimited exponents; the ranges below show which formats suffice.")
     rows = [(each.label, "none" if each.digits is None else str(each.digits), each.text) for each in report.answers]
     parts = [
         f"<h1>Wordlength for {html.escape(report.name)}</h1>",
-        f'<p class="answer">This {report.kind} needs <strong>{html.escape(answer)}</strong> to keep rounding errors '
-        "within the tolerance.</p>",
+        f'<p class="answer">This {report.kind} {verdict}.</p>',
         f"<p>{html.escape(report.text)}.</p>",
         limiting,
         "<h2>Basis of the answer</h2>",
@@ -249,21 +430,28 @@ def page(report: Report) -> str:
             ("question", "value"),
             [
                 ("steps", f"{report.steps}"),
-                ("measurements", report.source),
-                ("tolerance", _numbers(report.tolerance)),
-                *((f"limit on the {name}", _numbers(each)) for name, each in report.limits.items()),
+                (given, report.source),
+                ("tolerance", _numbers(report.tolerance, report.names)),
+                *((f"limit on the {name}", _numbers(each, of.get(name, ()))) for name, each in report.limits.items()),
                 ("rounding", report.rounding),
+                *([("exponents", report.exponents)] if report.exponents else []),
             ],
         ),
-        f"<p>{' '.join(_MEANINGS[each] for each in dict.fromkeys(each.basis for each in report.answers))} "
-        "None of this limits the exponent range: see the ranges below.</p>",
-        "<h2>Forms and bases compared</h2>",
-        _table(("form and basis", unit, "answer"), rows),
+        f"<p>{' '.join(meant)}</p>",
+        f"<h2>{what}s and bases compared</h2>",
+        _table((f"{what.lower()} and basis", unit, "answer"), rows),
         "<h2>Error against precision</h2>",
-        _curves(report.answers, unit),
+        _curves(report.answers, unit, what.lower()),
     ]
+    if report.blocks:
+        columns = ("block of the filter", f"{unit}, with the others", f"{unit}, alone")
+        cells = [(name, *("none" if each is None else str(each) for each in digits)) for name, *digits in report.blocks]
+        parts += ["<h2>Precision of each block</h2>", _table(columns, cells), f"<p>{html.escape(report.mixed)}.</p>"]
     if report.errors:
-        body = [(str(i + 1), "not limited" if e is None else f"{e:.3g}") for i, e in enumerate(report.errors)]
+        states = report.names or [str(i + 1) for i in range(len(report.errors))]
+        body = [
+            (state, "not limited" if e is None else f"{e:.3g}") for state, e in zip(states, report.errors, strict=True)
+        ]
         parts += ["<h2>Error of each state at the answer</h2>", _table(("state", "error / tolerance"), body)]
     if report.ranges:
         ranges = [(name, _power(2, low), _power(2, high)) for name, low, high in report.ranges]
@@ -281,8 +469,12 @@ def page(report: Report) -> str:
     )
 
 
-def _numbers(limits: Sequence[float | None]) -> str:
-    return ", ".join("any" if each is None else f"{each:.6g}" for each in limits)
+def _numbers(limits: Sequence[float | None], names: Sequence[str] = ()) -> str:
+    """List numbers, each after its name if there are names."""
+    texts = ["any" if each is None else f"{each:.6g}" for each in limits]
+    if len(names) == len(texts):
+        texts = [f"{name}: {text}" for name, text in zip(names, texts, strict=True)]
+    return ", ".join(texts)
 
 
 def _table(header: Sequence[str], body: Sequence[Sequence[str]]) -> str:
@@ -303,10 +495,33 @@ def _power(base: int, exponent: int) -> str:
 
 
 _COLOURS = 6  # of _STYLE, one a form
+_MARKERS = (
+    "M-3 0a3 3 0 1 0 6 0a3 3 0 1 0 -6 0z",
+    "M-5 -5h10v10h-10z",
+    "M0 -8l8 14h-16z",
+    "M0 -11l11 11l-11 11l-11 -11z",
+    "M-11 0h22M0 -11v22",
+    "M-9 -9l18 18M9 -9l-18 18",
+    "M-11 0a11 11 0 1 0 22 0a11 11 0 1 0 -22 0z",
+    "M0 9l-10 -17h20z",
+    "M-3 -11h6v22h-6z",
+    "M-11 -3h22v6h-22z",
+    "M-7 -7h14v14h-14zM-7 -7l14 14",
+    "M0 -8l8 8l-8 8l-8 -8zM-8 0h16",
+)  # one for each form or structure; only the first is filled, and others surround it where errors are equal
 _DASHES = (("", "solid"), ("7 3", "dashed"), ("2 3", "dotted"), ("9 3 2 3", "double"))  # one a basis
 
 
-def _curves(answers: Sequence[Answer], unit: str) -> str:
+def _marker(form: int, x: float, y: float, colour: str) -> str:
+    """Draw the marker of a form or structure at a point."""
+    at, fill = form % len(_MARKERS), colour if form % len(_MARKERS) == 0 else "none"
+    return (
+        f'<path transform="translate({x:.1f} {y:.1f})" d="{_MARKERS[at]}" fill="{fill}" stroke="{colour}" '
+        'stroke-width="1.6"/>'
+    )
+
+
+def _curves(answers: Sequence[Answer], unit: str, what: str) -> str:
     """Draw error / tolerance against precision as inline SVG; the dashed line is the tolerance."""
     points = [(t, r) for each in answers for t, r in each.tried if r is not None and r > 0]
     if len(points) < 2:
@@ -339,13 +554,15 @@ def _curves(answers: Sequence[Answer], unit: str) -> str:
         drawn.append(
             f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>'
         )
-        drawn += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colour}"/>' for x, y in line]
-        legend.append(f'<li><i style="border-top: .2rem {border} {colour}"></i>{html.escape(each.label)}</li>')
+        drawn += [_marker(form, x, y, colour) for x, y in line]
+        mark = f'<svg class="mark" viewBox="0 0 24 24" aria-hidden="true">{_marker(form, 12, 12, colour)}</svg>'
+        legend.append(f'<li>{mark}<i style="border-top: .2rem {border} {colour}"></i>{html.escape(each.label)}</li>')
     return (
         '<svg viewBox="0 0 640 336" role="img" aria-label="Error divided by tolerance, against precision; one line '
-        f'for each form and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
+        f'for each {what} and basis" font-size="12" font-family="system-ui, sans-serif">{"".join(drawn)}'
         '<text x="4" y="17">error / tolerance</text>'
         f'<text x="340" y="329" text-anchor="middle">{html.escape(unit)}</text></svg>'
         f'<ul class="legend">{"".join(legend)}</ul>'
-        "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance.</p>"
+        "<p>Error or bound, divided by the tolerance. The dashed line marks the tolerance. Colour and marker stand for "
+        f"the {what}, the kind of line for the basis.</p>"
     )

@@ -1,18 +1,23 @@
-"""The required number of digits, and the basis of this answer."""
+"""What is asked, the strategies that answer it, and the required number of digits with the basis of this answer."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
+from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.search import Outcome, Search
 from gpbnb.filters.array_forms import AnyForm
 
 ANY_BINARY = FloatFormat(2, 2)
@@ -32,17 +37,19 @@ class Requirement:
     steps : steps of the filter.
     tried : precision, and largest error / tolerance over states and steps; infinite if the run stopped, a
         variance was no longer positive, or no bound exists.
-    why : why, below the answer, the largest precision without a finite error has none; empty if all have one. It is
-        shown if it prevented a smaller answer.
+    why : the reason why an error is infinite, for the largest precision at which it is; empty if all errors are finite.
+        The answer shows this reason if it prevented a smaller answer.
     form : form of the filter.
     irregular : precisions that meet the tolerance although a higher one that was run misses it; usually empty.
-    advice : if more digits fail where fewer do not, another form that meets the tolerance; precisions without a bound.
+    advice : a form that meets the tolerance, if more digits fail where fewer do not; or the precisions without a bound.
     repairs : changes of the model's covariances, each as text.
-    cause : why there is no answer in any precision; the limit of the search then does not matter.
-    limit : why no higher precision than the last of `tried` was tried; it is shown if there is no answer.
+    cause : the reason why no precision can be an answer; the limit of the search then does not matter.
+    limit : the reason why the search ended at the last precision of `tried`. It is shown if there is no answer.
+    ends : whether a guarantee holds for the steps asked for, because no precision has one for ever.
+    untraced : why a function ran operation by operation, and not in compiled code; empty if it did not.
     """
 
-    fmt: FloatFormat | None
+    fmt: FloatFormat | MaybeNone
     basis: Basis
     steps: int
     tried: tuple[tuple[int, float], ...]
@@ -53,9 +60,11 @@ class Requirement:
     repairs: tuple[str, ...] = ()
     limit: str = ""
     cause: str = ""
+    ends: bool = False
+    untraced: str = ""
 
     @property
-    def precision(self) -> int | None:
+    def precision(self) -> int | MaybeNone:
         """Digits of the answer, or None."""
         return None if self.fmt is None else self.fmt.precision
 
@@ -66,20 +75,130 @@ class Requirement:
             notes.insert(0, f"{listed(self.irregular)} digits meet it, but {listed(missed)} do not")
         if self.advice:
             notes.append(self.advice)
+        if self.untraced:
+            notes.append(f"the function ran operation by operation: {self.untraced}")
         end = "".join(f"; {note}" for note in notes)
+        evidence, by_evidence = (text.format(_steps(self.steps)) for text in _evidence(self.basis, self.ends))
         if self.fmt is None and self.cause:
-            return f"no precision meets the tolerance ({self.basis}, {self.steps} steps): {self.cause}{end}"
+            return f"no precision meets the tolerance {by_evidence}: {self.cause}{end}"
         if self.fmt is None:
             most, why = f"{self.tried[-1][0]} digits", f"; {self.why}" if self.why else ""
             if self.limit:
                 most += f", {self.limit},"
-            met = "meets the tolerance reliably" if self.irregular else "meets the tolerance"
-            return f"no precision up to {most} {met} ({self.basis}, {self.steps} steps){why}{end}"
+            met = "reliably meets the tolerance" if self.irregular else "meets the tolerance"
+            return f"no precision up to {most} {met} {by_evidence}{why}{end}"
         tried = dict(self.tried)
         why = f"; {self.why}" if self.why and math.isinf(tried.get(self.fmt.precision - 1, 0.0)) else ""
-        return (
-            f"{self.fmt.precision} digits of base {self.fmt.base}, {self.fmt.rounding.value}: "
-            f"{tried[self.fmt.precision]:.2g} of the tolerance ({self.basis}, {self.steps} steps){why}{end}"
+        named = f" ({self.processor_format} is enough)" if self.processor_format else ""
+        share = f"{tried[self.fmt.precision]:.2g} of the tolerance"
+        return f"{arithmetic(self.fmt)}{named}: {share}, {evidence}{why}{end}"
+
+    @property
+    def processor_format(self) -> str:
+        """Name of the smaller of binary32 and binary64 that was tried and meets the tolerance; empty if neither.
+
+        It applies to rounding to nearest in base 2, and says nothing about the range of the exponents.
+        """
+        fmt, ratios = self.fmt, dict(self.tried)
+        if fmt is None or fmt.base != 2 or fmt.limits is not None:
+            return ""
+        if fmt.rounding not in (Rounding.NEAREST, Rounding.EVEN):
+            return ""
+        named = {"binary32": BINARY32.precision, "binary64": BINARY64.precision}
+        enough = (name for name, t in named.items() if t >= fmt.precision and ratios.get(t, math.inf) <= 1)
+        return next(enough, "")
+
+
+_EVIDENCE = {
+    "emulation": ("observed in {}", "in a run of {}"),
+    "bound": ("proved for this run of {}", "by a bound on this run of {}"),
+    "guarantee": ("guaranteed for ever", "by a guarantee for ever"),
+    "probable": ("as three times the probable error", "by three times the probable error"),
+}
+"""For each basis, how the error of an answer is known, and what had to meet the tolerance."""
+
+
+_GUARANTEED_FOR_STEPS = "guaranteed for {}", "by a guarantee for {}"
+
+
+def _evidence(basis: Basis, ends: bool) -> tuple[str, str]:
+    return _GUARANTEED_FOR_STEPS if ends and basis == "guarantee" else _EVIDENCE[basis]
+
+
+def evidence(basis: Basis, steps: int, ends: bool = False) -> str:
+    """Describe the evidence for an error, as "observed in 60 steps"; `ends` is that of a :class:`Requirement`."""
+    return _evidence(basis, ends)[0].format(_steps(steps))
+
+
+def has_no_bound(found: Search[FloatFormat]) -> bool:
+    """Whether no precision that was tried has a finite error."""
+    return all(math.isinf(ratio) for _, ratio in found.tried)
+
+
+def _steps(count: int) -> str:
+    return f"{count} step{'s' if count != 1 else ''}"
+
+
+class Strategy(Protocol):
+    """One way to find out how well a format does: by emulation, or by one of the bounds."""
+
+    def error(self, fmt: FloatFormat) -> Outcome:
+        """Return the largest error, or its bound, over the tolerance; or infinity and the reason."""
+
+
+class Asked(NamedTuple):
+    """What is asked about a filter, apart from the filter and its tolerance.
+
+    Parameters
+    ----------
+    steps : number of steps of the filter. basis : what counts as an error.
+    like : a format of any precision, with base, rounding and range of those to try.
+    largest : highest precision to try; by default the largest with compiled loops.
+    progress : whether to show a progress bar that counts precisions.
+    """
+
+    steps: int
+    basis: Basis
+    like: FloatFormat = ANY_BINARY
+    largest: int | None = None
+    progress: bool = False
+
+    @contextmanager
+    def search(
+        self, checks: Sequence[int], bounds: bool = False
+    ) -> Iterator[Callable[[Strategy], Search[FloatFormat]]]:
+        """Return a function that searches with a strategy, given `checks` and `bounds` as in ``Search``."""
+        with tqdm(desc="precisions", unit="run", disable=not self.progress) as bar:
+            yield lambda strategy: Search(strategy.error, self.like, checks, bar.update, bounds, self.largest)
+
+    def answer(
+        self,
+        found: Search[FloatFormat],
+        form: AnyForm | None = None,
+        advice: str = "",
+        repairs: tuple[str, ...] = (),
+        cause: str = "",
+        ends: bool = False,
+        untraced: str = "",
+    ) -> Requirement:
+        """Return the result of a search as the answer."""
+        if found.undecided and not advice:
+            advice = f"no bound exists in {listed(found.undecided)} digits"
+        tried, irregular, limit = found.tried, found.irregular, found.limit
+        return Requirement(
+            found.fmt,
+            self.basis,
+            self.steps,
+            tried,
+            found.why,
+            form,
+            irregular,
+            advice,
+            repairs,
+            limit,
+            cause,
+            ends,
+            untraced,
         )
 
 

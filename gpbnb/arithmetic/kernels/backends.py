@@ -16,28 +16,51 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.kernels.exact import kernel
-from gpbnb.arithmetic.kernels.tags import LARGEST_SHORT, Binary, Decimal, Hexadecimal, ShortDecimal, Tag
+from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
+from gpbnb.arithmetic.kernels.selection import tag_of
+from gpbnb.arithmetic.kernels.tags import (
+    LEAST,
+    LIMIT,
+    Binary,
+    Free,
+    Hardware32,
+    Hardware64,
+    Hexadecimal,
+    Limited,
+    Random,
+    ShortEven,
+    Tag,
+    extents_of_sums,
+)
+from gpbnb.arithmetic.rounding import Rounding, Rules
 
 Array = NDArray[Any]
 Components = tuple[Array, ...]
 
-LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # of the compiled backends
 _LARGEST_EXPONENT = 2**60
-_POWERS_OF_TEN = np.array([10**k for k in range(23)], np.float64)  # exact
+_MANY = 1000  # multiplications in a product for which a look at the range of its entries pays
+_LEAST_32, _LARGEST_32 = 2.0**-126, float(np.finfo(np.float32).max)
 
 
 class Backend(ABC):
     """Store numbers of one format and compute with them."""
 
     dtype: Any
+    records = False  # whether it only records operations, and holds no numbers
+    special = False  # whether it holds infinity, NaN and negative zero
 
-    def __init__(self, base: int, precision: int, nearest: bool) -> None:
-        self.base, self.precision, self.nearest = base, precision, nearest
-        self.kernel = kernel(base, precision, nearest)
+    def __init__(self, rules: Rules) -> None:
+        self.rules = rules
+        self.base, self.precision = rules.base, rules.precision
+        self.nearest = rules.rounding is Rounding.NEAREST
+        self.kernel = kernel(rules)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.base, self.precision, self.nearest)
+        return type(self), (self.rules,)
+
+    def restart(self) -> None:
+        """Restart the random numbers of stochastic rounding."""
+        self.kernel.restart()
 
     @abstractmethod
     def from_exact(self, m: Array, e: Array) -> Components | None:
@@ -50,6 +73,10 @@ class Backend(ABC):
     @abstractmethod
     def from_numbers(self, values: Array, exactly: bool) -> Components | None:
         """Round an array of a NumPy number type; with `exactly`, return None if rounding changes an entry."""
+
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        """Round numbers that another backend holds; None if this takes its exact kernel."""
+        return None
 
     @abstractmethod
     def apply(self, name: str, *operands: Components) -> Components | None:
@@ -67,13 +94,17 @@ class Backend(ABC):
         """Combine the entries along the first axis from left to right; there must be at least one."""
         return None
 
+    def scan(self, components: Components) -> Components | None:
+        """Sum from left to right along the first axis, and keep each partial sum."""
+        return None
+
     def matmul(self, a: Components, b: Components) -> Components | None:
         """Multiply two matrices with an inner dimension of at least 1, summing each entry from left to right."""
         return None
 
 
 class Exact(Backend):
-    """Any base, precision and exponent: significands and exponents are Python integers."""
+    """Any format: significands and exponents are Python integers."""
 
     dtype = object
 
@@ -87,7 +118,21 @@ class Exact(Backend):
         return None
 
     def apply(self, name: str, *operands: Components) -> Components:
-        return self._ufunc(name, 2 * len(operands), 2)(*(part for components in operands for part in components))
+        try:
+            return self._ufunc(name, 2 * len(operands), 2)(*(part for components in operands for part in components))
+        except OverflowError as error:
+            raise OverflowError(f"{_NAMES[name]}{self._place(name, operands)}: {error}") from None
+
+    def _place(self, name: str, operands: tuple[Components, ...]) -> str:
+        """Index of the first entry that overflows, for the message."""
+        parts = np.broadcast_arrays(*(part for components in operands for part in components))
+        operation = getattr(self.kernel, name)
+        for index in np.ndindex(parts[0].shape):
+            try:
+                operation(*(part[index] for part in parts))
+            except OverflowError:
+                return f" at [{', '.join(map(str, index))}]" if index else ""
+        return ""
 
     def compare(self, a: Components, b: Components) -> Array:
         return np.asarray(self._ufunc("compare", 4, 1)(*a, *b), dtype=np.int8)
@@ -99,16 +144,52 @@ class Exact(Backend):
         return np.frompyfunc(getattr(self.kernel, name), inputs, outputs)
 
 
+class Special(Exact):
+    """A format with infinity, NaN and negative zero, whose significands are floats; see :class:`SpecialKernel`."""
+
+    special = True
+
+    def apply(self, name: str, *operands: Components) -> Components:
+        with np.errstate(all="ignore"):  # of Python's own floats; exceptions are counted by the kernel
+            return super().apply(name, *operands)
+
+    def compare(self, a: Components, b: Components) -> Array:
+        """Compare each pair of entries: -1, 0 or 1, or NaN, for which every comparison but != is false."""
+        return np.asarray(self._ufunc("compare", 4, 1)(*a, *b), dtype=np.float64)
+
+    def signs(self, components: Components) -> Array:
+        """Return infinity, NaN and zeros as float64, and 1 or -1 for other numbers."""
+        return np.asarray(np.frompyfunc(_sign, 1, 1)(components[0]), dtype=np.float64)
+
+
+def _sign(m: Any) -> float:
+    return m if type(m) is float else float((m > 0) - (m < 0))
+
+
+_NAMES = {
+    "add": "addition",
+    "subtract": "subtraction",
+    "multiply": "multiplication",
+    "divide": "division",
+    "fused": "fused multiply-add",
+    "sqrt": "square root",
+    "negative": "negation",
+    "absolute": "absolute value",
+}
+
+
 class Compiled(Backend):
     """Common part of the backends with compiled loops."""
 
-    tag: Tag
     count: int  # number of components
     fuses = False  # whether it has a fused multiply-add
 
-    def run_tag(self) -> Tag:
-        """Return the tag for a separate run, whose random roundings start at the first number of their seed."""
-        return self.tag
+    def __init__(self, rules: Rules, tag: Tag) -> None:
+        super().__init__(rules)
+        self.tag = tag
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return backend, (self.rules,)
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name == "fused" and not self.fuses:
@@ -133,27 +214,49 @@ class Compiled(Backend):
             return None
         return None if gone else tuple(part.reshape(shape[1:]) for part in out)
 
-    def matmul(self, a: Components, b: Components) -> Components | None:
-        x, y = self.pack(a), self.pack(b)
-        c = np.empty((a[0].shape[0], b[0].shape[1], *x.shape[2:]), self.dtype)
+    def scan(self, components: Components) -> Components | None:
+        shape = components[0].shape
+        out = self._empty(math.prod(shape))
+        lines = self._seen(tuple(_flat(part, shape) for part in components))
         try:
-            _loops().product(self.tag, _read_only(x), _read_only(y), c)
+            gone = _loops().partial_sums(self.tag, shape[0], math.prod(shape[1:]), lines, self._seen(out))
+        except OverflowError:
+            return None
+        return None if gone else tuple(part.reshape(shape) for part in out)
+
+    def matmul(self, a: Components, b: Components) -> Components | None:
+        return self._product(self.tag, a, b)
+
+    def _product(self, tag: Tag, a: Components, b: Components) -> Components | None:
+        x, y = (self._packed(each, tag) for each in (a, b))
+        c = np.empty((a[0].shape[0], b[0].shape[1], *x.shape[2:]), x.dtype)
+        try:
+            _loops().product(tag, _read_only(x), _read_only(y), c)
         except OverflowError:
             return None
         return self.unpack(c)
 
-    def pack(self, components: Components) -> Array:
-        """Pack components into a new array, in the layout that the topics' compiled loops take and return."""
-        return (
-            np.array(components[0], order="C")
-            if self.count == 1
-            else np.ascontiguousarray(np.stack(components, axis=-1))
-        )
+    @property
+    def matrix_tag(self) -> Tag:
+        """The tag for loops over matrices that look for lost results only at their end."""
+        return self.tag
+
+    def pack(self, components: Components, tag: Tag | None = None) -> Array:
+        """Pack components into a new array, in the layout that compiled loops take and return, for this tag or ours."""
+        packed = self._packed(components, tag)
+        return packed.copy() if np.may_share_memory(packed, components[0]) else packed
+
+    def _packed(self, components: Components, tag: Tag | None) -> Array:
+        """Pack components, without a copy where their memory has the layout."""
+        if self.count == 1:
+            single = isinstance(tag, Free) and isinstance(tag.tag, Hardware32)
+            return np.ascontiguousarray(components[0], np.float32 if single else self.dtype)
+        return np.ascontiguousarray(np.stack(components, axis=-1))
 
     def unpack(self, array: Array) -> Components:
         """Unpack an array that :meth:`pack` made into components, as new arrays."""
         if self.count == 1:
-            return (np.array(array, order="C"),)
+            return (np.array(array, self.dtype, order="C"),)
         return tuple(np.array(array[..., i], order="C") for i in range(self.count))
 
     def _empty(self, size: int) -> Components:
@@ -171,10 +274,17 @@ class Floats(Compiled):
     count = 1
     lowest_power, highest_power = -960, 1023  # powers of two between which its numbers lie
 
-    def __init__(self, base: int, precision: int, nearest: bool) -> None:
-        super().__init__(base, precision, nearest)
-        self.tag = Binary(precision, nearest) if base == 2 else Hexadecimal(precision, nearest)
-        self.bits = base.bit_length() - 1
+    def __init__(self, rules: Rules, tag: Tag) -> None:
+        super().__init__(rules, tag)
+        self.bits = rules.base.bit_length() - 1
+        self.fuses = not isinstance(tag, Binary | Hexadecimal)
+        if isinstance(tag, Hardware64):
+            self.lowest_power, self.highest_power = -1074, 1024
+
+    def restart(self) -> None:
+        super().restart()
+        if isinstance(self.tag, Limited) and isinstance(self.tag.mode, Random):
+            self.tag.mode.state[1] = 0
 
     def from_exact(self, m: Array, e: Array) -> Components | None:
         # base**(e + t - 1) <= |x| < base**(e + t)
@@ -200,12 +310,56 @@ class Floats(Compiled):
         components = self.apply("round_", (x,))
         return None if components is None or (exactly and not np.array_equal(components[0], x)) else components
 
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        return self.apply("round_", components) if isinstance(other, Floats) else None
+
     def apply(self, name: str, *operands: Components) -> Components | None:
+        if name in ("negative", "absolute") and not self._has_opposites(operands[0][0]):
+            return None
         if name == "negative":
             return (np.asarray(0.0 - operands[0][0]),)
         if name == "absolute":
             return (np.asarray(np.abs(operands[0][0])),)
         return super().apply(name, *operands)
+
+    @property
+    def matrix_tag(self) -> Tag:
+        return Free(self.tag) if isinstance(self.tag, Hardware32 | Hardware64) else self.tag
+
+    def matmul(self, a: Components, b: Components) -> Components | None:
+        tag = self._product_tag(a[0], b[0])
+        if isinstance(tag, Free) and b[0].shape[1] < a[0].shape[0]:
+            # The inner loop runs over the columns, so the product of the transposes is faster. No digit changes.
+            c = self._product(tag, (b[0].T,), (a[0].T,))
+            return None if c is None else (np.ascontiguousarray(c[0].T),)
+        return self._product(tag, a, b)
+
+    def _product_tag(self, a: Array, b: Array) -> Tag:
+        """Return the fastest tag for a matrix product: one without range checks if no result can leave the range."""
+        tag: Any = self.tag
+        n = a.shape[1]
+        if isinstance(tag, Hardware32 | Hardware64):
+            return Free(tag)
+        limited = isinstance(tag, Limited)
+        if a.shape[0] * n * b.shape[1] < _MANY or (limited and not isinstance(tag.mode, ShortEven)):
+            return tag
+        gradual, least, largest = (tag.gradual, tag.least, tag.largest) if limited else (0.0, LEAST, LIMIT)
+        low, high, smallest, biggest = self._extents(a, b)
+        low, high = extents_of_sums(n, self.base, self.precision, gradual, low, high)
+        if not high <= largest or not (gradual or low >= least):
+            return tag
+        single = low >= max(_LEAST_32, gradual) and smallest >= _LEAST_32 and max(high, biggest) <= _LARGEST_32
+        return Free(Hardware32() if limited and self.precision == 24 and single else tag)
+
+    def _extents(self, a: Array, b: Array) -> tuple[float, float, float, float]:
+        """Smallest and largest size of products of two entries other than zero, and of the entries themselves."""
+        (low, high), (low_b, high_b) = _loops().extents(_flat(a, a.shape), _flat(b, b.shape))
+        return low * low_b, high * high_b, min(low, low_b), max(high, high_b)
+
+    def _has_opposites(self, x: Array) -> bool:
+        """Whether the opposite of each number is in the format; that of the lowest fixed-point number is not."""
+        limits = self.rules.limits
+        return limits is None or not limits.fixed or not np.any(x == float(limits.lowest))
 
     def compare(self, a: Components, b: Components) -> Array:
         return np.asarray(np.greater(a[0], b[0]).astype(np.int8) - np.less(a[0], b[0]).astype(np.int8))
@@ -220,10 +374,9 @@ class Pairs(Compiled):
     dtype = np.int64
     count = 2
 
-    def __init__(self, base: int, precision: int, nearest: bool) -> None:
-        super().__init__(base, precision, nearest)
-        self.tag = (ShortDecimal if precision <= LARGEST_SHORT else Decimal)(precision, nearest)
-        self.exact = Exact(base, precision, nearest)
+    def __init__(self, rules: Rules, tag: Tag) -> None:
+        super().__init__(rules, tag)
+        self.exact = exact(rules)
 
     def from_exact(self, m: Array, e: Array) -> Components | None:
         if np.any(e > _LARGEST_EXPONENT) or np.any(e < -_LARGEST_EXPONENT):
@@ -235,15 +388,36 @@ class Pairs(Compiled):
 
     def from_numbers(self, values: Array, exactly: bool) -> Components | None:
         if values.dtype.kind == "f" and values.dtype.itemsize <= 8:
-            x = values.astype(np.float64, copy=False)
-            if not ((np.abs(x) < 2.0**53) & (np.rint(x) == x)).all():
-                return None  # fractions: the exact backend converts every digit
-        elif values.dtype.kind not in "iu":
+            return self._from_floats(values.astype(np.float64, copy=False), exactly)
+        if values.dtype.kind not in "iu":
             return None
         largest = 10**self.precision if exactly else 2**63
         if ((values >= largest) | (values <= -largest)).any():
             return None
         return self.apply("round_", (values.astype(np.int64), np.zeros(values.shape, np.int64)))
+
+    def _from_floats(self, x: Array, exactly: bool) -> Components | None:
+        out, states = self._empty(x.size), np.empty(x.size, np.int8)
+        try:
+            _radix().from_floats(self.tag, x.size, _flat(x, x.shape), out, states)
+        except OverflowError:
+            return None
+        if exactly and states.any():
+            return None
+        for i in np.flatnonzero(states == 2):
+            value = float(x.flat[i])
+            if not math.isfinite(value):
+                return None
+            try:
+                out[0][i], out[1][i] = self.kernel.from_ratio(*value.as_integer_ratio())
+            except OverflowError:
+                return None
+        return tuple(part.reshape(x.shape) for part in out)
+
+    def from_backend(self, other: Backend, components: Components) -> Components | None:
+        if isinstance(other, Pairs):
+            return self.apply("round_", components)
+        return self.from_numbers(components[0], exactly=False) if isinstance(other, Floats) else None
 
     def apply(self, name: str, *operands: Components) -> Components | None:
         if name == "negative":
@@ -260,28 +434,28 @@ class Pairs(Compiled):
         return order.reshape(shape)
 
     def to_float(self, components: Components) -> Array:
-        m, e = components
-        # Both operands are exact in float64, so the result is rounded only once.
-        simple = (np.abs(m) <= 2**53) & (np.abs(e) <= 22)
-        power = _POWERS_OF_TEN[np.where(simple, np.abs(e), 0)]
-        x = np.asarray(np.where(e < 0, m / power, m * power))
-        if not simple.all():
-            x[~simple] = self.exact.to_float((m[~simple].astype(object), e[~simple].astype(object)))
-        return x
+        m, e = (_flat(part, components[0].shape) for part in components)
+        x, states = np.empty(m.size), np.empty(m.size, np.int8)
+        _radix().to_floats(m.size, m, e, x, states)
+        if (hard := states == 2).any():
+            x[hard] = self.exact.to_float((m[hard].astype(object), e[hard].astype(object)))
+        return x.reshape(components[0].shape)
 
 
 @lru_cache(maxsize=256)
-def exact(base: int, precision: int, nearest: bool) -> Exact:
+def exact(rules: Rules) -> Exact:
     """Return the backend that holds every number of a format."""
-    return Exact(base, precision, nearest)
+    special = rules.limits is not None and rules.limits.overflow in SPECIAL
+    return Special(rules) if special else Exact(rules)
 
 
 @lru_cache(maxsize=256)
-def backend(base: int, precision: int, nearest: bool) -> Backend:
+def backend(rules: Rules) -> Backend:
     """Return the fastest backend for a format."""
-    if precision > LARGEST_PRECISION.get(base, 0):
-        return exact(base, precision, nearest)
-    return (Pairs if base == 10 else Floats)(base, precision, nearest)
+    tag = tag_of(rules)
+    if tag is None:
+        return exact(rules)
+    return (Pairs if rules.base == 10 else Floats)(rules, tag)
 
 
 def double_doubles(values: NDArray[Any]) -> NDArray[np.float64]:
@@ -323,3 +497,10 @@ def _loops() -> Any:
     from gpbnb.arithmetic.kernels import elementwise
 
     return elementwise
+
+
+@lru_cache(maxsize=1)
+def _radix() -> Any:
+    from gpbnb.arithmetic.kernels import radix
+
+    return radix

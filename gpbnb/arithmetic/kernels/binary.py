@@ -20,7 +20,7 @@ import numpy as np
 
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.tags import Binary, Hexadecimal
+from gpbnb.arithmetic.kernels.tags import SAFE_TWICE, Binary, Hexadecimal
 
 _SIGN = np.int64(-(2**63))
 _MAGNITUDE = np.int64(2**63 - 1)
@@ -28,10 +28,7 @@ _EXPONENT = np.int64(0x7FF << 52)
 _LEAST = np.int64((1023 - 960) << 52)
 _LIMIT = np.int64((1023 + 1023) << 52)
 _HALF_ULP = np.int64(53 << 52)
-LEAST, LIMIT = 2.0**-960, 2.0**1023
-
 EXACT_PRODUCT = 26  # bits; products of numbers this short are exact in float64
-SAFE_TWICE = 25  # bits; rounding to float64 first and then to this precision gives the correct result
 
 
 def _clear_binary(fmt: Any, u: Any) -> Any:
@@ -47,7 +44,7 @@ def _clear_hexadecimal(fmt: Any, u: Any) -> Any:
     return (u + half) & -unit
 
 
-def operations(clear: Any, ties: bool) -> dict[str, Any]:
+def operations(clear: Any, ties: bool, free: bool) -> dict[str, Any]:
     """Make the scalar operations on float64 for one way of clearing the dropped bits.
 
     Parameters
@@ -55,6 +52,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
     clear : rounds a magnitude, chopped to 53 bits and read as an integer, to the digits of a format.
     ties : whether the format may have 53 bits: then no bit is cleared, and the ties that float64 rounds to even are
         corrected.
+    free : whether no result leaves the range, so that none is checked.
     """
     clear = inner(forceinline=True)(clear)
 
@@ -62,6 +60,8 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
     def fit(fmt: Any, p: Any, shift: Any, exact_zero: Any) -> Any:
         u = bits(p)
         v = clear(fmt, (u & _MAGNITUDE) + shift)
+        if free:
+            return from_bits(v | (u & _SIGN))
         in_range = ((v >= _LEAST) & (v < _LIMIT)) | (exact_zero & (v == 0))
         return from_bits(v | (u & _SIGN)) if in_range else np.nan
 
@@ -96,9 +96,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         return fit(fmt, p, direction(fmt, p, fma(a, b, -p)), zero)
 
     @inner(error_model="numpy", forceinline=True)
-    def divide(fmt: Any, a: Any, b: Any) -> Any:
-        if b == 0.0:
-            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+    def quotient(fmt: Any, a: Any, b: Any) -> Any:
         q = a / b + 0.0
         if ties and fmt.precision <= SAFE_TWICE:
             return fit(fmt, q, np.int64(0), a == 0.0)
@@ -110,9 +108,7 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         return fit(fmt, q, down, a == 0.0)
 
     @inner(forceinline=True)
-    def sqrt(fmt: Any, a: Any) -> Any:
-        if a < 0.0:
-            raise ValueError("got the square root of a negative number; needed x >= 0")
+    def root(fmt: Any, a: Any) -> Any:
         s = math.sqrt(a)
         if ties and fmt.precision <= SAFE_TWICE:
             return fit(fmt, s, np.int64(0), a == 0.0)
@@ -128,10 +124,14 @@ def operations(clear: Any, ties: bool) -> dict[str, Any]:
         "add": add,
         "subtract": subtract,
         "multiply": multiply,
-        "divide": divide,
-        "sqrt": sqrt,
+        "quotient": quotient,
+        "root": root,
         "round_": round_,
     }
 
 
-OPERATIONS = {Binary: operations(_clear_binary, True), Hexadecimal: operations(_clear_hexadecimal, False)}
+OPERATIONS = {
+    (tag, free): operations(clear, tag is Binary, free)
+    for tag, clear in ((Binary, _clear_binary), (Hexadecimal, _clear_hexadecimal))
+    for free in (False, True)
+}

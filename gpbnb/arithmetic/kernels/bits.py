@@ -63,6 +63,16 @@ def leading_zeros(typingctx: Any, n: Any) -> Any:
 
 
 @intrinsic
+def trailing_zeros(typingctx: Any, n: Any) -> Any:
+    """Number of zero bits below the lowest set bit of a uint64, as an int64."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.cttz(args[0], ir.Constant(ir.IntType(1), 0))
+
+    return types.int64(types.uint64), codegen
+
+
+@intrinsic
 def select(typingctx: Any, condition: Any, a: Any, b: Any) -> Any:
     """``a if condition else b`` without a branch, for two numbers of the same type."""
 

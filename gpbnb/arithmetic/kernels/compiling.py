@@ -11,10 +11,12 @@ files that the defining file imports. Several processes wait for each other and 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import os
 import pickle
 import platform
 import sys
+import time
 from collections.abc import Callable
 from functools import cache, lru_cache
 from pathlib import Path
@@ -30,6 +32,11 @@ from numba.core.serialize import dumps
 
 from gpbnb.arithmetic.kernels.machine_code import generate_on_demand
 from gpbnb.caching import cache_folder, changed_since_import, digest, imported, lock, read, remove_unused, unlock, write
+
+if numba.config.DISABLE_JIT:
+    raise ImportError(
+        "got NUMBA_DISABLE_JIT=1 in the environment; needed compiled loops: gpbnb has no others; unset it"
+    )
 
 _VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, platform.python_version())
 _LONGEST_WAIT = 240.0  # seconds, for another process that compiles the same function
@@ -76,11 +83,25 @@ def _stamp(path: Path) -> str:
 
 
 @lru_cache(maxsize=1)
-def _tell(folder: Path) -> None:
+def _begin(folder: Path) -> float:
+    """Say where compiled functions are kept, remove those that were not used for long, and return the time."""
     if not os.environ.get("GPBNB_QUIET"):
         sys.stderr.write(_NOTICE.format(folder))
-        sys.stderr.flush()
     remove_unused(folder)
+    return time.monotonic()
+
+
+_COUNT = itertools.count(1)
+
+
+def _tell(folder: Path, name: str) -> None:
+    """Say which function is compiled now, the how manyth it is, and how long compiling has taken so far."""
+    began = _begin(folder)
+    if not os.environ.get("GPBNB_QUIET"):
+        passed = time.monotonic() - began
+        so_far = f", {passed:.0f} s so far" if passed >= 1 else ""
+        sys.stderr.write(f"gpbnb: compiling function {next(_COUNT)}, {name.removeprefix('gpbnb.')}{so_far}\n")
+        sys.stderr.flush()
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]
@@ -108,7 +129,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
             found = _load(path, key, target_context)
             if found is None:
                 generate_on_demand()
-                _tell(self._folder)
+                _tell(self._folder, self._name)
             else:
                 self._release()
         return found

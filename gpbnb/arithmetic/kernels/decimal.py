@@ -119,12 +119,12 @@ def check(e: Any) -> None:
         )
 
 
-def _increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
+def increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
     """1 if a magnitude rounds up to m + 1, else 0; `up`: at least halfway, `tie`: halfway, `inexact`: above m."""
-    raise TypeError("got a call of _increment from Python; needed one from a function compiled by numba")
+    raise TypeError("got a call of increment from Python; needed one from a function compiled by numba")
 
 
-@overload(_increment, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
+@overload(increment, strict=False, jit_options={"forceinline": True, "no_cfunc_wrapper": True})
 def _overloaded_increment(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
     def to_nearest_or_chopped(fmt: Any, m: Any, up: Any, tie: Any, inexact: Any, negative: Any) -> Any:
         return np.uint64(up & fmt.nearest)
@@ -158,7 +158,7 @@ def _overloaded_within_range(fmt: Any, m: Any, e: Any) -> Any:
 
 
 @inner(forceinline=True)
-def _number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
+def number(fmt: Any, m: Any, e: Any, negative: Any) -> Any:
     """Make the pair of a magnitude with t digits, or with t + 1 after a carry."""
     carried = m == _power(fmt.precision)
     m = _power(fmt.precision - 1) if carried else m
@@ -171,7 +171,7 @@ def _filled(fmt: Any, n: Any, e: Any, negative: Any) -> Any:
     if n == _U0:
         return np.int64(0), np.int64(0)
     k = fmt.precision - _digits(n)
-    return _number(fmt, n * _power(k), e - k, negative)
+    return number(fmt, n * _power(k), e - k, negative)
 
 
 @inner(forceinline=True)
@@ -241,8 +241,8 @@ def add(fmt: Any, a: Any, b: Any) -> Any:
     else:
         m = n
         up = beyond_half
-    m += _increment(fmt, m, up, halfway, more, negative)
-    return _number(fmt, m, e, negative)
+    m += increment(fmt, m, up, halfway, more, negative)
+    return number(fmt, m, e, negative)
 
 
 @inner(forceinline=True)
@@ -268,8 +268,8 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
         up, tie, inexact = last >= _U5, (last == _U5) & (not inexact), inexact | (last != _U0)
         k = t
     negative = (m1 < 0) != (m2 < 0)
-    m += _increment(fmt, m, up, tie, inexact, negative)
-    return _number(fmt, m, e1 + e2 + k, negative)
+    m += increment(fmt, m, up, tie, inexact, negative)
+    return number(fmt, m, e1 + e2 + k, negative)
 
 
 @inner
@@ -290,8 +290,8 @@ def divide(fmt: Any, a: Any, b: Any) -> Any:
     else:
         m, rest = _wide_by_any(high_product(x, _power(k)), x * _power(k), y)
     negative = (m1 < 0) != (m2 < 0)
-    m += _increment(fmt, m, rest + rest >= y, rest + rest == y, rest != _U0, negative)
-    return _number(fmt, m, e1 - e2 - k, negative)
+    m += increment(fmt, m, rest + rest >= y, rest + rest == y, rest != _U0, negative)
+    return number(fmt, m, e1 - e2 - k, negative)
 
 
 @inner
@@ -320,7 +320,7 @@ def sqrt(fmt: Any, a: Any) -> Any:
         root += 1
     # Neither a tie nor a carry can occur, as the exact kernel explains.
     whole = np.uint64(root)
-    return _number(fmt, whole + _increment(fmt, whole, rest > root, False, rest > 0, False), (e - k) // 2, False)
+    return number(fmt, whole + increment(fmt, whole, rest > root, False, rest > 0, False), (e - k) // 2, False)
 
 
 @inner
@@ -332,12 +332,12 @@ def round_(fmt: Any, x: Any) -> Any:
     n = np.uint64(abs(m))
     drop = _digits(n) - fmt.precision
     if drop <= 0:
-        return _number(fmt, n * _power(-drop), e + drop, m < 0)
+        return number(fmt, n * _power(-drop), e + drop, m < 0)
     unit = _power(drop)
     q = n // unit
     rest = n - q * unit
-    q += _increment(fmt, q, rest + rest >= unit, rest + rest == unit, rest != _U0, m < 0)
-    return _number(fmt, q, e + drop, m < 0)
+    q += increment(fmt, q, rest + rest >= unit, rest + rest == unit, rest != _U0, m < 0)
+    return number(fmt, q, e + drop, m < 0)
 
 
 @inner

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels.bits import fma
+from gpbnb.arithmetic.kernels.bits import fma, select
 from gpbnb.arithmetic.kernels.compiling import inner
 
 LEAST, LIMIT = 2.0**-850, 2.0**1000
@@ -37,9 +37,8 @@ def _fast_two_sum(a: Any, b: Any) -> Any:
 @inner(forceinline=True)
 def _within_range(high: Any, low: Any, exact_zero: Any) -> Any:
     size = abs(high)
-    if ((size >= LEAST) & (size < LIMIT)) | (exact_zero & (size == 0.0)):
-        return high + 0.0, low + 0.0
-    return np.nan, np.nan
+    within = ((size >= LEAST) & (size < LIMIT)) | (exact_zero & (size == 0.0))
+    return select(within, high + 0.0, np.nan), select(within, low + 0.0, np.nan)
 
 
 @inner(forceinline=True)

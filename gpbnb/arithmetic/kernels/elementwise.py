@@ -8,9 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from gpbnb.arithmetic.kernels import scalar
-from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.kernels.bits import bits, from_bits
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.scalar import compare, load, lost, put
+
+_MOST = np.int64(2**63 - 1)
 
 
 def _two(operation: Any) -> Callable[..., bool]:
@@ -67,10 +72,25 @@ def _fold(operation: Any) -> Callable[..., bool]:
     return loop
 
 
-ENTRIES = {name: _two(getattr(scalar, name)) for name in ("add", "subtract", "multiply", "divide")}
-ENTRIES |= {name: _one(getattr(scalar, name)) for name in ("sqrt", "round_")}
+ENTRIES = {name: _two(getattr(scalar, name)) for name in ("add", "subtract", "multiply")}
+ENTRIES |= {"divide": _two(scalar.quotient), "sqrt": _one(scalar.root), "round_": _one(scalar.round_)}
 ENTRIES["fused"] = _three(scalar.fused)
 FOLDS = {name: _fold(getattr(scalar, name)) for name in ("add", "multiply")}
+
+
+@compiled
+def partial_sums(fmt: Any, n: int, width: int, a: Any, c: Any) -> Any:
+    """c[i] = the sum of a[0] to a[i] from left to right, in each of `width` columns."""
+    gone = False
+    for j in range(width):
+        x = load(fmt, a, j)
+        gone |= lost(fmt, x)
+        put(fmt, c, j, x)
+        for i in range(1, n):
+            x = scalar.add(fmt, x, load(fmt, a, i * width + j))
+            gone |= lost(fmt, x)
+            put(fmt, c, i * width + j, x)
+    return gone
 
 
 @compiled
@@ -84,3 +104,20 @@ def compared(fmt: Any, n: int, a: Any, b: Any, c: Any) -> None:
 def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """The matrix product c = a b; raises OverflowError like :func:`gpbnb.arithmetic.kernels.scalar.matmul`."""
     scalar.matmul(fmt, a, b, c)
+
+
+@inner
+def _extent(x: Any) -> Any:
+    """The smallest size of a float64 other than zero, infinite if there is none, and the largest size."""
+    smallest, largest = bits(np.inf), np.int64(0)
+    for i in range(x.shape[0]):
+        size = bits(abs(x[i]))
+        smallest = min(smallest, size if size > 0 else _MOST)
+        largest = max(largest, size)
+    return from_bits(smallest), from_bits(largest)
+
+
+@compiled
+def extents(x: Any, y: Any) -> Any:
+    """The smallest and the largest size of the numbers other than zero of two arrays."""
+    return _extent(x), _extent(y)

@@ -2,7 +2,7 @@
 
 The order of operations, and therefore each digit, is the same as in :mod:`gpbnb.arithmetic.linalg`. Matrices are packed
 arrays, which the functions overwrite. If a number leaves the range of its backend, they raise OverflowError, and the
-arrays are invalid.
+arrays are invalid. Such a number stays in its place, so that one look at the end finds it.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.arithmetic.kernels.scalar import (
     absolute,
     add,
+    check,
     compare,
-    divide,
     less,
     load,
     multiply,
     negative,
     put,
-    store,
+    quotient,
     subtract,
     zero,
 )
@@ -47,13 +47,17 @@ def lu(fmt: Any, a: Any, order: Any, pivot: bool) -> int:
                     put(fmt, a, (largest, j), moved)
         head = load(fmt, a, (k, k))
         if compare(fmt, head, zero(fmt)) == 0:
+            check(fmt, a)
             return k
+        upper = a[k, k + 1 :]
         for i in range(k + 1, n):
-            ratio = divide(fmt, load(fmt, a, (i, k)), head)
-            store(fmt, a, (i, k), ratio)
+            ratio = quotient(fmt, load(fmt, a, (i, k)), head)
+            put(fmt, a, (i, k), ratio)
             m = negative(fmt, ratio)
-            for j in range(k + 1, n):
-                store(fmt, a, (i, j), add(fmt, load(fmt, a, (i, j)), multiply(fmt, m, load(fmt, a, (k, j)))))
+            row = a[i, k + 1 :]
+            for j in range(row.shape[0]):  # counting from zero, which numba vectorizes
+                put(fmt, row, j, add(fmt, load(fmt, row, j), multiply(fmt, m, load(fmt, upper, j))))
+    check(fmt, a)
     return -1
 
 
@@ -65,7 +69,8 @@ def reduce(fmt: Any, factors: Any, b: Any) -> None:
         for i in range(k + 1, n):
             m = negative(fmt, load(fmt, factors, (i, k)))
             for j in range(b.shape[1]):
-                store(fmt, b, (i, j), add(fmt, load(fmt, b, (i, j)), multiply(fmt, m, load(fmt, b, (k, j)))))
+                put(fmt, b, (i, j), add(fmt, load(fmt, b, (i, j)), multiply(fmt, m, load(fmt, b, (k, j)))))
+    check(fmt, b)
 
 
 @compiled
@@ -76,7 +81,8 @@ def substitute(fmt: Any, factors: Any, b: Any) -> None:
         for i in range(k + 1, n):
             upper = load(fmt, factors, (k, i))
             for j in range(b.shape[1]):
-                store(fmt, b, (k, j), subtract(fmt, load(fmt, b, (k, j)), multiply(fmt, upper, load(fmt, b, (i, j)))))
+                put(fmt, b, (k, j), subtract(fmt, load(fmt, b, (k, j)), multiply(fmt, upper, load(fmt, b, (i, j)))))
         head = load(fmt, factors, (k, k))
         for j in range(b.shape[1]):
-            store(fmt, b, (k, j), divide(fmt, load(fmt, b, (k, j)), head))
+            put(fmt, b, (k, j), quotient(fmt, load(fmt, b, (k, j)), head))
+    check(fmt, b)

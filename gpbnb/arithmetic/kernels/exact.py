@@ -1,22 +1,31 @@
-"""Correctly rounded arithmetic on Python integers: any base, any precision, unbounded exponent.
+"""Correctly rounded arithmetic on Python integers: any base, any precision, every rounding, any range.
 
 A pair ``(m, e)`` represents ``m * base**e``. Zero is ``(0, 0)``; every other number is normalized,
-``base**(t-1) <= abs(m) < base**t``, so that equal numbers are equal pairs. Every function computes the exact result and
-rounds it once.
+``base**(t-1) <= abs(m) < base**t``, so that equal numbers are equal pairs. Subnormal numbers are normalized as well;
+their last digits are zeros. Every function computes the exact result and rounds it once.
 """
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
-from math import isqrt, log2
+from math import isqrt, log2, log10
+from typing import Any, cast
+
+from gpbnb.arithmetic.flags import signal
+from gpbnb.arithmetic.rounding import DRAW_BITS, Limits, Rounding, Rules
 
 Pair = tuple[int, int]
+
+SPECIAL = ("infinity", "NaN")
+"""What formats with infinity and NaN, or with NaN alone, give beyond their range."""
 
 ZERO: Pair = (0, 0)
 LARGEST_BITS = 10_000_000  # longer integers would take minutes or exhaust the memory
 _LARGEST_POWER_OF_TEN = int(LARGEST_BITS / log2(10))
+_MASK = 2**64 - 1
 
 
 def integer_text(n: int) -> str:
@@ -24,31 +33,69 @@ def integer_text(n: int) -> str:
     return str(Decimal(n))
 
 
+def draw(seed: int, count: int) -> int:
+    """Random bits for rounding number `count`: the upper bits of SplitMix64."""
+    z = (seed + count * 0x9E3779B97F4A7C15) & _MASK
+    z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & _MASK
+    z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & _MASK
+    return (z ^ (z >> 31)) >> (64 - DRAW_BITS)
+
+
+def size_text(value: Fraction) -> str:
+    """Write a number for a message: seven digits, or a power of ten beyond the range of float64."""
+    try:
+        return f"{float(value):.7g}"
+    except OverflowError:
+        power = (abs(value.numerator).bit_length() - value.denominator.bit_length()) * log10(2)
+        return f"{'-' if value < 0 else ''}10**{power:.0f}"
+
+
 class ExactKernel:
     """Scalar operations in one format.
 
-    Parameters
-    ----------
-    base : number base, at least 2.
-    precision : digits of the significand, t in the documents, at least 1.
-    nearest : round to nearest, half away from zero (hung1984, II (3)); else chop (II (9)).
+    Results are first rounded as if the exponent had no upper limit; a rounded result beyond the largest number
+    overflows. In a format without subnormal numbers, rounded results below the smallest normal number become zero.
+
+    Raises
+    ------
+    OverflowError : a result overflows, and the format neither saturates nor wraps around.
     """
 
-    def __init__(self, base: int, precision: int, nearest: bool) -> None:
-        self.base = base
-        self.precision = precision
-        self.nearest = nearest
-        self._bits = log2(base)
-        self._smallest = base ** (precision - 1)
-        self.limit = base**precision
+    def __init__(self, rules: Rules) -> None:
+        self.rules = rules
+        self.base, self.precision, self.rounding, self.limits, _ = rules
+        #: Whether ties are the only numbers that are not rounded to their nearest neighbour.
+        self.nearest = self.rounding in (Rounding.NEAREST, Rounding.EVEN)
+        self.count = 0  # roundings so far, which select the random bits
+        self._unlimited = self.limits is None  # what has no limits takes shorter ways
+        self._bits = log2(self.base)
+        self._smallest = self.base ** (self.precision - 1)
+        self.limit = self.base**self.precision
         self._largest_exponent = int(LARGEST_BITS / self._bits)
         # Powers that the operations need; for very long significands they are computed on demand.
-        self._powers = [base**k for k in range(min(2 * precision + 8, 512))]
+        self._powers = [self.base**k for k in range(min(2 * self.precision + 8, 512))]
+        if self.limits is not None:
+            #: Exponent of the last digit of the smallest normal number.
+            self.quantum = self.limits.emin - self.precision + 1
+            largest = self.limits.largest / Fraction(self.base) ** self.quantum
+            m, e = self._normalized(int(largest), self.quantum)
+            self.top = e, m  # exponent first, so that tuples compare by size
+            # The limits, in units of the last digit of the smallest normal number.
+            self._lowest = int(self.limits.lowest / Fraction(self.base) ** self.quantum)
+            self._largest = int(largest)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return kernel, (self.rules,)
+
+    def restart(self) -> None:
+        """Restart the random numbers of stochastic rounding."""
+        self.count = 0
 
     # -- from exact values ---------------------------------------------------------------------
 
     def from_ratio(self, p: int, q: int, e: int = 0) -> Pair:
         """Round ``p / q * base**e``; ``q`` must be positive."""
+        self.count += 1
         if p == 0:
             return ZERO
         if q == 1:
@@ -77,7 +124,7 @@ class ExactKernel:
         """Whether ``pair``, the rounded ``p / q * 10**k``, equals this number exactly."""
         m, e = pair
         if m == 0:
-            return True  # no other number rounds to zero
+            return p == 0
         if self.base == 10:
             e, k = e - k, 0
         numerator = m * q * self.base ** max(e, 0) * 10 ** max(-k, 0)
@@ -86,50 +133,64 @@ class ExactKernel:
     # -- operations ----------------------------------------------------------------------------
 
     def add(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
-        if m1 == 0:
-            return m2, e2
-        if m2 == 0:
-            return m1, e1
-        if e1 < e2:
-            m1, e1, m2, e2 = m2, e2, m1, e1
-        if e1 - e2 > self.precision + 1:
-            # Only the sign of the smaller operand matters. It is below base**-2 units in the last digit of the larger
-            # one, and the nearest number or midpoint is at least 1 / (2 * base) units away, even just below a power of
-            # the base.
-            m2, e2 = (1 if m2 > 0 else -1), e1 - 3
-        n = m1 * self.power(e1 - e2) + m2
-        return self._round_integer(n, e2) if n else ZERO
+        self.count += 1
+        return self._sum(m1, e1, m2, e2)
 
     def subtract(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
         return self.add(m1, e1, -m2, e2)
 
     def multiply(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        self.count += 1
         n = m1 * m2
         return self._round_integer(n, e1 + e2) if n else ZERO
 
     def divide(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
         """Round the quotient; callers exclude ``m2 == 0``."""
+        self.count += 1
         if m1 == 0:
             return ZERO
         return self._round_quotient(m1 if m2 > 0 else -m1, abs(m2), e1 - e2)
 
     def fused(self, m1: int, e1: int, m2: int, e2: int, m3: int, e3: int) -> Pair:
         """``a * b + c``, rounded once."""
-        m, e = m1 * m2, e1 + e2
-        if m == 0:
-            return m3, e3
-        if m3 == 0:
-            return self._round_integer(m, e)
-        (m, e), (n, f) = ((m, e), (m3, e3)) if e >= e3 else ((m3, e3), (m, e))
-        if e - f > 3 * self.precision + 2:
-            n, f = (1 if n > 0 else -1), e - self.precision - 3  # far below: only its sign matters
-        n += m * self.power(e - f)
-        return self._round_integer(n, f) if n else ZERO
+        self.count += 1
+        return self._sum(m1 * m2, e1 + e2, m3, e3)
 
     def sqrt(self, m: int, e: int) -> Pair:
         """Round the square root; callers exclude ``m < 0``."""
+        self.count += 1
         if m == 0:
             return ZERO
+        if self._unlimited and self.rounding in Rounding.documented():
+            return self._short_root(m, e)
+        # Enough digits that the root has more than t, and more than a random rounding compares.
+        shift = 2 * (self.precision + DRAW_BITS) + (e & 1)
+        n = m * self.base**shift
+        root = isqrt(n)
+        # One more digit marks an inexact root, which lies strictly between two integers.
+        sticky = int(root * root != n)
+        return self._round_integer(root * self.base + sticky, (e - shift) // 2 - 1)
+
+    def negative(self, m: int, e: int) -> Pair:
+        return (-m, e) if self._unlimited else self._within(-m, abs(m), e)
+
+    def absolute(self, m: int, e: int) -> Pair:
+        return (abs(m), e) if self._unlimited else self._within(1, abs(m), e)
+
+    def _sum(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        if m1 == 0 or m2 == 0:
+            m, e = (m1, e1) if m2 == 0 else (m2, e2)
+            return self._round_integer(m, e) if m else ZERO
+        if e1 < e2:
+            m1, e1, m2, e2 = m2, e2, m1, e1
+        gap = 3 * self.precision + DRAW_BITS + 2
+        if e1 - e2 > gap and self._unlimited:
+            # Only the sign of the smaller number matters: it is far below the digits that decide a rounding.
+            m2, e2 = (1 if m2 > 0 else -1), e1 - 2 * DRAW_BITS - 3
+        n = m1 * self.power(e1 - e2) + m2
+        return self._round_integer(n, e2) if n else ZERO
+
+    def _short_root(self, m: int, e: int) -> Pair:
         # The root of a number with 2t - 1 or 2t digits and an even exponent has exactly t digits.
         shift = self.precision if (e - self.precision) % 2 == 0 else self.precision - 1
         n = m * self.power(shift)
@@ -139,12 +200,6 @@ class ExactKernel:
         if self.nearest and n - root * root > root:
             root += 1
         return root, (e - shift) // 2
-
-    def negative(self, m: int, e: int) -> Pair:
-        return -m, e
-
-    def absolute(self, m: int, e: int) -> Pair:
-        return abs(m), e
 
     def compare(self, m1: int, e1: int, m2: int, e2: int) -> int:
         """-1, 0 or 1 if the first number is less than, equal to or greater than the second."""
@@ -213,39 +268,267 @@ class ExactKernel:
             count -= 1
         return count
 
-    def _carry(self, m: int, e: int) -> Pair:
-        """Normalize a positive significand that rounding may have carried to t + 1 digits."""
-        return (self._smallest, e + 1) if m == self.limit else (m, e)
-
     def _round_integer(self, n: int, e: int) -> Pair:
         """Round ``n * base**e``, ``n`` not zero."""
         a = abs(n)
-        drop = self.digits(a) - self.precision
+        drop = self._dropped(self.digits(a) - self.precision, e)
         if drop <= 0:
-            return n * self.power(-drop), e + drop
+            return (n * self.power(-drop), e + drop) if self._unlimited else self._within(n, a, e)
+        if drop > self.digits(a) + DRAW_BITS + 2:  # far below half a unit of the last digit
+            a, e, drop = 1, e + drop - DRAW_BITS - 2, DRAW_BITS + 2
         unit = self.power(drop)
         m, rest = divmod(a, unit)
-        if self.nearest and 2 * rest >= unit:
-            m += 1
-        m, e = self._carry(m, e + drop)
-        return (m if n > 0 else -m), e
+        return self._within(n, m + self._up(m, rest, unit, n < 0), e + drop)
 
     def _round_quotient(self, p: int, q: int, e: int) -> Pair:
         """Round ``p / q * base**e``, ``p`` not zero, ``q`` positive."""
         a = abs(p)
         shift = self.precision - self.digits(a) + self.digits(q)
+        # With this shift the quotient has t or t + 1 digits, which decides how many are dropped.
         numerator, denominator = (a * self.power(shift), q) if shift >= 0 else (a, q * self.power(-shift))
-        if numerator >= denominator * self.limit:  # t + 1 digits, not t
-            denominator *= self.base
-            shift -= 1
+        drop = self._dropped(int(numerator >= denominator * self.limit), e - shift)
+        if drop < 0:
+            numerator *= self.power(-drop)
+        else:
+            denominator *= self.power(drop)
         m, rest = divmod(numerator, denominator)
-        if self.nearest and 2 * rest >= denominator:
-            m += 1
-        m, e = self._carry(m, e - shift)
-        return (m if p > 0 else -m), e
+        return self._within(p, m + self._up(m, rest, denominator, p < 0), e - shift + drop)
+
+    def _dropped(self, excess: int, e: int) -> int:
+        """Number of digits to drop from an integer times ``base**e`` that has `excess` digits more than t."""
+        if self.limits is None:
+            return excess
+        if self.limits.fixed:
+            return self.quantum - e
+        return max(excess, self.quantum - e) if self.limits.subnormal else excess
+
+    def _up(self, m: int, rest: int, unit: int, negative: bool) -> bool:
+        """Whether the magnitude ``m + rest / unit`` rounds up to m + 1."""
+        match self.rounding:
+            case Rounding.NEAREST:
+                return 2 * rest >= unit
+            case Rounding.EVEN:
+                return 2 * rest > unit or (2 * rest == unit and m % 2 == 1)
+            case Rounding.CHOP:
+                return False
+            case Rounding.UP:
+                return rest > 0 and not negative
+            case Rounding.DOWN:
+                return rest > 0 and negative
+            case Rounding.ODD:
+                return rest > 0 and m % 2 == 0
+            case Rounding.STOCHASTIC:
+                return draw(self.rules.seed, self.count) * unit < rest << DRAW_BITS
+
+    def _within(self, sign: int, m: int, e: int) -> Pair:
+        """Make the pair of a rounded magnitude and apply the limits."""
+        if self._unlimited:  # it has t digits, or rounding has carried to one more
+            m, e = (self._smallest, e + 1) if m == self.limit else (m, e)
+            return (m if sign > 0 else -m), e
+        if m == 0:
+            return ZERO
+        limits = cast(Limits, self.limits)
+        if limits.fixed:
+            return self._within_fixed(m if sign > 0 else -m, e)
+        m, e = self._normalized(m, e)
+        if not limits.subnormal and e < self.quantum:
+            return ZERO
+        if (e, m) > self.top:
+            return self._beyond(sign > 0, e)
+        return (m if sign > 0 else -m), e
+
+    def _within_fixed(self, m: int, e: int) -> Pair:
+        """Apply the limits to a fixed-point number."""
+        places = e - self.quantum  # below 0 for a normalized number of less than t digits, which ends in zeros
+        count = m * self.power(places) if places >= 0 else m // self.power(-places)
+        lowest, largest = self._lowest, self._largest
+        if not lowest <= count <= largest:
+            if cast(Limits, self.limits).overflow != "wrap":
+                return self._beyond(count > 0, self.quantum, abs(count))
+            count = (count - lowest) % (largest - lowest + 1) + lowest
+        return self._normalized(count, self.quantum) if count else ZERO
+
+    def _beyond(self, positive: bool, e: int, count: int = 1) -> Pair:
+        """Replace a result beyond the limits by a limit, or refuse it; fixed point gives it as ``count * base**e``."""
+        limits = cast(Limits, self.limits)
+        if limits.overflow == "saturate":
+            return self._normalized(self._largest if positive else self._lowest, self.quantum)
+        if limits.fixed:
+            about = size_text((count if positive else -count) * Fraction(self.base) ** e)
+            needed, cure = f"one from {size_text(limits.lowest)} to {size_text(limits.largest)}", "more integer bits"
+        else:
+            about = self.about(e)
+            needed, cure = f"at most {size_text(limits.largest)} in size", "a format with a larger range"
+        raise OverflowError(f"got a result of about {about}; needed {needed}; scale the numbers, or use {cure}")
+
+    def _normalized(self, m: int, e: int) -> Pair:
+        """Append zeros up to t digits, or remove them if rounding has carried to more."""
+        shift = self.precision - self.digits(abs(m))
+        return (m * self.power(shift) if shift >= 0 else m // self.power(-shift)), e - shift
+
+
+class SpecialKernel(ExactKernel):
+    """Operations of a format with infinity, NaN and negative zero, as IEEE 754 defines them.
+
+    The pair of a special number is ``(math.inf, 0)``, ``(-math.inf, 0)``, ``(math.nan, 0)`` or ``(-0.0, 0)``; a float
+    is never the significand of another number. Exceptions are counted by :mod:`gpbnb.arithmetic.flags`.
+    """
+
+    def __init__(self, rules: Rules) -> None:
+        super().__init__(rules)
+        self._free = ExactKernel(rules._replace(limits=None))
+
+    def special(self, value: float) -> Pair:
+        """Return the pair of infinity, NaN or negative zero; a format without infinity has NaN in its place."""
+        if math.isinf(value) and cast(Limits, self.limits).overflow == "NaN":
+            value = math.nan
+        return cast(Pair, (value, 0))
+
+    def from_ratio(self, p: int, q: int, e: int = 0) -> Pair:
+        return self.special(p) if type(p) is float else super().from_ratio(p, q, e)
+
+    def is_exactly(self, pair: Pair, p: int, q: int, k: int) -> bool:
+        return p == 0 == pair[0] if type(pair[0]) is float else super().is_exactly(pair, p, q, k)
+
+    def add(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        return self.fused(m1, e1, 1, 0, m2, e2)
+
+    def subtract(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        return self.add(m1, e1, *self.negative(m2, e2))
+
+    def multiply(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        if _is_usual(m1) and _is_usual(m2):
+            return super().multiply(m1, e1, m2, e2)
+        product = _stand_in(m1) * _stand_in(m2)
+        return self._invalid() if math.isnan(product) and not _has_nan(m1, m2) else self._plain(product)
+
+    def divide(self, m1: int, e1: int, m2: int, e2: int) -> Pair:
+        if _is_usual(m1) and _is_usual(m2):
+            return super().divide(m1, e1, m2, e2)
+        a, b = _stand_in(m1), _stand_in(m2)
+        if _has_nan(m1, m2):
+            return self.special(math.nan)
+        if (a == 0 == b) or (math.isinf(a) and math.isinf(b)):
+            return self._invalid()
+        if b == 0:
+            if math.isfinite(a):
+                signal(self.rules, "divide_by_zero")
+            return self.special(math.copysign(math.inf, a) * math.copysign(1, b))
+        return self._plain(a / b)
+
+    def fused(self, m1: int, e1: int, m2: int, e2: int, m3: int, e3: int) -> Pair:
+        if _is_usual(m1) and _is_usual(m2) and _is_usual(m3):
+            if m1 * m2 * m3 > 0 or not self._cancel(m1 * m2, e1 + e2, m3, e3):
+                return super().fused(m1, e1, m2, e2, m3, e3)
+            return self.special(-0.0) if self.rounding is Rounding.DOWN else ZERO
+        if _has_nan(m1, m2, m3):
+            return self.special(math.nan)
+        product, c = _stand_in(m1) * _stand_in(m2), _stand_in(m3)
+        total = product + c
+        if math.isnan(total):
+            return self._invalid()
+        if math.isinf(total):
+            return self.special(total)
+        if c != 0:  # and the product is zero
+            return m3, e3
+        if product != 0:
+            return super().multiply(m1, e1, m2, e2)
+        down = self.rounding is Rounding.DOWN and math.copysign(1, product) != math.copysign(1, c)
+        return self._plain(-0.0 if down else total)
+
+    def sqrt(self, m: int, e: int) -> Pair:
+        if m < 0:
+            return self._invalid()
+        return super().sqrt(m, e) if _is_usual(m) else (m, e)
+
+    def negative(self, m: int, e: int) -> Pair:
+        return (-m, e) if _is_usual(m) else self._plain(-_stand_in(m))
+
+    def absolute(self, m: int, e: int) -> Pair:
+        return (abs(m), e) if _is_usual(m) else self._plain(abs(_stand_in(m)))
+
+    def compare(self, m1: int, e1: int, m2: int, e2: int) -> int:
+        """-1, 0 or 1, or NaN if one of the numbers is NaN."""
+        if _is_usual(m1) and _is_usual(m2):
+            return super().compare(m1, e1, m2, e2)
+        a, b = _stand_in(m1), _stand_in(m2)
+        return cast(int, math.nan) if _has_nan(m1, m2) else (a > b) - (a < b)
+
+    def to_fraction(self, m: int, e: int) -> Fraction:
+        if type(m) is float and m != 0:
+            raise ValueError(f"got {m}, which is no Fraction; needed a finite number; select entries by np.isfinite(x)")
+        return super().to_fraction(int(m), e)
+
+    def to_float(self, m: int, e: int) -> float:
+        return m if type(m) is float else super().to_float(m, e)
+
+    def _plain(self, value: float) -> Pair:
+        """Return the pair of zero, infinity or NaN."""
+        return ZERO if value == 0 and math.copysign(1, value) > 0 else self.special(value)
+
+    def _invalid(self) -> Pair:
+        signal(self.rules, "invalid")
+        return self.special(math.nan)
+
+    def _cancel(self, m1: int, e1: int, m2: int, e2: int) -> bool:
+        """Whether two numbers, not necessarily normalized, add up to zero."""
+        e = min(e1, e2)
+        return m1 * self.power(e1 - e) + m2 * self.power(e2 - e) == 0
+
+    def _round_integer(self, n: int, e: int) -> Pair:
+        return self._noted(super()._round_integer(n, e), n, 1, e)
+
+    def _round_quotient(self, p: int, q: int, e: int) -> Pair:
+        return self._noted(super()._round_quotient(p, q, e), p, q, e)
+
+    def _noted(self, pair: Pair, p: int, q: int, e: int) -> Pair:
+        """Count the exceptions of rounding ``p / q * base**e``, not zero, to a pair."""
+        m, exponent = pair
+        if type(m) is not float and p * self.power(max(e - exponent, 0)) == m * q * self.power(max(exponent - e, 0)):
+            return pair
+        signal(self.rules, "inexact")
+        if m == 0 or (abs(m) < math.inf and exponent <= self.quantum):
+            # Tiny results are those below the smallest normal number, in base 10 before rounding, in others after
+            # rounding to t digits with unlimited exponents.
+            self._free.count = self.count
+            kernel = self._free if self.base != 10 else _chopping(self.rules)
+            if kernel._round_quotient(p, q, e)[1] < self.quantum:
+                signal(self.rules, "underflow")
+        return pair
+
+    def _within(self, sign: int, m: int, e: int) -> Pair:
+        pair = super()._within(sign, m, e)
+        return self.special(-0.0) if pair == ZERO and sign < 0 else pair
+
+    def _beyond(self, positive: bool, e: int, count: int = 1) -> Pair:
+        signal(self.rules, "overflow")
+        toward_zero = {Rounding.CHOP: True, Rounding.ODD: True, Rounding.UP: not positive, Rounding.DOWN: positive}
+        if toward_zero.get(self.rounding, False):
+            return self._normalized(self._largest if positive else self._lowest, self.quantum)
+        return self.special(math.inf if positive else -math.inf)
+
+
+def _is_usual(m: int) -> bool:
+    """Whether a significand is that of a finite number other than zero."""
+    return type(m) is not float and m != 0
+
+
+def _has_nan(*significands: int) -> bool:
+    return any(m != m for m in significands)
+
+
+def _stand_in(m: int) -> float:
+    """Return a float that behaves like a number in operations whose result is zero, infinite or NaN."""
+    return m if type(m) is float else float((m > 0) - (m < 0))
 
 
 @lru_cache(maxsize=256)
-def kernel(base: int, precision: int, nearest: bool) -> ExactKernel:
+def _chopping(rules: Rules) -> ExactKernel:
+    return ExactKernel(rules._replace(limits=None, rounding=Rounding.CHOP))
+
+
+@lru_cache(maxsize=256)
+def kernel(rules: Rules) -> ExactKernel:
     """Return the kernel of a format; each is made only once."""
-    return ExactKernel(base, precision, nearest)
+    special = rules.limits is not None and rules.limits.overflow in SPECIAL
+    return SpecialKernel(rules) if special else ExactKernel(rules)

@@ -11,13 +11,17 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
+from gpbnb.arithmetic.kernels.bits import bits, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.scalar import (
     add,
+    can_be_freed,
     check,
     compare,
     divide,
     first_product,
+    freed,
+    guard,
     load,
     multiply,
     multiply_add,
@@ -27,7 +31,22 @@ from gpbnb.arithmetic.kernels.scalar import (
     subtract,
     zero,
 )
-from gpbnb.arithmetic.kernels.tags import Blocked, Limited, Mixed, Pairwise
+from gpbnb.arithmetic.kernels.tags import (
+    LEAST,
+    LIMIT,
+    Blocked,
+    DoubleDouble,
+    Hexadecimal,
+    Limited,
+    Mixed,
+    Pairwise,
+    extents_of_sums,
+)
+
+_INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
+_MOST = np.int64(2**63 - 1)
+WIDE = 8  # rows and columns, from which on high and low parts are taken apart
+MANY = 2000  # multiplications in a product, from which on a look at the range of its entries pays
 
 
 @inner
@@ -57,7 +76,8 @@ def matrix_sum(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a + b."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
-            store(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+            put(fmt, c, (i, j), add(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+    guard(fmt, c)
 
 
 @inner
@@ -65,7 +85,59 @@ def difference(fmt: Any, a: Any, b: Any, c: Any) -> None:
     """c = a - b."""
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
-            store(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+            put(fmt, c, (i, j), subtract(fmt, load(fmt, a, (i, j)), load(fmt, b, (i, j))))
+    guard(fmt, c)
+
+
+@inner
+def _extent(x: Any) -> Any:
+    """The smallest size of the float64 numbers of a matrix other than zero, infinite if there are none; the largest."""
+    smallest, largest = bits(np.inf), np.int64(0)
+    for i in range(x.shape[0]):
+        row = x[i]
+        for j in range(row.shape[0]):
+            size = bits(abs(row[j]))
+            smallest = min(smallest, size if size > 0 else _MOST)
+            largest = max(largest, size)
+    return from_bits(smallest), from_bits(largest)
+
+
+_extents_of_sums = inner(extents_of_sums)
+
+
+def stays_within(fmt: Any, a: Any, b: Any, least: int) -> Any:
+    """Whether no result of the product a b can leave the range, by its extents, and the tag has loops for that.
+
+    Products of fewer than `least` multiplications are not looked at.
+    """
+    raise TypeError("got a call of stays_within from Python; needed one from a function compiled by numba")
+
+
+@overload(stays_within, strict=False, jit_options=_INLINE)
+def _stays_within(fmt: Any, a: Any, b: Any, least: int) -> Any:
+    tag = getattr(fmt, "instance_class", None)
+    if not can_be_freed(fmt):
+        return lambda fmt, a, b, least: False
+    base = 16 if tag is Hexadecimal else 2
+
+    def unlimited(fmt: Any) -> Any:
+        return 0.0, LEAST, LIMIT
+
+    def limited(fmt: Any) -> Any:
+        return fmt.gradual, fmt.least, fmt.largest
+
+    limits = inner(limited if tag is Limited else unlimited)
+
+    def of_floats(fmt: Any, a: Any, b: Any, least: int) -> Any:
+        n = a.shape[1]
+        if b.shape[1] < 2 or a.shape[0] * n * b.shape[1] < least:
+            return False
+        gradual, smallest, largest = limits(fmt)
+        (low_a, high_a), (low_b, high_b) = _extent(a), _extent(b)
+        low, high = _extents_of_sums(n, base, fmt.precision, gradual, low_a * low_b, high_a * high_b)
+        return high <= largest and (gradual > 0.0 or low >= smallest)
+
+    return of_floats
 
 
 def product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
@@ -122,10 +194,48 @@ def _product_in_order(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @inner
-def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
-    if product_in_order(fmt, a, b, c):
-        return
+def _add_multiple(fmt: Any, factor: Any, high: Any, low: Any, sum_high: Any, sum_low: Any) -> None:
+    """Add a multiple of one row to another; all four arrays are contiguous, so that the loop is vectorized."""
+    for j in range(high.shape[0]):
+        s = add(fmt, (sum_high[j], sum_low[j]), multiply(fmt, factor, (high[j], low[j])))
+        sum_high[j] = s[0]
+        sum_low[j] = s[1]
+
+
+def product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    """c = a b for pairs of float64 in wide matrices, with high and low parts apart; returns whether it did that."""
+    raise TypeError("got a call of product_in_planes from Python; needed one from a function compiled by numba")
+
+
+@overload(product_in_planes, strict=False, jit_options=_INLINE)
+def _product_in_planes(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+    def of_pairs(fmt: Any, a: Any, b: Any, c: Any) -> Any:
+        p = b.shape[1]
+        if p < WIDE or a.shape[0] < WIDE:
+            return False
+        high, low = np.empty((b.shape[0], p)), np.empty((b.shape[0], p))
+        for k in range(b.shape[0]):
+            for j in range(p):
+                high[k, j], low[k, j] = load(fmt, b, (k, j))
+        sums = np.empty((2, p))
+        for i in range(a.shape[0]):
+            sums[:] = 0.0
+            for k in range(a.shape[1]):
+                factor = load(fmt, a, (i, k))
+                if not is_zero(fmt, factor):
+                    _add_multiple(fmt, factor, high[k], low[k], sums[0], sums[1])
+            for j in range(p):
+                put(fmt, c, (i, j), (sums[0, j], sums[1, j]))
+        check(fmt, c)
+        return True
+
+    if getattr(fmt, "instance_class", None) is DoubleDouble:
+        return of_pairs
+    return lambda fmt, a, b, c: False
+
+
+@inner(forceinline=True)
+def _add_products(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         fresh = True
         for k in range(a.shape[1]):
@@ -142,7 +252,18 @@ def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
         if fresh:
             for j in range(b.shape[1]):
                 put(fmt, c, (i, j), zero(fmt))
-    check(fmt, c)
+
+
+@inner
+def product(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
+    if product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
+        return
+    if stays_within(fmt, a, b, MANY):
+        _add_products(freed(fmt), a, b, c)
+    else:
+        _add_products(fmt, a, b, c)
+        check(fmt, c)
 
 
 @inner

@@ -15,16 +15,29 @@ from typing import Any
 
 import numpy as np
 
-from gpbnb.arithmetic.kernels.binary import LEAST
 from gpbnb.arithmetic.kernels.bits import bits, fma, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.tags import AWAY, DOWN, ODD, UP, Even, Mode, Random, Sixteen, Two
+from gpbnb.arithmetic.kernels.tags import (
+    AWAY,
+    DOWN,
+    LEAST,
+    ODD,
+    UP,
+    Even,
+    Hardware32,
+    Hardware64,
+    Mode,
+    Random,
+    ShortEven,
+    Sixteen,
+    Two,
+)
 from gpbnb.arithmetic.rounding import DRAW_BITS
 
 EXACT_PRODUCT = 26  # bits; products of numbers this short are exact in float64
 _ONE = np.int64(1)
 _SIGN, _MAGNITUDE = np.int64(-(2**63)), np.int64(2**63 - 1)
-_EXPONENT, _ONE_BITS = np.int64(0x7FF << 52), np.int64(1023 << 52)
+_EXPONENT, _HALF = np.int64(0x7FF << 52), np.int64(1 << 51)
 _LARGEST_32 = float(np.finfo(np.float32).max)
 _GOLDEN, _FIRST, _SECOND = np.uint64(0x9E3779B97F4A7C15), np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 _DRAWN = np.uint64(64 - DRAW_BITS)
@@ -57,7 +70,7 @@ def _coded(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
 
 
 def _random(fmt: Any, u: Any, k: Any, sticky: Any, negative: Any) -> Any:
-    # The same random numbers as gpbnb.arithmetic.kernels.limited.draw.
+    # The same random numbers as gpbnb.arithmetic.kernels.exact.draw.
     state = fmt.mode.state
     state[1] += np.uint64(1)
     z = state[0] + state[1] * _GOLDEN
@@ -79,6 +92,8 @@ _DROPPED = {Two: _dropped_binary, Sixteen: _dropped_hexadecimal}
 @cache
 def operations(digits: Any, mode: Any) -> dict[str, Any]:
     """Make the scalar operations for a class of digits and a class of rounding mode."""
+    if mode is ShortEven:
+        return {**_short(_within), "fused": operations(digits, Even)["fused"]}
     dropped = inner(forceinline=True)(_DROPPED[digits])
     round_magnitude = inner(forceinline=True)(_MODES[mode])
     exact_product = EXACT_PRODUCT // (4 if digits is Sixteen else 1)  # digits
@@ -118,17 +133,13 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         return fit(fmt, p, 0.0 if fmt.precision <= exact_product else fma(a, b, -p), zero)
 
     @inner(error_model="numpy", forceinline=True)
-    def divide(fmt: Any, a: Any, b: Any) -> Any:
-        if b == 0.0:
-            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+    def quotient(fmt: Any, a: Any, b: Any) -> Any:
         q = a / b
         r = fma(-q, b, a)
         return fit(fmt, q, -r if b < 0.0 else r, a == 0.0)
 
     @inner(forceinline=True)
-    def sqrt(fmt: Any, a: Any) -> Any:
-        if a < 0.0:
-            raise ValueError("got the square root of a negative number; needed x >= 0")
+    def root(fmt: Any, a: Any) -> Any:
         s = math.sqrt(a)
         return fit(fmt, s, fma(-s, s, a), a == 0.0)
 
@@ -146,31 +157,96 @@ def operations(digits: Any, mode: Any) -> dict[str, Any]:
         "add": add,
         "subtract": subtract,
         "multiply": multiply,
-        "divide": divide,
-        "sqrt": sqrt,
-        "round_": _round_even if (digits, mode) == (Two, Even) else round_,
+        "quotient": quotient,
+        "root": root,
+        "round_": _round_even_of_52 if (digits, mode) == (Two, Even) else round_,
         "fused": fused,
     }
 
 
 @inner(forceinline=True)
-def _round_even(fmt: Any, x: Any) -> Any:
-    """Round a float64 with as few vector instructions as possible; the general method gives the same result.
+def _power(fmt: Any, x: Any, fraction: Any) -> Any:
+    """(1 + fraction / 2**52) * 2**(e + 53 - t), where x has the exponent e, or that of the smallest normal number.
 
-    The float64 values between C and 2C, with C = 2**(e + 53 - t), have the spacing of the t-digit numbers from 2**e to
-    2**(e + 1), and the machine rounds ties to even. So adding C, with the sign of x, and subtracting it again rounds x.
+    The float64 values from this power C to 2C have the spacing of the t-digit numbers from 2**e to 2**(e + 1), and the
+    machine rounds ties to even. So adding C, with the sign of x, and subtracting it again rounds x. If x is beyond
+    every range, C does not matter.
     """
-    u = bits(x)
-    shift = (np.int64(53) - fmt.precision) << 52
-    # Below the smallest normal number the spacing stays the same. If x is beyond every range, C does not matter.
-    large, least = from_bits((u & _EXPONENT) + shift), fmt.gradual * from_bits(_ONE_BITS + shift)
-    large = from_bits(bits(large if large > least else least) | (u & _SIGN))
-    y = (x + large) - large
+    scale = from_bits(bits(x) & _EXPONENT)
+    scale = scale if scale > fmt.gradual else fmt.gradual
+    return scale * from_bits(((np.int64(1023 + 53) - fmt.precision) << 52) | fraction)
+
+
+@inner(forceinline=True)
+def _nearest_even(fmt: Any, x: Any) -> Any:
+    """Round a float64 of any size to the spacing of a format of at most 51 bits: 1.5 C serves for either sign."""
+    c = _power(fmt, x, _HALF)
+    return (x + c) - c
+
+
+@inner(forceinline=True)
+def _nearest_even_of_52(fmt: Any, x: Any) -> Any:
+    c = from_bits(bits(_power(fmt, x, np.int64(0))) | (bits(x) & _SIGN))
+    return (x + c) - c
+
+
+@inner(forceinline=True)
+def _within(fmt: Any, y: Any, exact_zero: Any) -> Any:
+    """Apply the limits to a rounded number."""
     if fmt.least > 0.0:
-        y = y if (abs(y) >= fmt.least) | (x == 0.0) else fmt.below
+        y = y if (abs(y) >= fmt.least) | (exact_zero & (y == 0.0)) else fmt.below
     y = fmt.over if y > fmt.largest else y
-    y = fmt.under if y < fmt.lowest else y
-    return y + (x - x)  # NaN for infinities
+    return fmt.under if y < fmt.lowest else y
+
+
+@inner(forceinline=True)
+def _round_even(fmt: Any, x: Any) -> Any:
+    return _within(fmt, _nearest_even(fmt, x), x == 0.0) + (x - x)  # NaN for infinities
+
+
+@inner(forceinline=True)
+def _round_even_of_52(fmt: Any, x: Any) -> Any:
+    return _within(fmt, _nearest_even_of_52(fmt, x), x == 0.0) + (x - x)
+
+
+# A result of two numbers of at most 25 bits may be rounded to 53 bits first. If it is not a tie of the format, also of
+# one whose last digits gradual underflow takes, it differs from each by more than 2**-52 of its size.
+
+
+@inner(forceinline=True)
+def _free(fmt: Any, y: Any, exact_zero: Any) -> Any:
+    return y
+
+
+def _short(within: Any) -> dict[str, Any]:
+    @inner(forceinline=True)
+    def add(fmt: Any, a: Any, b: Any) -> Any:
+        return within(fmt, _nearest_even(fmt, a + b), True)
+
+    @inner(forceinline=True)
+    def subtract(fmt: Any, a: Any, b: Any) -> Any:
+        return within(fmt, _nearest_even(fmt, a - b), True)
+
+    @inner(forceinline=True)
+    def multiply(fmt: Any, a: Any, b: Any) -> Any:
+        return within(fmt, _nearest_even(fmt, a * b), (a == 0.0) | (b == 0.0))
+
+    @inner(error_model="numpy", forceinline=True)
+    def quotient(fmt: Any, a: Any, b: Any) -> Any:
+        return within(fmt, _nearest_even(fmt, a / b), a == 0.0)
+
+    @inner(forceinline=True)
+    def root(fmt: Any, a: Any) -> Any:
+        return within(fmt, _nearest_even(fmt, math.sqrt(a)), a == 0.0)
+
+    return {
+        "add": add,
+        "subtract": subtract,
+        "multiply": multiply,
+        "quotient": quotient,
+        "root": root,
+        "round_": _round_even,
+    }
 
 
 @inner(forceinline=True)
@@ -227,22 +303,25 @@ def _machine(rounded: Any) -> dict[str, Any]:
         return rounded(a * b)
 
     @inner(error_model="numpy", forceinline=True)
-    def divide(fmt: Any, a: Any, b: Any) -> Any:
-        if b == 0.0:
-            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+    def quotient(fmt: Any, a: Any, b: Any) -> Any:
         return rounded(a / b)
 
     @inner(forceinline=True)
-    def sqrt(fmt: Any, a: Any) -> Any:
-        if a < 0.0:
-            raise ValueError("got the square root of a negative number; needed x >= 0")
+    def root(fmt: Any, a: Any) -> Any:
         return rounded(math.sqrt(a))
 
     @inner(forceinline=True)
     def round_(fmt: Any, x: Any) -> Any:
         return rounded(x)
 
-    return {"add": add, "subtract": subtract, "multiply": multiply, "divide": divide, "sqrt": sqrt, "round_": round_}
+    return {
+        "add": add,
+        "subtract": subtract,
+        "multiply": multiply,
+        "quotient": quotient,
+        "root": root,
+        "round_": round_,
+    }
 
 
 @inner(forceinline=True)
@@ -260,5 +339,25 @@ def _fused_double(fmt: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 # Sums, products, quotients and roots of 24-bit numbers may be rounded to 53 bits first, which never creates a tie.
-SINGLE = {**_machine(_single), "fused": _fused_single}
-DOUBLE = {**_machine(_double), "fused": _fused_double}
+MACHINE = {
+    Hardware32: {**_machine(_single), "fused": _fused_single},
+    Hardware64: {**_machine(_double), "fused": _fused_double},
+}
+
+
+@inner(forceinline=True)
+def _as_computed(x: Any) -> Any:
+    return x + np.float32(0.0)  # no negative zero
+
+
+@inner(forceinline=True)
+def _to_single(fmt: Any, x: Any) -> Any:
+    return np.float32(x) + np.float32(0.0)
+
+
+# Results of which none leaves the range, or whose range is checked at the end: infinities and NaN stay what they are.
+FREE = {
+    ShortEven: _short(_free),
+    Hardware32: {**_machine(_as_computed), "round_": _to_single},
+    Hardware64: _machine(_as_computed),
+}

@@ -31,22 +31,25 @@ from gpbnb.arithmetic.kernels.compiling import inner
 from gpbnb.arithmetic.kernels.tags import (
     FLOATS,
     PAIRS,
+    Binary,
     Blocked,
     Decimal,
     Double,
     DoubleDouble,
+    Free,
     Fused,
     Hardware32,
-    Hardware64,
+    Hexadecimal,
     Limited,
     LimitedDecimal,
     Mixed,
+    Separate,
     ShortDecimal,
+    ShortEven,
 )
 
 _INLINE = {"forceinline": True, "no_cfunc_wrapper": True}
 _MODULES = {Decimal: decimal, ShortDecimal: shortdecimal, LimitedDecimal: decimal, DoubleDouble: doubledouble}
-_MACHINE = {Hardware32: processor.SINGLE, Hardware64: processor.DOUBLE}
 
 _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**1023; scale the numbers, or use base 10"
 
@@ -54,6 +57,12 @@ _BEYOND = "got a result beyond the range of float64; needed 2**-960 <= |x| < 2**
 def _tag(fmt: Any) -> Any:
     """The class of a tag, from its numba type."""
     return getattr(fmt, "instance_class", None)
+
+
+def _free_machine(fmt: Any) -> Any:
+    """The machine's arithmetic that a tag leaves unchecked, or None."""
+    tag = _tag(fmt.types[0]) if _tag(fmt) is Free else None
+    return tag if tag in processor.MACHINE else None
 
 
 def _fuses(fmt: Any) -> bool:
@@ -86,6 +95,16 @@ def multiply(fmt: Any, a: Any, b: Any) -> Any:
 def divide(fmt: Any, a: Any, b: Any) -> Any:
     """fl(a / b); raises ZeroDivisionError for b = 0, except in ``Double``."""
     raise _only_compiled("divide")
+
+
+def quotient(fmt: Any, a: Any, b: Any) -> Any:
+    """fl(a / b), where the caller has made sure that b is not zero: without a branch, so that loops are vectorized."""
+    raise _only_compiled("quotient")
+
+
+def root(fmt: Any, a: Any) -> Any:
+    """fl(sqrt(a)), where the caller has made sure that a is not negative."""
+    raise _only_compiled("root")
 
 
 def sqrt(fmt: Any, a: Any) -> Any:
@@ -218,22 +237,29 @@ _DOUBLE = {
     "add": _double_add,
     "subtract": _double_subtract,
     "multiply": _double_multiply,
-    "divide": _double_divide,
-    "sqrt": _double_sqrt,
+    "quotient": _double_divide,
+    "root": _double_sqrt,
     "round_": _double_round,
 }
 
 
 def _implementation(fmt: Any, name: str) -> Any:
-    tag = _tag(fmt)
-    if tag in binary.OPERATIONS:
-        return binary.OPERATIONS[tag].get(name)
-    if tag in _MACHINE:
-        return _MACHINE[tag][name]
+    tag, free = _tag(fmt), _tag(fmt) is Free
+    if free:
+        fmt = fmt.types[0]
+        tag = _tag(fmt)
+    if tag in (Binary, Hexadecimal):
+        return binary.OPERATIONS[tag, free].get(name)
+    if free:
+        return processor.FREE[_tag(fmt.types[1]) if tag is Limited else tag].get(name)
+    if tag in processor.MACHINE:
+        return processor.MACHINE[tag].get(name)
     if tag is Limited:
         digits, mode = (kind.instance_class for kind in fmt.types[:2])
         return processor.operations(digits, mode)[name]
-    return _DOUBLE.get(name) if tag is Double else getattr(_MODULES.get(tag), name, None)
+    if tag is Double:
+        return _DOUBLE.get(name)
+    return getattr(_MODULES.get(tag), {"quotient": "divide", "root": "sqrt"}.get(name, name), None)
 
 
 def fused(fmt: Any, a: Any, b: Any, c: Any) -> Any:
@@ -253,6 +279,8 @@ def _overload_two(stub: Callable[..., Any]) -> None:
         if _tag(fmt) is Mixed:
             return lambda fmt, a, b: stub(fmt.stored, a, b)
         function = _implementation(fmt, stub.__name__)
+        if _tag(fmt) is Free:
+            return lambda fmt, a, b: function(fmt.tag, a, b)
         return None if function is None else lambda fmt, a, b: function(fmt, a, b)
 
 
@@ -262,13 +290,35 @@ def _overload_one(stub: Callable[..., Any]) -> None:
         if _tag(fmt) is Mixed:
             return lambda fmt, x: stub(fmt.stored, x)
         function = _implementation(fmt, stub.__name__)
+        if _tag(fmt) is Free:
+            return lambda fmt, x: function(fmt.tag, x)
         return None if function is None else lambda fmt, x: function(fmt, x)
 
 
-for _operation in (add, subtract, multiply, divide):
+for _operation in (add, subtract, multiply, quotient):
     _overload_two(_operation)
-_overload_one(sqrt)
+_overload_one(root)
 _overload_one(round_)
+
+
+@overload(divide, strict=False, jit_options=_INLINE)
+def _divide(fmt: Any, a: Any, b: Any) -> Any:
+    def tested(fmt: Any, a: Any, b: Any) -> Any:
+        if b == 0.0:
+            raise ZeroDivisionError("got a division by zero; needed a divisor other than zero")
+        return quotient(fmt, a, b)
+
+    return tested if _tag(fmt) in FLOATS and _tag(fmt) is not Double else lambda fmt, a, b: quotient(fmt, a, b)
+
+
+@overload(sqrt, strict=False, jit_options=_INLINE)
+def _sqrt(fmt: Any, a: Any) -> Any:
+    def tested(fmt: Any, a: Any) -> Any:
+        if a < 0.0:
+            raise ValueError("got the square root of a negative number; needed x >= 0")
+        return root(fmt, a)
+
+    return tested if _tag(fmt) in FLOATS and _tag(fmt) is not Double else lambda fmt, a: root(fmt, a)
 
 
 @overload(negative, strict=False, jit_options=_INLINE)
@@ -279,7 +329,7 @@ def _negative(fmt: Any, a: Any) -> Any:
         return lambda fmt, a: (0.0 - a[0], 0.0 - a[1])
     if _tag(fmt) is Double:
         return lambda fmt, a: -a
-    return lambda fmt, a: _beyond_largest(fmt, 0.0 - a)
+    return lambda fmt, a: _beyond_largest(fmt, zero(fmt) - a)
 
 
 @overload(_beyond_largest, strict=False, jit_options=_INLINE)
@@ -337,7 +387,7 @@ def _zero(fmt: Any) -> Any:
         return lambda fmt: (np.int64(0), np.int64(0))
     if _tag(fmt) is DoubleDouble:
         return lambda fmt: (0.0, 0.0)
-    return lambda fmt: 0.0
+    return (lambda fmt: np.float32(0.0)) if _free_machine(fmt) is Hardware32 else lambda fmt: 0.0
 
 
 @overload(one, strict=False, jit_options=_INLINE)
@@ -349,6 +399,8 @@ def _one(fmt: Any) -> Any:
 def _overloaded_multiply_add(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     if _fuses(fmt):
         return lambda fmt, a, b, c: fused(fmt, a, b, c)
+    if _free_machine(fmt) is not None:
+        return lambda fmt, a, b, c: c + a * b  # no negative zero, as c is none
     if _tag(fmt) is ShortDecimal:
         return lambda fmt, a, b, c: shortdecimal.multiply_add(fmt, a, b, c)
     if _tag(fmt) is Mixed:
@@ -423,8 +475,8 @@ def _lost(fmt: Any, x: Any) -> Any:
         return lambda fmt, x: False
     if _tag(fmt) is DoubleDouble:
         return lambda fmt, x: x[0] != x[0]
-    if _tag(fmt) is Double:
-        return lambda fmt, x: not abs(x) <= np.inf or abs(x) == np.inf
+    if _tag(fmt) is Double or _free_machine(fmt) is not None:
+        return lambda fmt, x: not abs(x) < np.inf
     return lambda fmt, x: x != x
 
 
@@ -436,6 +488,36 @@ def _store(fmt: Any, array: Any, index: Any, x: Any) -> Any:
         put(fmt, array, index, x)
 
     return checked
+
+
+def freed(fmt: Any) -> Any:
+    """The tag without range checks, or the same tag if there is none."""
+    raise _only_compiled("freed")
+
+
+def can_be_freed(fmt: Any) -> bool:
+    """Whether a tag, given as its numba type, has loops without range checks on the same arrays."""
+    tag = _tag(fmt)
+    if tag is Limited:
+        return _tag(fmt.types[1]) is ShortEven and _tag(fmt.types[2]) is Separate
+    return tag in (Binary, Hexadecimal)
+
+
+@overload(freed, strict=False, jit_options=_INLINE)
+def _freed(fmt: Any) -> Any:
+    return (lambda fmt: Free(fmt)) if can_be_freed(fmt) else (lambda fmt: fmt)
+
+
+def repeats(fmt: Any) -> Any:
+    """Whether the same operation always has the same result: not so with random roundings."""
+    raise _only_compiled("repeats")
+
+
+@overload(repeats, strict=False, jit_options=_INLINE)
+def _repeats(fmt: Any) -> Any:
+    if "Random" in repr(fmt):
+        return lambda fmt: False
+    return lambda fmt: True
 
 
 # -- sums of products --------------------------------------------------------------------------------
@@ -460,6 +542,11 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
     The loops take one row of c at a time and add one product to each of its entries; within an entry, the order is that
     of :func:`dot`.
     """
+    if b.shape[1] == 1:
+        for i in range(a.shape[0]):
+            put(fmt, c, (i, 0), dot(fmt, a[i], b[:, 0]))
+        check(fmt, c)
+        return
     for i in range(a.shape[0]):
         if a.shape[1] == 0:
             for j in range(b.shape[1]):
@@ -479,6 +566,12 @@ def matmul(fmt: Any, a: Any, b: Any, c: Any) -> None:
 def check(fmt: Any, c: Any) -> None:
     """Settle the matrix c; raises OverflowError if an entry has left the range of its backend."""
     settle(fmt, c)
+    guard(fmt, c)
+
+
+@inner
+def guard(fmt: Any, c: Any) -> None:
+    """Raise OverflowError if an entry of the matrix c has left the range of its backend."""
     gone = False
     for i in range(c.shape[0]):
         for j in range(c.shape[1]):

@@ -5,9 +5,12 @@ Importing this module is fast, because it needs no compiled code.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 LARGEST_SHORT = 8  # precision of ShortDecimal
+SAFE_TWICE = 25  # bits; results rounded to float64 first and then to nearest with this precision are correct
+LEAST, LIMIT = 2.0**-960, 2.0**1023  # magnitudes of Binary and Hexadecimal, from LEAST to below LIMIT
 # Codes of rounding modes. AWAY and EVEN round to nearest, with ties away from zero or to the even last digit. ZERO, UP
 # and DOWN round toward zero, plus or minus infinity. ODD rounds inexact results to neighbours with an odd last digit.
 AWAY, EVEN, ZERO, UP, DOWN, ODD = range(6)
@@ -58,7 +61,11 @@ class Sixteen(NamedTuple):
 
 
 class Even(NamedTuple):
-    """To nearest, ties to the even last digit: the mode of most processors, with the fastest loops."""
+    """To nearest, ties to the even last digit."""
+
+
+class ShortEven(NamedTuple):
+    """The same in base 2 with at most 25 digits, the mode of most processors, with the fastest loops."""
 
 
 class Mode(NamedTuple):
@@ -96,7 +103,7 @@ class Limited(NamedTuple):
     """Bases 2 and 16 with any rounding mode and a limited range; a number is a float64, an array is float64 (...)."""
 
     digits: Any  # Two or Sixteen
-    mode: Any  # Even, Mode or Random
+    mode: Any  # Even, ShortEven, Mode or Random
     sums: Any  # Separate, Fused, Pairwise or Blocked
     precision: int
     gradual: float  # smaller numbers keep the spacing just above it; 0 without subnormal numbers
@@ -116,11 +123,29 @@ class Hardware64(NamedTuple):
     """IEEE binary64 with its range and ties to even, computed by the machine."""
 
 
+class Free(NamedTuple):
+    """Another arithmetic, for loops whose results do not leave its range, or are checked when the loop has ended.
+
+    Numbers of ``Hardware32`` are then float32, and so are its arrays.
+    """
+
+    tag: Any  # Binary, Hexadecimal, Limited with ShortEven, Hardware32 or Hardware64
+
+
 class Mixed(NamedTuple):
     """Numbers in one arithmetic whose sums of products are accumulated in another; both are single float64."""
 
     stored: Any
     sums: Any
+
+
+class Blocks(NamedTuple):
+    """An arithmetic for each block of a filter's step; loops take the arithmetic of a block from it."""
+
+    state: Any
+    gain: Any
+    covariance: Any
+    innovation: Any
 
 
 class LimitedDecimal(NamedTuple):
@@ -133,7 +158,18 @@ class LimitedDecimal(NamedTuple):
     flush: bool  # whether smaller numbers become zero; otherwise they are out of range
 
 
-FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Mixed)  # numbers are single float64
+def extents_of_sums(n: int, base: int, precision: int, gradual: float, low: float, high: float) -> tuple[float, float]:
+    """Smallest and largest size of sums of n products other than zero, if those of the products are `low` and `high`.
+
+    A sum grows at most by this factor when it is rounded, and no longer when a product is less than half a unit of its
+    last digit. Nonzero sums are multiples of the last digit of the smallest product.
+    """
+    unit = float(base) ** (1 - precision)
+    growth = min(n * math.exp(min((n + 1) * unit, 700.0)), base**2 * (base / unit))
+    return low * unit / (4 * base), high * growth + n * gradual
+
+
+FLOATS = (Binary, Hexadecimal, Double, Limited, Hardware32, Hardware64, Free, Mixed)  # numbers are single float64
 PAIRS = (Decimal, ShortDecimal, LimitedDecimal)
 
 Tag = (
@@ -147,5 +183,7 @@ Tag = (
     | Hardware32
     | Hardware64
     | LimitedDecimal
+    | Free
     | Mixed
+    | Blocks
 )

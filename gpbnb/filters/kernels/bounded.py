@@ -129,7 +129,7 @@ def residuals(exact_model: Any, exact_z: Any, first: int, x: Any, P: Any, repeat
     innovation, q, T = out
     n, m = x.shape[1], exact_z.shape[1]
     y, hx = np.empty((m, 1, 2)), np.empty((n, 1, 2))
-    Phi, H = exact_model[0], exact_model[2]
+    Phi, H = exact_model.Phi, exact_model.H
     for step in range(exact_z.shape[0]):
         k = first + step
         product(exactly, Phi[k % Phi.shape[0]], x[step], hx)

@@ -9,17 +9,16 @@ from gpbnb.arithmetic.kernels.matrices import copy, difference, matrix_sum, prod
 
 
 @inner
-def compensated_update(
-    fmt: Any, increment: Any, h: Any, K: Any, z: Any, x: Any, carried: Any, d: Any, u: Any, y: Any, g: Any
-) -> None:
+def compensated_update(fmt: Any, increment: Any, h: Any, K: Any, z: Any, x: Any, carried: Any, work: Any) -> None:
     """Add (Phi - I) x + K (z - H Phi x) to x, and carry the rounding error of the addition to the next step.
 
     Parameters
     ----------
     increment : Phi - I, rounded.
     carried : rounding error of the estimate, from the previous step and for the next.
-    d, u, y, g : workspaces with the shapes of x, x, z and z.
+    work : the workspace of the step.
     """
+    d, u, y, g = work.v, work.u, work.y, work.g
     product(fmt, increment, x, d)
     matrix_sum(fmt, x, d, u)
     product(fmt, h, u, y)

@@ -34,6 +34,31 @@ class Contraction(NamedTuple):
     gain: NDArray[np.float64]
 
 
+class Repeated(NamedTuple):
+    """One exact step from a run's values, evaluated in double-double and rounded to float64, and what the run differs.
+
+    The innovation covariance S° and the gain K° belong to the run's covariance before the step.
+    """
+
+    #: (n, m) and (m, m).
+    K: NDArray[np.float64]
+    S: NDArray[np.float64]
+    #: (m,), of the run's estimate.
+    innovation: NDArray[np.float64]
+    #: (n,) and (n, n), the residuals, which are state and covariance of the run minus those of the exact step.
+    q: NDArray[np.float64]
+    T: NDArray[np.float64]
+
+
+class EvaluationErrors(NamedTuple):
+    """Bounds of the errors of the evaluation of one step, entry by entry."""
+
+    q: NDArray[np.float64]
+    T: NDArray[np.float64]
+    gain: NDArray[np.float64]
+    innovation: NDArray[np.float64]
+
+
 @compiled
 def contraction_start(P: Any, de: Any, dE: Any) -> Any:
     """Start the bound at the initial state and covariance.
@@ -58,22 +83,7 @@ def contraction_start(P: Any, de: Any, dE: Any) -> Any:
 
 
 @compiled
-def contraction_step(
-    before: Any,
-    Phi: Any,
-    H: Any,
-    Q: Any,
-    R: Any,
-    K: Any,
-    S: Any,
-    innovation: Any,
-    q: Any,
-    T: Any,
-    dq: Any,
-    dT: Any,
-    dK: Any,
-    dinnovation: Any,
-) -> Any:
+def contraction_step(before: Any, model: Any, repeated: Any, off: Any) -> Any:
     r"""Propagate the bound through one step.
 
     .. math:: \zeta_k = \|T_k\|_k + \frac{\alpha^2\zeta}{1-g\zeta}, \qquad
@@ -85,16 +95,17 @@ def contraction_step(
     Parameters
     ----------
     before : Contraction, the bound after the previous step.
-    Phi (n, n), H (m, n), Q (n, n), R (m, m) : the model, nearest float64.
-    K (n, m), S (m, m), innovation (m,) : gain K°, innovation covariance S° and innovation ν̂ of the exact step from
-        the program's values, evaluated in double-double and rounded to float64.
-    q (n,), T (n, n) : residuals of the step, program minus exact step, subtracted in double-double.
-    dq, dT, dK, dinnovation : componentwise bounds on the errors of that evaluation, from :func:`evaluation_errors`.
+    model : StepModel of this step, nearest float64.
+    repeated : Repeated, the exact step from the program's values, and its residuals.
+    off : EvaluationErrors of the repeated step, from :func:`evaluation_errors`.
 
     Returns
     -------
     bound : Contraction.
     """
+    Phi, H, Q, R = model
+    K, S, innovation, q, T = repeated
+    dq, dT, dK, dinnovation = off
     n, m = K.shape
     L, zeta = before.L, before.zeta
     many = _many(n, m)
@@ -135,7 +146,7 @@ def contraction_step(
 
 
 @compiled
-def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
+def evaluation_errors(model: Any, x: Any, P: Any, z: Any, K: Any, S: Any, unit: float) -> Any:
     r"""Bound the errors of the evaluation of one step, componentwise.
 
     The step is :math:`x = \Phi x + K(z - H(\Phi x))`, :math:`P_p = \Phi P\Phi^T + Q`, :math:`S = HP_pH^T + R`,
@@ -145,14 +156,15 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
 
     Parameters
     ----------
-    Phi, H, Q, R : the model. x (n,), P (n, n) : state and covariance before the step. z (m,) : measurement.
+    model : StepModel. x (n,), P (n, n) : state and covariance before the step. z (m,) : measurement.
     K (n, m), S (m, m) : gain and innovation covariance of this step.
     unit : unit roundoff of one operation of the evaluation, 2**-102 for :mod:`gpbnb.arithmetic.kernels.doubledouble`.
 
     Returns
     -------
-    dq (n,), dT (n, n), dK (n, m), dinnovation (m,).
+    off : EvaluationErrors.
     """
+    Phi, H, Q, R = model
     n, m = K.shape
     many = (16 * (n + m) + 64) * unit * (1 + _many(n, m))
     aPhi, aH, aK = np.abs(Phi), np.abs(H), np.abs(K)
@@ -172,7 +184,7 @@ def evaluation_errors(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any, 
     ahead = _times(aPhi, np.abs(x).reshape(-1, 1))
     seen = np.abs(z).reshape(-1, 1) + _times(aH, ahead)
     dq = many * (ahead + _times(aK, seen)) + _times(dK, seen)
-    return dq[:, 0], dT, dK, many * seen[:, 0]
+    return EvaluationErrors(dq[:, 0], dT, dK, many * seen[:, 0])
 
 
 @compiled

@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from numba.extending import overload
 
-from gpbnb.arithmetic.kernels.binary import SAFE_TWICE
 from gpbnb.arithmetic.kernels.bits import bits, from_bits
 from gpbnb.arithmetic.kernels.compiling import inner
-from gpbnb.arithmetic.kernels.matrices import product_in_order
+from gpbnb.arithmetic.kernels.matrices import MANY, product_in_order, product_in_planes, stays_within
 from gpbnb.arithmetic.kernels.scalar import (
     add,
     check,
     compare,
     first_product,
+    freed,
     load,
     multiply_add,
     one,
@@ -27,7 +27,7 @@ from gpbnb.arithmetic.kernels.scalar import (
     store,
     zero,
 )
-from gpbnb.arithmetic.kernels.tags import Binary
+from gpbnb.arithmetic.kernels.tags import SAFE_TWICE, Binary
 
 _MAGNITUDE = np.int64(2**63 - 1)
 _LEAST, _LARGEST = np.int64((1023 - 400) << 52), np.int64((1023 + 400) << 52)
@@ -74,11 +74,8 @@ def _overloaded_short_product(fmt: Any, a: Any, b: Any, c: Any) -> Any:
     return of_binary if getattr(fmt, "instance_class", None) is Binary else lambda fmt, a, b, c: False
 
 
-@inner
-def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
-    if product_in_order(fmt, a, b, c):
-        return
+@inner(forceinline=True)
+def _with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         fresh = True
         for k in range(a.shape[1]):
@@ -98,18 +95,24 @@ def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
         if fresh:
             for j in range(b.shape[1]):
                 put(fmt, c, (i, j), zero(fmt))
-    check(fmt, c)
 
 
 @inner
-def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
-    """Like :func:`product_with_units`, with the same digits, but one column of a at a time.
-
-    A column adds one product to each row of c; the processor computes several rows at once, because none waits for
-    another.
-    """
-    if _short_product(fmt, a, b, c) or product_in_order(fmt, a, b, c):
+def product_with_units(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """c = a b, each entry summed from left to right over the nonzero entries of a; c must be neither a nor b."""
+    if product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
         return
+    if a.shape[0] * a.shape[1] * b.shape[1] >= MANY and _short_product(fmt, a, b, c):
+        return
+    if stays_within(fmt, a, b, MANY):
+        _with_units(freed(fmt), a, b, c)
+    else:
+        _with_units(fmt, a, b, c)
+        check(fmt, c)
+
+
+@inner(forceinline=True)
+def _by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
     for i in range(a.shape[0]):
         for j in range(b.shape[1]):
             put(fmt, c, (i, j), zero(fmt))
@@ -119,7 +122,22 @@ def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
             if compare(fmt, factor, zero(fmt)) != 0:
                 for j in range(b.shape[1]):
                     put(fmt, c, (i, j), multiply_add(fmt, factor, load(fmt, b, (k, j)), load(fmt, c, (i, j))))
-    check(fmt, c)
+
+
+@inner
+def product_by_columns(fmt: Any, a: Any, b: Any, c: Any) -> None:
+    """Like :func:`product_with_units`, with the same digits, but one column of a at a time.
+
+    A column adds one product to each row of c; the processor computes several rows at once, because none waits for
+    another.
+    """
+    if _short_product(fmt, a, b, c) or product_in_order(fmt, a, b, c) or product_in_planes(fmt, a, b, c):
+        return
+    if stays_within(fmt, a, b, MANY):
+        _by_columns(freed(fmt), a, b, c)
+    else:
+        _by_columns(fmt, a, b, c)
+        check(fmt, c)
 
 
 @inner

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gpbnb.arithmetic.kernels.bits import fma
 from gpbnb.arithmetic.kernels.compiling import compiled
 
 _POWERS = np.array([10.0**k for k in range(23)])  # exact
@@ -22,6 +23,23 @@ def pairs_as_floats(pairs: Any, out: Any) -> None:
                     out[k, i, j] = m / _POWERS[-e]
                 else:
                     out[k, i, j] = m * _POWERS[e] if 0 < e <= 22 else m * 10.0**e
+
+
+@compiled
+def pairs_as_double_doubles(m: Any, e: Any, out: Any) -> Any:
+    """Convert decimal numbers to the nearest double-doubles, (k, 2); returns the index of a longer one, or k."""
+    for k in range(len(m)):
+        x = np.float64(m[k])
+        if abs(m[k]) >= 2**53 or abs(e[k]) > 22:
+            return k
+        power = _POWERS[abs(e[k])]  # exact, and so is the remainder of a product or of a quotient
+        if e[k] < 0:
+            out[k, 0] = x / power
+            out[k, 1] = fma(-out[k, 0], power, x) / power
+        else:
+            out[k, 0] = x * power
+            out[k, 1] = fma(x, power, -out[k, 0])
+    return len(m)
 
 
 @compiled

@@ -5,9 +5,10 @@ Each function works in every arithmetic of :mod:`gpbnb.arithmetic.kernels.scalar
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gpbnb.arithmetic.kernels.compiling import compiled, inner
 from gpbnb.arithmetic.kernels.matrices import (
@@ -30,13 +31,26 @@ from gpbnb.arithmetic.kernels.scalar import (
     negative,
     one,
     put,
+    repeats,
     store,
     subtract,
     zero,
 )
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kernels.blocks import (
+    number_taken,
+    of_covariance,
+    of_gain,
+    of_innovation,
+    of_state,
+    taken,
+    taken_arrays,
+)
 from gpbnb.filters.kernels.compensated import compensated_update
 from gpbnb.filters.kernels.products import add_transposed, product_by_columns, product_with_units
+
+LARGEST_KEPT = 2**18
+"""Largest number of entries of the covariances that a step keeps of a cycle that they have reached."""
 
 _HUNG, _HUNG_SECOND_GAIN, _JOSEPH = (int(each) for each in (Form.HUNG, Form.HUNG_SECOND_GAIN, Form.JOSEPH))
 
@@ -54,6 +68,73 @@ QUANTITIES = (
     "the estimate",
     "the update of factors and estimate",
 )
+
+
+class StepArrays(NamedTuple):
+    """What a step of a filter uses, each with its own cycle of members, as the compiled loops expect it."""
+
+    #: (p, n, n) and its transposed members.
+    Phi: NDArray[Any]
+    PhiT: NDArray[Any]
+    #: (p, m, n) and its transposed members.
+    H: NDArray[Any]
+    HT: NDArray[Any]
+    #: (p, n, n) and (p, m, m).
+    Q: NDArray[Any]
+    R: NDArray[Any]
+    #: (p, m, m), inverses of R, for Hung's form with the second gain.
+    RI: NDArray[Any]
+    #: (n, n).
+    identity: NDArray[Any]
+    #: (p, n, n), Phi - I, for compensated summation of the estimate; otherwise (0, n, n).
+    increment: NDArray[Any]
+    #: (n, 1), rounding error of the estimate, from the previous step and for the next.
+    carried: NDArray[Any]
+    #: (1,), which of :data:`QUANTITIES` is being computed.
+    place: NDArray[np.int64]
+
+
+class FactorArrays(NamedTuple):
+    """What a step of the UD form uses."""
+
+    Phi: NDArray[Any]
+    #: (p, m, n) and its transposed members.
+    H: NDArray[Any]
+    HT: NDArray[Any]
+    #: factors of Q and R, with D on the diagonal.
+    UQ: NDArray[Any]
+    UR: NDArray[Any]
+    #: (1,), which of :data:`QUANTITIES` is being computed.
+    place: NDArray[np.int64]
+
+
+class Workspace(NamedTuple):
+    """Arrays that a step overwrites; those of one line have the same shape."""
+
+    V: NDArray[Any]
+    T: NDArray[Any]
+    W: NDArray[Any]
+    F: NDArray[Any]
+    WT: NDArray[Any]
+    #: the gain, (n, m), and others.
+    K: NDArray[Any]
+    PHt: NDArray[Any]
+    B: NDArray[Any]
+    #: (m, n).
+    KT: NDArray[Any]
+    HD: NDArray[Any]
+    #: (m, m), the innovation covariance and others.
+    S: NDArray[Any]
+    SI: NDArray[Any]
+    pivots: NDArray[Any]
+    #: as a measurement.
+    y: NDArray[Any]
+    g: NDArray[Any]
+    #: as an estimate.
+    u: NDArray[Any]
+    v: NDArray[Any]
+
+
 _PREDICTED, _OF_INNOVATION, _INVERSE, _GAIN, _COVARIANCE, _ESTIMATE, _FACTORS = range(len(QUANTITIES))
 
 
@@ -107,47 +188,55 @@ def _observe_ud(fmt: Any, i: int, h: Any, z: Any, r: Any, x: Any, U: Any, K: Any
 
     Returns 1 if all variances are positive, -1 if one is not, and 0 if a division by zero ended the update.
     """
+    state, gain, covariance, innovation = of_state(fmt), of_gain(fmt), of_covariance(fmt), of_innovation(fmt)
     n = x.shape[0]
     answer = 1
     y = z
     for j in range(n):
-        c = load(fmt, h, j)
-        if not is_zero(fmt, c):
-            y = subtract(fmt, y, multiply(fmt, c, load(fmt, x, (j, 0))))
+        c = number_taken(fmt, state, load(state, h, j))
+        if not is_zero(state, c):
+            y = subtract(state, y, multiply(state, c, load(state, x, (j, 0))))
     for j in range(n):
-        s = zero(fmt)
+        s = zero(innovation)
         for k in range(j):
-            c = load(fmt, h, k)
-            if not is_zero(fmt, c):
-                s = add(fmt, s, multiply(fmt, load(fmt, U, (k, j)), c))
-        s = add(fmt, s, load(fmt, h, j))
-        put(fmt, F, (j, 0), s)
-        store(fmt, G, (j, 0), multiply(fmt, load(fmt, U, (j, j)), s))
+            c = load(innovation, h, k)
+            if not is_zero(innovation, c):
+                u = number_taken(fmt, innovation, load(innovation, U, (k, j)))
+                s = add(innovation, s, multiply(innovation, u, c))
+        s = add(innovation, s, load(innovation, h, j))
+        put(innovation, F, (j, 0), s)
+        d = number_taken(fmt, innovation, load(innovation, U, (j, j)))
+        store(innovation, G, (j, 0), multiply(innovation, d, s))
     a = r
     for j in range(n):
-        f, g = load(fmt, F, (j, 0)), load(fmt, G, (j, 0))
+        f, g = load(innovation, F, (j, 0)), load(innovation, G, (j, 0))
         before = a
-        if not is_zero(fmt, g):
-            a = add(fmt, before, multiply(fmt, f, g))
-            sign = compare(fmt, a, zero(fmt))
+        if not is_zero(innovation, g):
+            a = add(innovation, before, multiply(innovation, f, g))
+            sign = compare(innovation, a, zero(innovation))
             if sign == 0:
                 return 0
             if sign < 0:
                 answer = -1
-            store(fmt, U, (j, j), divide(fmt, multiply(fmt, load(fmt, U, (j, j)), before), a))
-            factor = negative(fmt, divide(fmt, f, before))
+            whole, part = number_taken(fmt, covariance, a), number_taken(fmt, covariance, before)
+            d = multiply(covariance, load(covariance, U, (j, j)), part)
+            store(covariance, U, (j, j), divide(covariance, d, whole))
+            factor = negative(covariance, divide(covariance, number_taken(fmt, covariance, f), part))
             for k in range(j):
-                u, c = load(fmt, U, (k, j)), load(fmt, K, (k, i))
-                if not is_zero(fmt, c):
-                    store(fmt, U, (k, j), add(fmt, u, multiply(fmt, factor, c)))
-                store(fmt, K, (k, i), add(fmt, c, multiply(fmt, g, u)))
-        if compare(fmt, load(fmt, U, (j, j)), zero(fmt)) < 0:
+                u, c = load(covariance, U, (k, j)), load(gain, K, (k, i))
+                if not is_zero(gain, c):
+                    moved = multiply(covariance, factor, number_taken(fmt, covariance, c))
+                    store(covariance, U, (k, j), add(covariance, u, moved))
+                moved = multiply(gain, number_taken(fmt, gain, g), number_taken(fmt, gain, u))
+                store(gain, K, (k, i), add(gain, c, moved))
+        if compare(covariance, load(covariance, U, (j, j)), zero(covariance)) < 0:
             answer = -1
-        put(fmt, K, (j, i), g)
+        put(gain, K, (j, i), number_taken(fmt, gain, g))
     for j in range(n):
-        g = divide(fmt, load(fmt, K, (j, i)), a)
-        store(fmt, K, (j, i), g)
-        store(fmt, x, (j, 0), add(fmt, load(fmt, x, (j, 0)), multiply(fmt, g, y)))
+        g = divide(gain, load(gain, K, (j, i)), number_taken(fmt, gain, a))
+        store(gain, K, (j, i), g)
+        step = multiply(state, number_taken(fmt, state, g), y)
+        store(state, x, (j, 0), add(state, load(state, x, (j, 0)), step))
     return answer
 
 
@@ -195,70 +284,84 @@ def _subtract_gain(fmt: Any, identity: Any, K: Any, hT: Any, KT: Any, T: Any, F:
     difference(fmt, identity, F, W)
 
 
+@inner
+def _update_estimate(fmt: Any, model: Any, k: int, z: Any, x: Any, K: Any, work: Any, own: Any) -> None:
+    """Overwrite x with the estimate of step k + 1, whose gain is K, in the innovation form or Joseph's."""
+    phi, h, state = model.Phi[k % model.Phi.shape[0]], model.H[k % model.H.shape[0]], of_state(fmt)
+    if model.increment.shape[0] > 0:
+        compensated_update(state, model.increment[k % model.Phi.shape[0]], h, K, z, x, model.carried, work)
+    else:
+        product_with_units(state, taken(fmt, state, phi, own.Phi), x, work.u)
+        product(state, taken(fmt, state, h, own.H), work.u, work.y)
+        difference(state, z, work.y, work.g)
+        product(state, taken(fmt, state, K, own.tall), work.g, work.v)
+        matrix_sum(state, work.u, work.v, x)
+
+
 @inner(inline="always")
-def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any) -> Any:
+def _filter_step(fmt: Any, form: int, model: Any, k: int, z: Any, x: Any, P: Any, work: Any, own: Any) -> Any:
     """Take step k + 1 with the measurement z, and overwrite x and P; the gain stays in the workspace.
 
     Returns 1 if all variances and pivots are positive, -1 if one is not, and 0 if a pivot is zero; x is then invalid.
     """
-    Phi, PhiT, H, HT, Q, R, RI, identity, increment, carried, place = model
-    V, T, W, F, WT, K, PHt, B, KT, HD, S, SI, pivots, y, g, u, v = work
+    Phi, PhiT, H, HT, Q, R, RI, identity, increment, _carried, place = model
+    V, T, W, F, WT, K, PHt, B, KT, HD, S, SI, pivots, _y, _g, u, v = work
+    state, gain, covariance, innovation = of_state(fmt), of_gain(fmt), of_covariance(fmt), of_innovation(fmt)
     phi, h, r = Phi[k % Phi.shape[0]], H[k % H.shape[0]], R[k % R.shape[0]]
     phiT, hT = PhiT[k % Phi.shape[0]], HT[k % H.shape[0]]
     # Products whose right factor is sparse are formed transposed, with the same digits.
     place[0] = _PREDICTED
-    product_with_units(fmt, phi, P, T)
-    transpose(fmt, T, F)
-    product_with_units(fmt, phi, F, W)
-    add_transposed(fmt, Q[k % Q.shape[0]], W)
-    transpose(fmt, W, V)
+    own_phi = taken(fmt, covariance, phi, own.Phi)
+    product_with_units(covariance, own_phi, P, T)
+    transpose(covariance, T, F)
+    product_with_units(covariance, own_phi, F, W)
+    add_transposed(covariance, taken(fmt, covariance, Q[k % Q.shape[0]], own.square), W)
+    transpose(covariance, W, V)
     place[0] = _OF_INNOVATION
-    product_with_units(fmt, h, W, HD)
-    transpose(fmt, HD, PHt)
-    product(fmt, h, PHt, S)
-    matrix_sum(fmt, S, r, S)
+    own_h = taken(fmt, innovation, h, own.H)
+    product_with_units(innovation, own_h, taken(fmt, innovation, W, own.square), HD)
+    transpose(innovation, HD, PHt)
+    product(innovation, own_h, PHt, S)
+    matrix_sum(innovation, S, taken(fmt, innovation, r, own.small), S)
     place[0] = _INVERSE
-    copy(fmt, S, pivots)
-    answer = inverse(fmt, pivots, SI)
+    copy(innovation, S, pivots)
+    answer = inverse(innovation, pivots, SI)
     if answer != 0:
         place[0] = _GAIN
-        transpose(fmt, SI, pivots)
-        product_with_units(fmt, pivots, HD, KT)
-        transpose(fmt, KT, K)
+        transpose(innovation, SI, pivots)
+        product_with_units(gain, taken(fmt, gain, pivots, own.small), taken(fmt, gain, HD, own.wide), KT)
+        transpose(gain, KT, K)
         place[0] = _COVARIANCE
-        _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
+        own_K, own_hT = taken(fmt, covariance, K, own.tall), taken(fmt, covariance, hT, own.HT)
+        _subtract_gain(covariance, identity, own_K, own_hT, KT, T, F, W)
         if form == _JOSEPH:
-            transpose(fmt, W, WT)
-            product(fmt, W, V, T)
-            product(fmt, T, WT, F)
-            product_by_sparse(fmt, K, r, B)
-            product(fmt, B, KT, T)
-            matrix_sum(fmt, F, T, P)
+            transpose(covariance, W, WT)
+            product(covariance, W, V, T)
+            product(covariance, T, WT, F)
+            product_by_sparse(covariance, own_K, taken(fmt, covariance, r, own.small), B)
+            product(covariance, B, KT, T)
+            matrix_sum(covariance, F, T, P)
         else:
-            product_by_columns(fmt, W, V, P)
+            product_by_columns(covariance, W, V, P)
         if form == _HUNG_SECOND_GAIN:
             place[0] = _GAIN
-            product_by_sparse(fmt, P, hT, B)
-            product(fmt, B, RI[k % R.shape[0]], K)
-            _subtract_gain(fmt, identity, K, hT, KT, T, F, W)
+            own_hT = taken(fmt, gain, hT, own.HT)
+            product_by_sparse(gain, taken(fmt, gain, P, own.square), own_hT, B)
+            product(gain, B, taken(fmt, gain, RI[k % R.shape[0]], own.small), K)
+            own_K, own_hT = taken(fmt, covariance, K, own.tall), taken(fmt, covariance, hT, own.HT)
+            _subtract_gain(covariance, identity, own_K, own_hT, KT, T, F, W)
         place[0] = _ESTIMATE
-        if increment.shape[0] > 0:
-            compensated_update(fmt, increment[k % Phi.shape[0]], h, K, z, x, carried, v, u, y, g)
+        if increment.shape[0] == 0 and form in (_HUNG, _HUNG_SECOND_GAIN):
+            transpose(covariance, W, WT)
+            product_with_units(state, taken(fmt, state, phiT, own.Phi), taken(fmt, state, WT, own.square), T)
+            transpose(state, T, F)
+            product(state, F, x, u)
+            product(state, taken(fmt, state, K, own.tall), z, v)
+            matrix_sum(state, u, v, x)
         else:
-            if form in (_HUNG, _HUNG_SECOND_GAIN):
-                transpose(fmt, W, WT)
-                product_with_units(fmt, phiT, WT, T)
-                transpose(fmt, T, F)
-                product(fmt, F, x, u)
-                product(fmt, K, z, v)
-            else:
-                product_with_units(fmt, phi, x, u)
-                product(fmt, h, u, y)
-                difference(fmt, z, y, g)
-                product(fmt, K, g, v)
-            matrix_sum(fmt, u, v, x)
+            _update_estimate(fmt, model, k, z, x, K, work, own)
         for i in range(x.shape[0]):
-            if compare(fmt, load(fmt, P, (i, i)), zero(fmt)) <= 0:
+            if compare(covariance, load(covariance, P, (i, i)), zero(covariance)) <= 0:
                 answer = -1
     return answer
 
@@ -282,6 +385,25 @@ def _record_step(fmt: Any, k: int, answer: int, x: Any, K: Any, P: Any, kept: An
     return True
 
 
+@inner
+def _least_multiple(model: Any) -> Any:
+    """Number of steps after which the matrices of a model repeat."""
+    found = 1
+    for length in (model.Phi.shape[0], model.H.shape[0], model.Q.shape[0], model.R.shape[0]):
+        found *= length // np.gcd(found, length)
+    return found
+
+
+@inner
+def _equal(a: Any, b: Any) -> Any:
+    """Whether two matrices have the same numbers."""
+    one, other = a.ravel(), b.ravel()
+    same = True
+    for i in range(one.shape[0]):
+        same &= one[i] == other[i]
+    return same
+
+
 @compiled
 def advance(
     fmt: Any, form: int, model: Any, z: Any, first: int, x: Any, P: Any, repeated: Any, kept: Any, notes: Any
@@ -300,20 +422,50 @@ def advance(
     if z.shape[0] == 0:
         return
     x0, P0, innovation = repeated
-    K, KT, S, y = np.empty_like(model[3][0]), np.empty_like(model[2][0]), np.empty_like(model[5][0]), z[:1].copy()
+    K, KT, S, y = np.empty_like(model.HT[0]), np.empty_like(model.H[0]), np.empty_like(model.R[0]), z[:1].copy()
     square = np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P), np.empty_like(P)
     tall = K, np.empty_like(K), np.empty_like(K), KT, np.empty_like(KT)
     small = S, np.empty_like(S), np.empty_like(S)
-    work = (*square, *tall, *small, y[0], np.empty_like(y[0]), np.empty_like(x), np.empty_like(x))
+    work = Workspace(*square, *tall, *small, y[0], np.empty_like(y[0]), np.empty_like(x), np.empty_like(x))
+    own, storing = taken_arrays(P, KT, K, S), of_state(fmt)
+    # Once a covariance comes back, a whole number of the model's cycles later, so do all later ones and the gains, and
+    # only the estimate is still computed. Each is compared with an earlier one, which is replaced ever more rarely.
+    cycle = _least_multiple(model)
+    seeks = x0.shape[0] == 0 and form not in (_HUNG, _HUNG_SECOND_GAIN) and repeats(fmt)
+    since, lasts, before, returned = 0, cycle, P.copy(), -1
+    gains, covariances = model.HT[:0].copy(), model.Phi[:0].copy()
     for step in range(z.shape[0]):
+        if returned >= 0 and step >= returned + gains.shape[0]:
+            at = (step - returned) % gains.shape[0]
+            model.place[0] = _ESTIMATE
+            _update_estimate(fmt, model, first + step, z[step], x, gains[at], work, own)
+            _record_step(storing, first + step, 1, x, gains[at], covariances[at], kept, notes)
+            continue
         if x0.shape[0] > 0:
-            copy(fmt, x0[step], x)
-            copy(fmt, P0[step], P)
-        answer = _filter_step(fmt, form, model, first + step, z[step], x, P, work)
+            copy(storing, x0[step], x)
+            copy(storing, P0[step], P)
+        answer = _filter_step(fmt, form, model, first + step, z[step], x, P, work, own)
         if x0.shape[0] > 0:
-            copy(fmt, S, innovation[step])
-        if not _record_step(fmt, first + step, answer, x, K, P, kept, notes):
+            copy(storing, S, innovation[step])
+        if not _record_step(storing, first + step, answer, x, K, P, kept, notes):
             return
+        if returned >= 0:
+            copy(storing, K, gains[step - returned])
+            copy(storing, P, covariances[step - returned])
+        elif seeks:
+            since += 1
+            if since % cycle == 0 and _equal(P, before):
+                returned, seeks = step + 1, since * P.size <= LARGEST_KEPT
+                if seeks:
+                    gains = np.empty((since, *K.shape), K.dtype)
+                    covariances = np.empty((since, *P.shape), P.dtype)
+                else:
+                    returned = -1
+            elif since == lasts:
+                copy(storing, P, before)
+                since, lasts = 0, lasts + cycle * (lasts // (8 * cycle) + 1)
+    if returned >= 0 and z.shape[0] > returned + gains.shape[0]:
+        copy(storing, covariances[(z.shape[0] - 1 - returned) % gains.shape[0]], P)
 
 
 @compiled
@@ -324,20 +476,25 @@ def advance_ud(fmt: Any, model: Any, z: Any, first: int, x: Any, U: Any, kept: A
     Phi, H, HT, UQ, UR, place = model
     K, HD, y, u, v = np.empty_like(HT[0]), np.empty_like(H[0]), z[:1].copy(), np.empty_like(x), np.empty_like(x)
     T, W, D, C = np.empty_like(U), np.concatenate((U, U), axis=1), np.concatenate((x, x)), np.concatenate((x, x))
+    state, covariance, innovation = of_state(fmt), of_covariance(fmt), of_innovation(fmt)
+    own = taken_arrays(U, HD, K, UR[0])
     for step in range(z.shape[0]):
         k = first + step
         place[0] = _PREDICTED
         phi = Phi[k % Phi.shape[0]]
-        answer = 1 if _predict_ud(fmt, phi, UQ[k % UQ.shape[0]], U, W, D, C, T) else -1
+        own_phi, uq = taken(fmt, covariance, phi, own.Phi), taken(fmt, covariance, UQ[k % UQ.shape[0]], own.square)
+        answer = 1 if _predict_ud(covariance, own_phi, uq, U, W, D, C, T) else -1
         place[0] = _FACTORS
-        product(fmt, phi, x, u)
-        copy(fmt, u, x)
+        product(state, taken(fmt, state, phi, own.Phi), x, u)
+        copy(state, u, x)
         ur = UR[k % UR.shape[0]]
-        decorrelate(fmt, ur, H[k % H.shape[0]], HD)
-        decorrelate(fmt, ur, z[step], y[0])
+        decorrelate(state, taken(fmt, state, ur, own.small), z[step], y[0])
+        ur = taken(fmt, innovation, ur, own.small)
+        decorrelate(innovation, ur, taken(fmt, innovation, H[k % H.shape[0]], own.H), HD)
         for i in range(HD.shape[0]):
             if answer != 0:
-                found = _observe_ud(fmt, i, HD[i], load(fmt, y[0], (i, 0)), load(fmt, ur, (i, i)), x, U, K, u, v)
+                measured, variance = load(state, y[0], (i, 0)), load(innovation, ur, (i, i))
+                found = _observe_ud(fmt, i, HD[i], measured, variance, x, U, K, u, v)
                 answer = min(answer, found) if found != 0 else 0
-        if not _record_step(fmt, k, answer, x, K, U, kept, notes):
+        if not _record_step(state, k, answer, x, K, U, kept, notes):
             return

@@ -1,0 +1,248 @@
+"""The compiled arithmetic of a format, if it has one: its tag, and the tag for sums of products."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+from typing import Any, Protocol, cast, get_args
+
+import numpy as np
+
+from gpbnb.arithmetic.kernels import tags
+from gpbnb.arithmetic.kernels.exact import SPECIAL, kernel
+from gpbnb.arithmetic.rounding import DRAW_BITS, Order, Rounding, Rules
+
+LARGEST_PRECISION = {2: 53, 10: 18, 16: 13}  # with compiled loops
+_CODES = {
+    Rounding.NEAREST: tags.AWAY,
+    Rounding.EVEN: tags.EVEN,
+    Rounding.CHOP: tags.ZERO,
+    Rounding.UP: tags.UP,
+    Rounding.DOWN: tags.DOWN,
+    Rounding.ODD: tags.ODD,
+}
+_REACH = 320  # largest binary exponent for which products, quotients and their residuals are normal float64
+_HARDWARE = {(24, -126, 127): tags.Hardware32(), (53, -1022, 1023): tags.Hardware64()}
+_UNLIMITED = 2**60  # stands for an unlimited exponent in base 10
+
+
+class Accumulator(Protocol):
+    """A format that can accumulate sums of products."""
+
+    def run_tag(self, fused: bool = False, *, order: Order = "left", block: int = 32) -> tags.Tag:
+        """Return the tag of its arithmetic for a compiled loop."""
+
+
+def tag_of(rules: Rules) -> Any:
+    """Return the tag of a format's arithmetic, or None if it has no compiled loops.
+
+    Random roundings start with the first number of the seed.
+    """
+    if rules.precision > LARGEST_PRECISION.get(rules.base, 0):
+        return None
+    if rules.limits is None and rules.rounding in Rounding.documented():
+        nearest = rules.rounding is Rounding.NEAREST
+        if rules.base == 10:
+            return (tags.ShortDecimal if rules.precision <= tags.LARGEST_SHORT else tags.Decimal)(
+                rules.precision, nearest
+            )
+        return (tags.Binary if rules.base == 2 else tags.Hexadecimal)(rules.precision, nearest)
+    return _decimal_tag(rules) if rules.base == 10 else _float_tag(rules)
+
+
+def _decimal_tag(rules: Rules) -> tags.LimitedDecimal | None:
+    """Return the tag for pairs of int64, or None if they cannot hold the digits that decide a rounding."""
+    limits, last = rules.limits, rules.precision - 1
+    if rules.rounding not in _CODES:
+        return None
+    if limits is None:
+        return tags.LimitedDecimal(_CODES[rules.rounding], rules.precision, -_UNLIMITED, _UNLIMITED, False)
+    if limits.fixed or not _ends_in_nines(rules) or limits.overflow != "raise":
+        return None
+    return tags.LimitedDecimal(
+        _CODES[rules.rounding], rules.precision, limits.emin - last, _emax(rules) - last, not limits.subnormal
+    )
+
+
+def _float_tag(rules: Rules, hardware: bool = True) -> Any:
+    """Return the tag for float64 storage, or None if float64 cannot hold the digits that decide a rounding."""
+    base, precision, rounding, limits, seed = rules
+    random = rounding is Rounding.STOCHASTIC
+    longest = min(_longest(base, rounding, True), 53 - DRAW_BITS if random else 53)
+    # A single binary digit is implicit in float64: no stored bit is even or odd.
+    hidden = (base, precision) == (2, 1) and rounding in (Rounding.EVEN, Rounding.ODD)
+    digits = tags.Two() if base == 2 else tags.Sixteen()
+    if limits is not None and limits.fixed:
+        # Numbers up to twice the largest keep its spacing, so that none is rounded back into the range.
+        precision += 1
+    mode = _mode(base, precision, rounding, seed)
+    if limits is None:
+        nan, least, largest = math.nan, 2.0**-960, 2.0**960
+        return (
+            tags.Limited(digits, mode, tags.Separate(), precision, 0.0, least, nan, -largest, largest, nan, nan)
+            if precision <= longest and not (random and base == 16) and not hidden
+            else None
+        )
+    emin, emax = limits.emin + limits.fixed, _emax(rules)
+    plain = not limits.fixed and limits.subnormal and _ends_in_nines(rules) and limits.overflow == "raise"
+    if hardware and base == 2 and rounding is Rounding.EVEN and plain and (precision, limits.emin, emax) in _HARDWARE:
+        return _HARDWARE[precision, limits.emin, emax]
+    bits = base.bit_length() - 1
+    if (
+        precision > longest
+        or hidden
+        or (precision == 1 and limits.subnormal)
+        or (random and base == 16)
+        or limits.overflow not in ("raise", "saturate")
+        or bits * (emin - precision) < -_REACH
+        or bits * (emax + 1) > _REACH
+    ):
+        return None
+    least = float(base) ** emin
+    lowest, largest = float(limits.lowest), float(limits.largest)
+    beyond = (lowest, largest) if limits.overflow == "saturate" else (math.nan, math.nan)
+    return tags.Limited(
+        digits,
+        mode,
+        tags.Separate(),
+        precision,
+        least if limits.subnormal else 0.0,
+        0.0 if limits.subnormal else least,
+        0.0,
+        lowest,
+        largest,
+        *beyond,
+    )
+
+
+def _mode(base: int, precision: int, rounding: Rounding, seed: int) -> Any:
+    if rounding is Rounding.STOCHASTIC:
+        return tags.Random(np.array([seed & (2**64 - 1), 0], np.uint64))
+    if rounding is Rounding.EVEN:
+        return tags.ShortEven() if base == 2 and precision <= tags.SAFE_TWICE else tags.Even()
+    return tags.Mode(_CODES[rounding])
+
+
+def _emax(rules: Rules) -> int:
+    """Exponent of the largest number, d.dd... * base**emax."""
+    if rules.limits is None:
+        return _UNLIMITED
+    e, _ = kernel(rules).top
+    return e + rules.precision - 1
+
+
+def _ends_in_nines(rules: Rules) -> bool:
+    """Whether all digits of the largest number are b - 1."""
+    nines = (rules.base**rules.precision - 1) * Fraction(rules.base) ** (_emax(rules) - rules.precision + 1)
+    return rules.limits is not None and rules.limits.largest == nines
+
+
+def _longest(base: int, rounding: Rounding, limited: bool) -> int:
+    """Return the largest precision with compiled loops, where nothing else prevents them."""
+    if base != 2:
+        return LARGEST_PRECISION[base]
+    if rounding is Rounding.STOCHASTIC:
+        return 53 - DRAW_BITS
+    return 52 if limited or rounding not in Rounding.documented() else LARGEST_PRECISION[2]
+
+
+def check_order(order: Order, fused: bool, block: int) -> None:
+    """Check the options for computing sums of products.
+
+    Raises
+    ------
+    ValueError : an unknown order, pairwise sums with fused multiply-add, blocks of less than one product, or `fused`
+        that is neither true nor false.
+    """
+    if order not in get_args(Order):
+        raise ValueError(f"order: got {order!r}; needed 'left', 'pairwise' or 'blocked'")
+    if fused not in (True, False):
+        raise ValueError(f"fused: got {fused!r}; needed True or False")
+    if block < 1:
+        raise ValueError(f"block: got {block}; needed at least 1")
+    if fused and order == "pairwise":
+        raise ValueError("got pairwise sums with fused multiply-add; needed one of the two; use 'left' or 'blocked'")
+
+
+def check_compiled(rules: Rules) -> None:
+    """Reject a format without compiled loops.
+
+    Raises
+    ------
+    ValueError : the format has no compiled loops; the message names the setting that prevents them, and what to set
+        instead.
+    """
+    if tag_of(rules) is not None:
+        return
+    base, precision, rounding, limits, _ = rules
+    if base not in LARGEST_PRECISION:
+        why = f"base {base}; needed one with compiled loops: {', '.join(map(str, LARGEST_PRECISION))}"
+    elif rounding is Rounding.STOCHASTIC and base != 2:
+        why = f"stochastic rounding in base {base}; needed base 2 for compiled loops"
+    elif limits is not None and limits.overflow == "wrap":
+        why = "overflow that wraps around; needed 'raise' or 'saturate' for compiled loops"
+    elif limits is not None and limits.overflow in SPECIAL:
+        why = "overflow to infinity; needed 'raise' or 'saturate' for compiled loops"
+    elif limits is not None and limits.overflow == "saturate" and base == 10:
+        why = "overflow that saturates in base 10; needed 'raise' for compiled loops"
+    elif precision > (most := _longest(base, rounding, limits is not None) - (limits is not None and limits.fixed)):
+        why = f"{_described(rules)}; needed at most {most} for compiled loops"
+    elif precision == 1:
+        why = "one digit; needed at least 2 for compiled loops"
+    elif base == 10:
+        why = "a largest number that does not end in nines; needed one that does, for compiled loops of base 10"
+    else:
+        why = (
+            f"a range down to the exponent {limits.emin if limits else None} and up to {_emax(rules)}; needed numbers, "
+            f"with all digits, between 2**-{_REACH} and 2**{_REACH} for compiled loops"
+        )
+    raise ValueError(f"got {why}")
+
+
+def _described(rules: Rules) -> str:
+    """Describe digits, base and what else limits the digits of compiled loops."""
+    text = f"{rules.precision} digits of base {rules.base}"
+    if rules.rounding not in Rounding.documented():
+        text += f", rounded {rules.rounding.value}"
+    if rules.limits is not None:
+        text += " in fixed point" if rules.limits.fixed else " with a limited range"
+    return text
+
+
+def run_tag(rules: Rules, fused: bool, order: Order = "left", block: int = 32) -> tags.Tag:
+    """Return the tag for a separate compiled loop; see :meth:`gpbnb.arithmetic.formats.FloatFormat.run_tag`."""
+    check_order(order, fused, block)
+    check_compiled(rules)
+    if not fused and order == "left":
+        return cast(tags.Tag, tag_of(rules))
+    tag = _float_tag(rules, hardware=False) if rules.base in (2, 16) else None
+    if tag is None:
+        what = "fused multiply-add" if fused else f"{order} sums"
+        raise ValueError(f"got {what} in {_described(rules)}; needed base 2 up to 52 digits, or 16 up to 13")
+    products: Any = tags.Fused() if fused else tags.Separate()
+    sums = {"left": products, "pairwise": tags.Pairwise(), "blocked": tags.Blocked(block, products)}[order]
+    return cast(tags.Limited, tag._replace(sums=sums))
+
+
+def mixed_tag(stored: tags.Tag, sums: tags.Tag) -> tags.Mixed:
+    """Return the tag for numbers in one arithmetic whose sums of products are accumulated in another.
+
+    Raises
+    ------
+    ValueError : one of the two does not use float64, or the sums have fewer digits than the numbers.
+    """
+    for tag in (stored, sums):
+        if not isinstance(tag, tags.FLOATS) or isinstance(tag, tags.Mixed):
+            raise ValueError(f"got sums kept in {sums} with numbers in {stored}; needed base 2 or 16 for both")
+    if _digits(sums) < _digits(stored):
+        raise ValueError(
+            f"got sums of {_digits(sums)} digits with numbers of {_digits(stored)}; needed at least as many digits "
+            "for sums as for numbers"
+        )
+    return tags.Mixed(stored, sums)
+
+
+def _digits(tag: tags.Tag) -> int:
+    if isinstance(tag, tags.Hardware32):
+        return 24
+    return tag.precision if isinstance(tag, tags.Binary | tags.Hexadecimal | tags.Limited) else 53

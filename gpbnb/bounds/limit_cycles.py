@@ -1,0 +1,216 @@
+r"""Limit cycles and dead bands of filters in fixed point: found by an exhaustive search, or bounded.
+
+With a constant input, a stable filter without rounding comes to rest at :math:`x^* = (I - A)^{-1}Bu`. With rounding it
+ends in a cycle of states: at rest beside :math:`x^*`, in a *dead band* in which small differences are rounded away, or
+in an oscillation. Every such cycle is nothing but rounding error, so it stays within the bound of
+:func:`gpbnb.bounds.words.bounded_rounding` around :math:`x^*`, as long as nothing overflows. This box holds finitely
+many states. If they are not too many, each is tried.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.conversion import MaybeNone
+from gpbnb.arithmetic.kernels.compiling import compiled
+from gpbnb.arithmetic.rational import exact, rationals
+from gpbnb.bounds.words import bounded_rounding
+from gpbnb.filters.program import ADD, SUBTRACT, Program, matrices
+from gpbnb.filters.system import LinearSystem, is_stable
+from gpbnb.filters.words import IntegerProgram, WordFormats, integer_program, integers_of, run_integers, successors
+
+MOST_STATES = 2**24
+"""Largest number of states that a search tries by default."""
+
+
+@dataclass(frozen=True, eq=False)
+class LimitCycle:
+    """States that follow each other for ever with a constant input.
+
+    Parameters
+    ----------
+    states : (period, n), integers in units of the data. outputs : (period, p), likewise.
+    """
+
+    states: NDArray[np.int64]
+    outputs: NDArray[np.int64]
+
+    @property
+    def period(self) -> int:
+        """Number of steps after which the states are the same again."""
+        return len(self.states)
+
+
+@dataclass(frozen=True, eq=False)
+class LimitCycles:
+    """How a filter in fixed point ends with a constant input.
+
+    Parameters
+    ----------
+    cycles : all cycles, the longest first; None if they were not searched.
+    bound : (p,), largest distance of an output from that of the filter without rounding, in units of the data.
+    rest : (p,), the exact outputs of the filter at rest without rounding, in units of the data.
+    searched : number of states that were tried; 0 if there are too many.
+    """
+
+    cycles: tuple[LimitCycle, ...] | MaybeNone
+    bound: NDArray[np.float64]
+    rest: NDArray[Any]
+    searched: int
+
+    @property
+    def largest(self) -> NDArray[np.float64]:
+        """Largest distance of an output on a cycle from the output at rest, (p,), in units of the data; the dead band.
+
+        Without a search, this property is the bound.
+        """
+        if self.cycles is None:
+            return self.bound
+        off = [np.abs(cycle.outputs - self.rest).max(axis=0).astype(np.float64) for cycle in self.cycles]
+        return np.asarray(np.max(off, axis=0)) if off else np.zeros(len(self.rest))
+
+    def __str__(self) -> str:
+        most = ", ".join(f"{each:.6g}" for each in self.largest)
+        if self.cycles is None:
+            return f"outputs stay within {most} units of rest; too many states to try each"
+        oscillations = sum(cycle.period > 1 for cycle in self.cycles)
+        return (
+            f"{len(self.cycles)} cycles, of which {oscillations} oscillate; outputs stay within {most} units of rest, "
+            f"by a search of {self.searched} states"
+        )
+
+
+def limit_cycles(
+    system: LinearSystem, words: WordFormats, u: Any = 0, most: int = MOST_STATES, everywhere: bool = False
+) -> LimitCycles:
+    """Find every cycle in which a filter can end with a constant input.
+
+    Parameters
+    ----------
+    system : a stable system, in any structure.
+    words : formats of data, coefficients and sums.
+    u : the input, one number or (m,).
+    most : largest number of states to try; if there are more, only the bound is returned.
+    everywhere : whether to try every state that the word can store. By default, the search tries only the states within
+        the error bound around the state of rest, which no cycle without an overflow can leave. Cycles with an overflow,
+        in a format that saturates or wraps, are found only if this is True.
+
+    Raises
+    ------
+    TypeError : `system` is not a LinearSystem, or `words` are not WordFormats.
+    ValueError : the stored system is not stable, or it limits its values and is therefore not linear.
+    OverflowError : an input or a coefficient beyond the range of its format.
+
+    Examples
+    --------
+    An integer smoother that rounds down, with the constant input 512, can come to rest at any of four outputs:
+
+    >>> from gpbnb import FixedFormat, LinearSystem, WordFormats
+    >>> words = WordFormats(FixedFormat(15, 0, "down"), FixedFormat(3, 12))
+    >>> found = limit_cycles(LinearSystem.smoother("1097/4096"), words, 512)
+    >>> sorted(int(cycle.outputs[0, 0]) for cycle in found.cycles)
+    [509, 510, 511, 512]
+    """
+    if not isinstance(system, LinearSystem):
+        raise TypeError(f"got a {type(system).__name__}; needed a LinearSystem")
+    if not isinstance(words, WordFormats):
+        raise TypeError(f"got words {words!r}; needed WordFormats, such as WordFormats(FixedFormat(0, 15))")
+    made = integer_program(system.as_filter(), words)
+    if not made.program.is_linear:
+        raise ValueError(f"got {system.name}, which limits its values; needed a linear system for its limit cycles")
+    data, n = words.data, made.program.n
+    inputs = integers_of(exact(np.broadcast_to(np.asarray(u, dtype=object), (1, system.m))), data)[0]
+    if cause := _unstable(made, system.n):
+        raise ValueError(cause)
+    error = bounded_rounding(made) / float(data.unit) * (1 + 2.0**-40)
+    rest = _at_rest(made, inputs)
+    if everywhere:
+        low = np.full(n, int(data.lowest / data.unit), np.int64)
+        counts = np.full(n, int((data.largest - data.lowest) / data.unit) + 1, np.int64)
+    else:
+        ends = [(math.ceil(x - Fraction(r)), math.floor(x + Fraction(r))) for x, r in zip(rest, error, strict=True)]
+        low = np.array([first for first, _ in ends], np.int64)
+        counts = np.array([last - first + 1 for first, last in ends], np.int64)
+    counts[~_read(made.program)] = 0
+    bound, outputs = error[system.n :], rest[system.n :]
+    total = math.prod(max(int(each), 1) for each in counts)
+    if total > most:
+        return LimitCycles(None, bound, outputs, 0)
+    found = _cycles(successors(made, inputs.astype(np.int64), low, counts))
+    cycles = [_cycle(made, numbers, inputs, low, counts, system.n) for numbers in found]
+    return LimitCycles(tuple(sorted(cycles, key=lambda each: -each.period)), bound, outputs, total)
+
+
+def _unstable(made: IntegerProgram, n: int) -> str:
+    """Return in words that a filter as stored in words is not stable; empty if it is."""
+    A, _ = matrices(made.program, made.coefficients)
+    if is_stable(A[:n, :n]):
+        return ""
+    return f"got a filter that is not stable as stored in {made.words}; needed a stable one, which comes to rest"
+
+
+def _at_rest(made: IntegerProgram, u: NDArray[Any]) -> NDArray[Any]:
+    """Return states and outputs at rest without rounding, in units of the data, exact."""
+    A, B = matrices(made.program, made.coefficients)
+    right = B @ np.array([Fraction(int(each)) for each in u], dtype=object)
+    left = exact(np.eye(len(A), dtype=int)) - A
+    solved = rationals(left).solve(rationals(right.reshape(-1, 1)))
+    return np.array([Fraction(int(solved[i, 0].p), int(solved[i, 0].q)) for i in range(len(A))], dtype=object)
+
+
+def _read(program: Program) -> NDArray[np.bool_]:
+    """Return whether a step reads each state, (n,)."""
+    sums = np.isin(program.operations[:, 0], (ADD, SUBTRACT))
+    values = np.concatenate([program.operations[:, 2], program.operations[sums, 1]])
+    return np.isin(np.arange(program.n), np.concatenate([values, program.outputs]))
+
+
+def _cycles(following: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return the numbers of the states on each cycle of a map, -1 where a state leaves it."""
+    on_cycle = np.zeros(len(following), np.bool_)
+    _mark(following, np.zeros(len(following), np.int64), on_cycle)
+    left, found = set(np.flatnonzero(on_cycle).tolist()), list[NDArray[np.int64]]()
+    while left:
+        at = first = next(iter(left))
+        numbers = list[int]()
+        while True:
+            numbers.append(at)
+            left.discard(at)
+            at = int(following[at])
+            if at == first:
+                break
+        found.append(np.array(numbers))
+    return found
+
+
+@compiled
+def _mark(following: Any, visit: Any, on_cycle: Any) -> None:
+    """Mark the states on cycles; `visit` is zero, and becomes the number of the walk that first met a state."""
+    for start in range(len(following)):
+        at = start
+        while at >= 0 and visit[at] == 0:
+            visit[at] = start + 1
+            at = following[at]
+        if at >= 0 and visit[at] == start + 1:
+            while not on_cycle[at]:
+                on_cycle[at] = True
+                at = following[at]
+
+
+def _cycle(
+    made: IntegerProgram,
+    numbers: NDArray[np.int64],
+    u: NDArray[Any],
+    low: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    n: int,
+) -> LimitCycle:
+    first = np.array(np.unravel_index(numbers[0], np.maximum(counts, 1))) + low
+    states = run_integers(made, np.tile(u, (len(numbers), 1)), first)
+    return LimitCycle(states[:, :n], states[:, n:])

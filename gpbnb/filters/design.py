@@ -1,0 +1,124 @@
+"""A filter design, as coefficients or second-order sections, before a structure is chosen for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gpbnb.filters.named import checked_names
+from gpbnb.filters.structures import (
+    CASCADES,
+    STRUCTURES,
+    USUAL,
+    expanded,
+    sections_of,
+    structure_named,
+    transfer_function,
+)
+from gpbnb.filters.system import LinearSystem
+
+SIDE_BY_SIDE = ("direct form I", USUAL, f"cascade of {USUAL}", "lattice", "balanced state space")
+"""Structures that are compared if none are named."""
+
+_NAMED = ("input", "output")
+
+
+@dataclass(frozen=True, eq=False)
+class FilterDesign:
+    """A filter design, given by b and a, or by second-order sections.
+
+    Parameters
+    ----------
+    b, a : coefficients of the transfer function, as in :meth:`gpbnb.filters.system.LinearSystem.from_coefficients`.
+    sos : (sections, 6), in place of these.
+    pairing, order : how the sections of a cascade are paired and ordered; by default as given for sections, else
+        "nearest" and "up".
+    scale : whether to scale the sections, as in :meth:`gpbnb.filters.system.LinearSystem.from_sections`.
+    name : name of the filter in tables and reports.
+    input_names, output_names : lists with one name each, perhaps with a unit, as of
+        :class:`gpbnb.filters.system.LinearSystem`.
+
+    Raises
+    ------
+    ValueError, TypeError : neither or both of b and sos are given; or for a reason given in these methods.
+
+    Examples
+    --------
+    >>> design = FilterDesign(b=[1], a=[1, "-0.9"])
+    >>> list(design.systems())[:2]
+    ['direct form I', 'direct form II transposed']
+    """
+
+    b: Any = None
+    a: Any = None
+    sos: Any = None
+    pairing: str | None = None
+    order: Any = None
+    scale: bool = False
+    name: str = "a digital filter"
+    input_names: Sequence[str] | None = None
+    output_names: Sequence[str] | None = None
+
+    def __post_init__(self) -> None:
+        if (self.b is None) == (self.sos is None) or (self.a is not None and self.sos is not None):
+            raise ValueError("got neither or both of b and sos; needed b and perhaps a, or sos")
+        if not isinstance(self.scale, bool):
+            raise ValueError(f"got scale {self.scale!r}; needed true or false")
+        if self.sos is None:
+            transfer_function(self.b, (1,) if self.a is None else self.a)
+        else:
+            sections_of(self.sos)
+        for kind in _NAMED:
+            checked_names(f"{kind}_names", getattr(self, f"{kind}_names"), 1)
+
+    @property
+    def usual(self) -> str:
+        """The structure that is used when none is named, a cascade for sections, else the transposed direct form II."""
+        return USUAL if self.sos is None else f"cascade of {USUAL}"
+
+    def system(self, structure: str | None = None) -> LinearSystem:
+        """Return the filter in a structure, by default the usual one.
+
+        Raises
+        ------
+        ValueError : the structure is unknown, or this filter does not have it.
+        """
+        found = self._system(structure_named(self.usual if structure is None else structure))
+        inputs, outputs = (checked_names(f"{kind}_names", getattr(self, f"{kind}_names"), 1) for kind in _NAMED)
+        return replace(found, input_names=inputs, output_names=outputs) if inputs or outputs else found
+
+    def _system(self, found: str) -> LinearSystem:
+        if self.sos is None:
+            b, a = self.b, (1,) if self.a is None else self.a
+            if not (self.scale and found in CASCADES):
+                pairing, order = self.pairing or "nearest", "up" if self.order is None else self.order
+                return LinearSystem.from_coefficients(b, a, found, pairing, order, self.name)
+            raise ValueError("got scale for b and a; needed sections in sos, which it scales")
+        if found in CASCADES:
+            pairing, order = self.pairing or "given", "given" if self.order is None else self.order
+            return LinearSystem.from_sections(self.sos, found, pairing, order, self.scale, self.name)
+        b, a = expanded(sections_of(self.sos))
+        return LinearSystem.from_coefficients(b, a, found, name=self.name)
+
+    def systems(self, structures: Sequence[str] | str = SIDE_BY_SIDE) -> dict[str, LinearSystem]:
+        """Return the filter in several structures, by their names; those that it does not have are left out.
+
+        Parameters
+        ----------
+        structures : names, or "all".
+
+        Raises
+        ------
+        ValueError : a structure is unknown, or the filter has none of them.
+        """
+        names = STRUCTURES if structures == "all" else [structures] if isinstance(structures, str) else structures
+        found, why = dict[str, LinearSystem](), list[str]()
+        for name in map(structure_named, names):
+            try:
+                found[name] = self.system(name)
+            except ValueError as error:
+                why.append(f"{name}: {error}")
+        if not found:
+            raise ValueError("; ".join(why))
+        return found

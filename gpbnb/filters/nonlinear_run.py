@@ -1,0 +1,294 @@
+"""A run of an extended or unscented Kalman filter in any format, and its reference in many bits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.exits import stays
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.array_forms import AnyForm, ArrayForm
+from gpbnb.filters.array_run import (
+    FACTORED,
+    OBSERVE,
+    PREDICT,
+    ROOTS,
+    ArrayRun,
+    SteppedRun,
+    block_algebra,
+    opened_run,
+)
+from gpbnb.filters.array_steps import BlockStorage, observe_ud, observed, root_of_factors
+from gpbnb.filters.blocks import BLOCKS, BlockFormats
+from gpbnb.filters.factors import combined_gain, upper_factors
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import corrected_by, measured_in, predicted_in
+from gpbnb.filters.missing import without_missing
+from gpbnb.filters.nonlinear import AnyModel, NonlinearModel
+from gpbnb.filters.reference import Step, agreed
+from gpbnb.filters.run import Run, reference_states
+from gpbnb.filters.simulation import covariance_root, fine_resolution, simulated_measurements
+from gpbnb.filters.unscented import UnscentedModel, unscented_step
+
+NONLINEAR_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD, ArrayForm.SYMMETRIZED, *ROOTS)
+"""Forms of an extended filter. An unscented one has the innovation form only."""
+
+BLOCK_FORMS = (Form.INNOVATION, Form.JOSEPH, Form.UD)
+"""Forms of an extended filter whose blocks may have formats of their own."""
+
+
+class _Ahead(NamedTuple):
+    """A predicted estimate (n,), and its covariance, factors or root (n, n)."""
+
+    x: FloatArray
+    P: Any
+
+
+class NonlinearRun(SteppedRun):
+    """A run of a nonlinear filter; its attributes are those of :class:`~gpbnb.filters.run.Run`.
+
+    Parameters
+    ----------
+    model : the functions and the noise.
+    fmt : any format, or formats for the blocks of an extended filter. The functions and their derivatives are computed
+        in the format of the state.
+    form : one of ``NONLINEAR_FORMS``. The factors and roots of Q, R and P0 are computed exactly from the model as
+        given, before a format stores them.
+    checkpoint_steps : as for ``Run``.
+
+    Raises
+    ------
+    ValueError : a form that nonlinear filters, the unscented filter or blocks do not have.
+    OverflowError : the model has entries beyond the range of the format.
+    """
+
+    @stays
+    def __init__(
+        self,
+        model: NonlinearModel,
+        fmt: FloatFormat | BlockFormats,
+        form: AnyForm = Form.INNOVATION,
+        checkpoint_steps: Sequence[int] = (),
+    ) -> None:
+        check_form(model, form, isinstance(fmt, BlockFormats))
+        each = [getattr(fmt, name) for name in BLOCKS] if isinstance(fmt, BlockFormats) else [fmt] * len(BLOCKS)
+        of_state, of_gain, of_covariance, of_innovation = each
+        super().__init__(model.n, model.m, of_state.array, form, checkpoint_steps)
+        self.model, self.fmt = model, fmt
+        self._to = BlockStorage(of_state.array, of_gain.array, of_covariance.array, of_innovation.array)
+        self._blocks = block_algebra(each, self._to)
+        stored_in = fmt.model if isinstance(fmt, BlockFormats) else fmt
+        sound = model.noise.definite_in(stored_in)
+        #: Changes of the covariances, including those of the model.
+        self.repairs = list(sound.repairs)
+        arrays = sound.arrays(stored_in)
+        self.x = of_state.array(arrays["x0"])
+        self._R, self._Q = list(arrays["R"]), list(arrays["Q"])
+        P = arrays["P0"]
+        if form in FACTORED:
+            self._R = [stored_in.array(upper_factors(one)) for one in sound.R]
+            self._Q = [self._factors(upper_factors(one), stored_in) for one in sound.Q]
+            P = self._factors(upper_factors(sound.P0), stored_in)
+        self.P = of_covariance.array(P)
+        if model.method == "unscented":
+            self._weights = [of_state.array(each) for each in model.weights()]
+        self._u = None if model.u is None else of_state.array(model.u)
+
+    def _factors(self, factors: NDArray[Any], fmt: FloatFormat) -> FloatArray:
+        stored = fmt.array(factors)
+        return root_of_factors(stored) if self.form in ROOTS else stored
+
+    def _check(self, z: Any) -> None:
+        self.model.noise.check_measurements(z, self.steps)
+
+    def _step(self, k: int, z: FloatArray) -> tuple[Any, bool]:
+        u = None if self._u is None else self._u[k]
+        step = self._unscented if self.model.method == "unscented" else self._extended
+        K, definite = step(k, z, u)
+        self.x = self.model.normalized(self.x)
+        return K, definite
+
+    def _extended(self, k: int, z: FloatArray, u: FloatArray | None) -> tuple[Any, bool]:
+        """Predict, then update once or several times, each time with h and H at the last estimate."""
+        ahead, F = self.model.moved(self.x, u)
+        predicted, definite = self._predicted(k, F)
+        x, K = ahead, None
+        for _ in range(self.model.iterations):
+            expected, H = self.model.measured(x, u)
+            y = self.model.difference(z, expected)
+            if x is not ahead:
+                y = y - H @ (ahead - x)
+            x, P, K, positive = self._updated(k, self._seen(k, H), self._seen(k, y), _Ahead(ahead, predicted))
+        self.x, self.P = x, P
+        return K, definite and positive
+
+    def _predicted(self, k: int, F: FloatArray) -> tuple[Any, bool]:
+        Q, taken = self._member(self._Q, k), self._to.covariance
+        if self.form in FACTORED:
+            return PREDICT[self.form](taken(F), self.P, taken(Q))
+        return predicted_in(self._blocks, F, self.P, Q), True
+
+    def _updated(self, k: int, H: FloatArray, y: FloatArray, ahead: _Ahead) -> tuple[FloatArray, Any, Any, bool]:
+        """Return estimate, covariance, gain, and whether all variances and pivots are positive."""
+        R = self._member(self._R, k)
+        if self.form in FACTORED:  # what the measurements correct is zero before them
+            observe = partial(observe_ud, stored=self._to) if self.form is Form.UD else OBSERVE[self.form]
+            step = observed(observe, H, R, y, ahead.x * 0, ahead.P, self._to)
+            return ahead.x + step.x, step.P, (step.gains, H, R), step.definite
+        found = measured_in(self._blocks, self.form, H, R, ahead.P)
+        x = corrected_by(self._blocks.state, self._to.state(found.K), ahead.x, y)
+        positive = all(bool(each > 0) for each in found.pivots) and bool(np.all(np.diagonal(found.P) > 0))
+        return x, found.P, found.K, positive
+
+    def _unscented(self, k: int, z: FloatArray, u: FloatArray | None) -> tuple[Any, bool]:
+        model = self.model
+
+        def difference(a: FloatArray, b: FloatArray) -> FloatArray:
+            return self._seen(k, model.difference(a, b))
+
+        scale, means, covariances = self._weights
+        step = UnscentedModel(
+            lambda x: model.value("f", x, u),
+            lambda x: model.value("h", x, u),
+            difference,
+            scale,
+            means,
+            covariances,
+            self._member(self._Q, k),
+            self._member(self._R, k),
+        )
+        found = unscented_step(self._blocks.state, step, self.x, self.P, z)
+        self.x, self.P = found.x, found.P
+        return found.K, found.definite
+
+    def _seen(self, k: int, numbers: FloatArray) -> FloatArray:
+        """Return numbers (m,) or (m, n) with zeros where a measurement of step k + 1 is missing."""
+        seen = self.model.seen(k)
+        if seen is None or seen.all():
+            return numbers
+        found: Any = np.where(seen.reshape(-1, *(1,) * (numbers.ndim - 1)), numbers, 0)
+        return found
+
+    @staticmethod
+    def _member(cycle: list[FloatArray], k: int) -> FloatArray:
+        return cycle[k % len(cycle)]
+
+    def _whole_gain(self, k: int, gain: Any) -> NDArray[Any]:
+        if not isinstance(gain, tuple):
+            return np.asarray(gain.to_fractions(), dtype=object)
+        columns, H, UR = gain
+        return combined_gain([each.to_fractions() for each in columns], UR.to_fractions(), H.to_fractions())
+
+
+def check_form(model: NonlinearModel, form: AnyForm, blocks: bool = False) -> None:
+    """Reject a form that a nonlinear filter, or its blocks, do not have.
+
+    Raises
+    ------
+    ValueError : another form.
+    """
+    if model.method == "unscented":
+        if form is not Form.INNOVATION or blocks:
+            raise ValueError(
+                f"got {'formats of blocks' if blocks else f'the {form} form'} for an unscented filter; needed the "
+                "innovation form in one format: it has no Jacobians to factor its update by"
+            )
+    elif blocks and form not in BLOCK_FORMS:
+        raise ValueError(f"got formats of blocks in the {form} form; needed one of {', '.join(map(str, BLOCK_FORMS))}")
+    elif form not in NONLINEAR_FORMS:
+        raise ValueError(
+            f"got the {form} form for a nonlinear filter; needed one of {', '.join(map(str, NONLINEAR_FORMS))}: closed "
+            "loops and compensated estimates need a linear model"
+        )
+
+
+def opened(
+    model: AnyModel,
+    fmt: FloatFormat | BlockFormats,
+    form: AnyForm,
+    checkpoint_steps: Sequence[int] = (),
+    bounded: bool = False,
+) -> Run | ArrayRun | NonlinearRun:
+    """Return a run of a linear or nonlinear filter.
+
+    Raises
+    ------
+    ValueError, OverflowError : as for :func:`~gpbnb.filters.array_run.opened_run` and :class:`NonlinearRun`.
+    """
+    if isinstance(model, NonlinearModel):
+        return NonlinearRun(model, fmt, form, checkpoint_steps)
+    return opened_run(model, fmt, form, checkpoint_steps, bounded)
+
+
+def complete(model: AnyModel, z: Any) -> tuple[Any, Any]:
+    """Return a model for the measurements of each step, and these with zeros in place of missing ones."""
+    return model.without_missing(z) if isinstance(model, NonlinearModel) else without_missing(model, z)
+
+
+def true_states(model: AnyModel, z: Any) -> NDArray[np.float64]:
+    """Return the estimates after every step without rounding, (steps, n, 2), as double-double.
+
+    Those of a nonlinear filter are computed in bits that agree with twice as many.
+
+    Raises
+    ------
+    ArithmeticError : as for :func:`~gpbnb.filters.run.reference`; results that depend on the number of bits.
+    """
+    if not isinstance(model, NonlinearModel):
+        return reference_states(model, z)
+    return double_doubles(np.array([x for x, _, _ in nonlinear_reference(model, z)], dtype=object))
+
+
+def nonlinear_reference(model: NonlinearModel, z: Any) -> list[Step]:
+    """Return estimate, gain and covariance after every step, as Fractions, in bits that agree with twice as many.
+
+    Raises
+    ------
+    ArithmeticError : results that depend on the number of bits; too many steps.
+    """
+    return _reference(model, tuple(map(tuple, exact(z))))
+
+
+@lru_cache(maxsize=4)
+def _reference(model: NonlinearModel, z: tuple[tuple[Any, ...], ...]) -> list[Step]:
+    measured = np.array(z, dtype=object)
+    return agreed(model.name, len(measured), lambda bits: _steps(model, measured, bits))
+
+
+def _steps(model: NonlinearModel, z: NDArray[Any], bits: int) -> list[Step] | None:
+    """Return all steps in some bits; None if the run stops."""
+    run = NonlinearRun(model, FloatFormat(2, bits), Form.INNOVATION, range(1, len(z) + 1))
+    run.take(z)
+    saved = run.checkpoints()
+    return None if run.stopped is not None else list(zip(saved.x, saved.K, saved.P, strict=True))
+
+
+def simulated(model: AnyModel, steps: int, seed: int = 0) -> NDArray[np.float64]:
+    """Simulate measurements (steps, m) of a process that starts at the first estimate.
+
+    Those of a nonlinear process are computed in binary64, with every operation correctly rounded, and are rounded to
+    :func:`gpbnb.filters.simulation.fine_resolution`; they are the same on every machine.
+
+    Raises
+    ------
+    ValueError : more steps than the model describes.
+    """
+    if not isinstance(model, NonlinearModel):
+        return simulated_measurements(model, steps, seed)
+    model.check_steps(steps)
+    noise, fmt, rng = model.noise, FloatFormat(2, 53), np.random.default_rng(seed)
+    roots = [[covariance_root(each) for each in cycle] for cycle in (noise.Q, noise.R)]
+    x, unit, z = fmt.array(noise.x0), np.asarray(fine_resolution(noise)), np.empty((steps, model.m))
+    for k in range(steps):
+        u = None if model.u is None else fmt.array(model.u[k])
+        w, v = (fmt.array(cycle[k % len(cycle)]) @ fmt.array(rng.standard_normal(len(cycle[0]))) for cycle in roots)
+        x = model.value("f", x, u) + w
+        z[k] = (model.value("h", x, u) + v).to_float()
+    return np.asarray(np.rint(z / unit) * unit)

@@ -1,0 +1,562 @@
+r"""Structures of a digital filter: each is another list of rounded operations for one transfer function.
+
+.. math:: H(z) = \frac{b_0 + b_1 z^{-1} + \dots + b_M z^{-M}}{1 + a_1 z^{-1} + \dots + a_N z^{-N}}
+
+Without rounding, all structures have the same output. With rounding they differ, because each stores other coefficients
+and other states. Here every structure is written once, as a :class:`~gpbnb.filters.program.Program` and its exact
+coefficients, in the order in which the operations run:
+
+``direct form I``
+    :math:`y = b_0 u + b_1 u_1 + \dots - a_1 y_1 - \dots`, one sum from left to right over delayed inputs and outputs.
+``direct form II``
+    :math:`w = u - a_1 w_1 - \dots,\; y = b_0 w + b_1 w_1 + \dots`.
+``direct form I transposed``
+    :math:`v = u - t_1,\; t_i \leftarrow t_{i+1} + a_i v,\; y = b_0 v + s_1,\; s_i \leftarrow s_{i+1} + b_i v`.
+``direct form II transposed``
+    :math:`y = b_0 u + s_1,\; s_i \leftarrow (b_i u + s_{i+1}) - a_i y`, as in ``scipy.signal.lfilter``.
+``cascade of …``
+    sections of second order, each in one of these forms.
+``lattice``
+    reflection coefficients k and taps v: :math:`f_{i-1} = f_i - k_i g_{i-1},\; g_i = g_{i-1} + k_i f_{i-1}` with
+    delayed :math:`g_{i-1}`, :math:`y = v_0 g_0 + v_1 g_1 + \dots`.
+``state space``
+    the companion form; each row of (A, B) and of (C, D) is one sum from left to right.
+``balanced state space``
+    the same with balanced states, which are as easy to excite as to observe.
+``FIR``
+    a tapped delay line, for a filter without feedback.
+
+A lattice, a balanced form, and a cascade that is factored from b and a have coefficients that are computed; they are
+exact, or have relative errors below 2**-250.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from flint import fmpq, fmpq_mat
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.rational import exact, rationals
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.program import Builder, Program, coefficient_matrices
+
+DESIGN = FloatFormat(2, 256, Rounding.EVEN)
+"""Format of computed coefficients that would be too long as fractions."""
+
+LONGEST = 512
+"""Bits of numerator and denominator together up to which a computed coefficient is kept as it is."""
+
+
+class Structure(NamedTuple):
+    """One step of a filter in a structure.
+
+    Parameters
+    ----------
+    program : operations of the step; the outputs follow the states.
+    coefficients : (c,), the exact design values; they are rounded when a format stores them.
+    """
+
+    program: Program
+    coefficients: NDArray[Any]
+
+
+class Section(NamedTuple):
+    """A section under construction: numbers of its coefficients and of its states.
+
+    Parameters
+    ----------
+    b, a : numbers of the coefficients b0 … bM and a1 … aN.
+    x : numbers of the states.
+    """
+
+    b: Sequence[int]
+    a: Sequence[int]
+    x: Sequence[int]
+
+
+Writer = Callable[[Builder, Section, int], tuple[int, list[int]]]
+"""A function that writes a section for an input; it returns the output, and the next values of the states."""
+
+
+# -- direct forms -----------------------------------------------------------------------------------------------------
+
+
+def _direct_1(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+    b, a, x = section
+    inputs, outputs = x[: len(b) - 1], x[len(b) - 1 :]
+    y = build.row(b, [u, *inputs])
+    for coefficient, value in zip(a, outputs, strict=True):
+        y = build.subtract(y, build.multiply(coefficient, value))
+    return y, [*[u, *inputs][: len(inputs)], *[y, *outputs][: len(outputs)]]
+
+
+def _direct_2(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+    b, a, x = section
+    w = u
+    for coefficient, value in zip(a, x, strict=False):
+        w = build.subtract(w, build.multiply(coefficient, value))
+    delayed = [w, *x]
+    return build.row(b, delayed[: len(b)]), delayed[: len(x)]
+
+
+def _transposed_1(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+    b, a, x = section
+    t, s = [*x[: len(a)]], [*x[len(a) :]]
+    v = build.subtract(u, t[0]) if t else u
+    y = build.multiply(b[0], v)
+    if s:
+        y = build.add(y, s[0])
+    return y, [*_shifted(build, t, a, v), *_shifted(build, s, b[1:], v)]
+
+
+def _shifted(build: Builder, states: list[int], coefficients: Sequence[int], v: int) -> list[int]:
+    """Move a chain of states by one, and add the product of a value to each."""
+    moved = []
+    for i, coefficient in enumerate(coefficients):
+        term = build.multiply(coefficient, v)
+        moved.append(build.add(states[i + 1], term) if i + 1 < len(states) else term)
+    return moved
+
+
+def _transposed_2(build: Builder, section: Section, u: int) -> tuple[int, list[int]]:
+    b, a, x = section
+    y = build.multiply(b[0], u)
+    if x:
+        y = build.add(y, x[0])
+    moved = []
+    for i, coefficient in enumerate(b[1:]):
+        s = build.multiply(coefficient, u)
+        if i + 1 < len(x):
+            s = build.add(s, x[i + 1])
+        if i < len(a):
+            s = build.subtract(s, build.multiply(a[i], y))
+        moved.append(s)
+    return y, moved
+
+
+class _Form(NamedTuple):
+    """A direct form: how to write it, its number of states, and their names, for M and N."""
+
+    write: Writer
+    states: Callable[[int, int], list[str]]
+    pads: bool = False
+    """Whether b is extended by zeros to the length of a."""
+
+
+def _numbered(letter: str, count: int) -> list[str]:
+    return [f"{letter}{i + 1}" for i in range(count)]
+
+
+DIRECT = {
+    "direct form I": _Form(_direct_1, lambda M, N: _numbered("u", M) + _numbered("y", N)),
+    "direct form II": _Form(_direct_2, lambda M, N: _numbered("w", max(M, N))),
+    "direct form I transposed": _Form(_transposed_1, lambda M, N: _numbered("t", N) + _numbered("s", M)),
+    "direct form II transposed": _Form(_transposed_2, lambda M, N: _numbered("s", max(M, N)), pads=True),
+}
+"""The direct forms, by name."""
+
+USUAL = "direct form II transposed"
+"""The form of sections, if none is named."""
+
+CASCADES = tuple(f"cascade of {name}" for name in DIRECT)
+
+STRUCTURES = (*DIRECT, *CASCADES, "lattice", "state space", "balanced state space")
+"""Names of all structures of a filter with feedback; one without also has the structure "FIR"."""
+
+WITH_FIR = (*STRUCTURES, "FIR")
+"""Names of all structures."""
+
+
+_DOUBLINGS = 64
+"""After so many doublings, a sum over 2**64 steps would have converged for any eigenvalue below 1 in float64."""
+
+
+def structure_named(name: Any, among: Sequence[str] = WITH_FIR) -> str:
+    """Return the name of a structure as this module writes it; case and spaces do not matter.
+
+    "cascade" alone stands for a cascade of sections in the transposed direct form II.
+
+    Raises
+    ------
+    ValueError : no such structure.
+
+    Examples
+    --------
+    >>> structure_named("Direct Form I")
+    'direct form I'
+    """
+    wanted = " ".join(name.lower().replace("-", " ").split()) if isinstance(name, str) else name
+    if wanted == "cascade":
+        wanted = f"cascade of {USUAL}".lower()
+    for each in among:
+        if wanted == each.lower():
+            return each
+    raise ValueError(f"got structure {name!r}; needed one of {', '.join(map(repr, among))}")
+
+
+# -- coefficients -----------------------------------------------------------------------------------------------------
+
+
+def transfer_function(b: Any, a: Any) -> tuple[list[Fraction], list[Fraction]]:
+    """Check the coefficients of a filter, and return them exact, divided by a[0], without zeros at their end.
+
+    Returns
+    -------
+    b, a : b0 … bM, at least b0, and a1 … aN, without the leading 1.
+
+    Raises
+    ------
+    ValueError : no coefficients, not one row of them, ``a[0] = 0``, or a filter without any delay.
+    TypeError : entries that are not numbers.
+    """
+    rows = []
+    for letter, given in (("b", b), ("a", a)):
+        try:
+            entries = exact(given)
+        except (TypeError, ValueError) as error:
+            raise type(error)(f"{letter}: {error}") from None
+        if entries.ndim > 1 or not entries.size:
+            raise ValueError(
+                f"got {letter} of shape {entries.shape}; needed one row of coefficients, such as [1, -0.5]"
+            )
+        rows.append(np.atleast_1d(entries).tolist())
+    top, bottom = rows
+    if not bottom[0]:
+        raise ValueError("got a[0] = 0; needed a first coefficient that is not 0: the output is divided by it")
+    top, bottom = ([each / bottom[0] for each in row] for row in (top, bottom))
+    for row in (top, bottom):
+        while len(row) > 1 and not row[-1]:
+            row.pop()
+    if len(top) == len(bottom) == 1:
+        raise ValueError("got b and a without any delay; needed at least a second coefficient in one of them")
+    return top, bottom[1:]
+
+
+def sections_of(sos: Any) -> list[tuple[list[Fraction], list[Fraction]]]:
+    """Check second-order sections, and return b and a of each as :func:`transfer_function` does.
+
+    Parameters
+    ----------
+    sos : (sections, 6), rows b0, b1, b2, a0, a1, a2, as in ``scipy.signal``.
+
+    Raises
+    ------
+    ValueError : a wrong shape, ``a0 = 0``, or a section without any delay; the message names the section from 0.
+    TypeError : entries that are not numbers.
+    """
+    entries = exact(sos)
+    if entries.ndim != 2 or entries.shape[1:] != (6,) or not len(entries):
+        raise ValueError(
+            f"got sections of shape {entries.shape}; needed (sections, 6), rows of b0, b1, b2, a0, a1, a2 as in SciPy"
+        )
+    found = []
+    for i, row in enumerate(entries):
+        try:
+            found.append(transfer_function(row[:3], row[3:]))
+        except ValueError as error:
+            raise ValueError(f"section {i}: {error}") from None
+    return found
+
+
+def expanded(sections: Sequence[tuple[list[Fraction], list[Fraction]]]) -> tuple[list[Fraction], list[Fraction]]:
+    """Multiply sections, and return b and a of the whole filter; a begins with 1."""
+    b, a = [Fraction(1)], [Fraction(1)]
+    for top, bottom in sections:
+        b, a = _product(b, top), _product(a, [Fraction(1), *bottom])
+    return b, a
+
+
+def _product(p: Sequence[Fraction], q: Sequence[Fraction]) -> list[Fraction]:
+    found = [Fraction(0)] * (len(p) + len(q) - 1)
+    for i, x in enumerate(p):
+        for j, y in enumerate(q):
+            found[i + j] += x * y
+    return found
+
+
+def shortened(values: Sequence[Fraction]) -> list[Fraction]:
+    """Round computed coefficients that are longer than :data:`LONGEST` to 256 bits."""
+    return [
+        each if each.numerator.bit_length() + each.denominator.bit_length() <= LONGEST else DESIGN.round(each)
+        for each in values
+    ]
+
+
+# -- structures -------------------------------------------------------------------------------------------------------
+
+
+def direct(b: Sequence[Fraction], a: Sequence[Fraction], name: str) -> Structure:
+    """Return a direct form of a filter; for b and a, see :func:`transfer_function`."""
+    return cascade([(b, a)], name)
+
+
+def cascade(sections: Sequence[tuple[Sequence[Fraction], Sequence[Fraction]]], name: str) -> Structure:
+    """Return sections in a row, each in the direct form with this name; the output of one is the input of the next."""
+    form = DIRECT[name]
+    padded = [([*b, *[Fraction(0)] * (len(a) + 1 - len(b))] if form.pads else [*b], [*a]) for b, a in sections]
+    names = [form.states(len(b) - 1, len(a)) for b, a in padded]
+    build = Builder(sum(map(len, names)) + 1, 1)
+    value, at, first, moved = build.inputs[0], 0, 0, list[int]()
+    coefficients, labels, states = list[Fraction](), list[str](), list[str]()
+    for i, ((b, a), own) in enumerate(zip(padded, names, strict=True)):
+        end = f"_{i + 1}" if len(padded) > 1 else ""
+        numbers = range(first, first + len(b) + len(a))
+        section = Section(numbers[: len(b)], numbers[len(b) :], build.states[at : at + len(own)])
+        value, following = form.write(build, section, value)
+        build.stored(value)
+        moved += following
+        coefficients += [*b, *a]
+        labels += [f"b{j}{end}" for j in range(len(b))] + [f"a{j + 1}{end}" for j in range(len(a))]
+        states += [each + end for each in own]
+        at, first = at + len(own), first + len(numbers)
+    program = build.finish([*moved, value], len(coefficients), 1, [*states, "y"], labels)
+    return Structure(program, exact(coefficients))
+
+
+def lattice(b: Sequence[Fraction], a: Sequence[Fraction]) -> Structure:
+    """Return the lattice and ladder of a filter, with two products for each reflection coefficient.
+
+    Raises
+    ------
+    ValueError : a reflection coefficient of size 1, so that the filter is not stable and has no lattice.
+    """
+    K = max(len(b) - 1, len(a))
+    k, v = reflections([*b, *[Fraction(0)] * (K + 1 - len(b))], [Fraction(1), *a, *[Fraction(0)] * (K - len(a))])
+    build = Builder(K + 1, 1)
+    f, delayed, backward = build.inputs[0], build.states[:K], [0] * (K + 1)
+    for i in range(K, 0, -1):
+        f = build.subtract(f, build.multiply(i - 1, delayed[i - 1]))
+        backward[i] = build.add(delayed[i - 1], build.multiply(i - 1, f))
+    backward[0] = f
+    y = build.row(range(K, 2 * K + 1), backward)
+    names = [f"k{i + 1}" for i in range(K)] + [f"v{i}" for i in range(K + 1)]
+    states = [*(f"g{i}" for i in range(K)), "y"]
+    return Structure(build.finish([*backward[:K], y], 2 * K + 1, 1, states, names), exact([*k, *v]))
+
+
+def reflections(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[list[Fraction], list[Fraction]]:
+    """Return the reflection coefficients (K,) and the taps (K + 1,) of a filter, by stepping down its order.
+
+    Parameters
+    ----------
+    b, a : (K + 1,), a with its leading 1.
+
+    Raises
+    ------
+    ValueError : a reflection coefficient of size 1.
+    """
+    a, b = [*a], [*b]
+    k, v = [Fraction(0)] * (len(a) - 1), [Fraction(0)] * len(a)
+    for i in range(len(a) - 1, 0, -1):
+        v[i], k[i - 1] = b[i], a[i]
+        if abs(a[i]) == 1:
+            raise ValueError(
+                f"got a filter with the reflection coefficient k{i} = {a[i]}; needed sizes below 1 for a lattice: the "
+                "filter is not stable; use another structure"
+            )
+        b = [b[j] - v[i] * a[i - j] for j in range(i)]
+        a = [(a[j] - a[i] * a[i - j]) / (1 - a[i] ** 2) for j in range(i)]
+        b, a = shortened(b), shortened(a)
+    v[0] = b[0]
+    return shortened(k), shortened(v)
+
+
+def companion(b: Sequence[Fraction], a: Sequence[Fraction]) -> tuple[NDArray[Any], ...]:
+    """Return A, B, C and D of a filter in its companion form, exact."""
+    K = max(len(b) - 1, len(a))
+    top, bottom = [*b, *[Fraction(0)] * (K + 1 - len(b))], [*a, *[Fraction(0)] * (K - len(a))]
+    A = exact(np.eye(K, k=-1, dtype=int))
+    A[0] = [-each for each in bottom]
+    B = exact(np.eye(K, 1, dtype=int))
+    C = np.array([[x - top[0] * y for x, y in zip(top[1:], bottom, strict=True)]], dtype=object)
+    return A, B, C, exact([[top[0]]])
+
+
+def steady_covariance(A: NDArray[np.float64], Q: NDArray[np.float64]) -> NDArray[np.float64]:
+    r"""Return :math:`X = AXA^T + Q`, the covariance of a stable system in its steady state.
+
+    The sum of :math:`A^kQ(A^k)^T` over all k is added up by doubling: 2, 4, 8, … terms.
+
+    Raises
+    ------
+    ValueError : the sum does not converge, because an eigenvalue of A has at least size 1.
+    """
+    X, power = Q, A
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(_DOUBLINGS):
+            before, X = X, X + power @ X @ power.T
+            if not np.isfinite(X).all():
+                break
+            if np.array_equal(before, X):
+                return (X + X.T) / 2
+            power = power @ power
+    raise ValueError("its covariance does not converge")
+
+
+def balanced(matrices: Sequence[NDArray[Any]]) -> tuple[NDArray[Any], ...]:
+    """Return A, B, C and D in balanced states: their matrices of reachability and of observability are near equal.
+
+    The change of states is computed in float64 and then applied exactly, so the filter stays the same.
+
+    Raises
+    ------
+    ValueError : the filter is not stable, or its states are too far from reachable or observable in float64.
+    """
+    A, B, C, D = matrices
+    a, b, c = (each.astype(np.float64) for each in (A, B, C))
+    try:
+        reach = np.linalg.cholesky(steady_covariance(a, b @ b.T))
+        seen = np.linalg.cholesky(steady_covariance(a.T, c.T @ c))
+        U, sizes, _ = np.linalg.svd(reach.T @ seen)
+        change = rationals(reach @ U / np.sqrt(sizes))
+        back = change.inv()
+    except (np.linalg.LinAlgError, ValueError, ZeroDivisionError) as error:
+        raise ValueError(
+            f"got a filter whose states cannot be balanced in float64: {error}; needed a stable filter of a lower "
+            "order; use another structure, for example a cascade"
+        ) from None
+    changed = (back * rationals(A) * change, back * rationals(B), rationals(C) * change)
+    return (*map(_fractions, changed), D)
+
+
+def _fractions(matrix: fmpq_mat) -> NDArray[Any]:
+    found = np.empty((matrix.nrows(), matrix.ncols()), dtype=object)
+    for i, j in np.ndindex(found.shape):
+        entry: fmpq = matrix[i, j]
+        found[i, j] = shortened([Fraction(int(entry.p), int(entry.q))])[0]
+    return found
+
+
+def state_space_structure(A: Any, B: Any, C: Any = None, D: Any = None) -> Structure:
+    """Return a filter from its exact matrices; with C (p, n) and D (p, m), p outputs follow the states."""
+    n, m = B.shape
+    p = 0 if C is None else len(C)
+    (a, b, c, d), count = coefficient_matrices((n, n), (n, m), (p, n), (p, m))
+    build = Builder(n + p, m)
+    values = [*build.states[:n], *build.inputs]
+    results = build.product(np.block([[a, b], [c, d]]), values)
+    given = [A, B, *([] if C is None else [C, D])]
+    names = [
+        f"{letter}{i + 1}_{j + 1}"
+        for letter, each in zip("ABCD", given, strict=False)
+        for i, j in np.ndindex(each.shape)
+    ]
+    states = [*_numbered("x", n), *(["y"] if p == 1 else _numbered("y", p))]
+    coefficients = np.concatenate([np.asarray(each).reshape(-1) for each in given])
+    return Structure(build.finish(results, count, p, states, names), coefficients)
+
+
+# -- sums, smoothing and control --------------------------------------------------------------------------------------
+
+
+SUMS = ("left", "pairwise", "blocked", "tree")
+"""Orders in which a sum is added, those of :func:`gpbnb.arithmetic.linalg.matmul`, and neighbours level by level."""
+
+
+def sum_structure(count: int, order: str, block: int, running: bool) -> Structure:
+    """Return the sum of the inputs of a step, added to that of all earlier steps if it is running.
+
+    The states are the sum, and the sum again as output.
+    """
+    build = Builder(2, count)
+    total = _SUMMED[order](build, build.inputs, block)
+    if running:
+        total = build.add(build.states[0], total)
+    return Structure(build.finish([total, total], 0, 1, ["sum", "y"]), exact(np.zeros(0, dtype=int)))
+
+
+def _in_a_row(build: Builder, values: Sequence[int], block: int) -> int:
+    total = values[0]
+    for each in values[1:]:
+        total = build.add(total, each)
+    return total
+
+
+def _by_halves(build: Builder, values: Sequence[int], block: int) -> int:
+    if len(values) == 1:
+        return values[0]
+    half = len(values) // 2
+    return build.add(_by_halves(build, values[:half], block), _by_halves(build, values[half:], block))
+
+
+def _by_levels(build: Builder, values: Sequence[int], block: int) -> int:
+    while len(values) > 1:
+        pairs = [build.add(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
+        values = pairs + ([values[-1]] if len(values) % 2 else [])
+    return values[0]
+
+
+def _by_blocks(build: Builder, values: Sequence[int], block: int) -> int:
+    return _in_a_row(build, [_in_a_row(build, values[i : i + block], 0) for i in range(0, len(values), block)], 0)
+
+
+_SUMMED = dict(zip(SUMS, (_in_a_row, _by_halves, _by_blocks, _by_levels), strict=True))
+
+
+def smoother(alpha: Fraction) -> Structure:
+    """Return exponential smoothing :math:`y + α(u - y)`; the states are y, and y again as output."""
+    build = Builder(2, 1)
+    y, u = build.states[0], build.inputs[0]
+    y = build.add(y, build.multiply(0, build.subtract(u, y)))
+    return Structure(build.finish([y, y], 1, 1, ["y1", "y"], ["alpha"]), exact([alpha]))
+
+
+class Controller(NamedTuple):
+    r"""Settings of a PID controller with the error e as its input; all exact, None where a term is absent.
+
+    .. math::
+        i \leftarrow \lambda i + K_i e + K_b (u - v),\quad v = K_p e + i + K_d(e - e_{-1}),\quad u = v \text{ limited}
+
+    Parameters
+    ----------
+    Kp, Ki, Kd : gains per step. leak : λ, the factor by which the integral decays in a step.
+    limits : lowest and highest output. integral_limits : lowest and highest integral.
+    back : :math:`K_b`; this gain times the last output minus its value before limiting is added to the integral.
+    """
+
+    Kp: Fraction
+    Ki: Fraction
+    Kd: Fraction | None = None
+    leak: Fraction = Fraction(1)
+    limits: tuple[Fraction, Fraction] | None = None
+    integral_limits: tuple[Fraction, Fraction] | None = None
+    back: Fraction | None = None
+
+
+def controller_structure(given: Controller) -> Structure:
+    """Return a PI or PID controller with four states: integral, last error, excess over the limits, and output."""
+    numbers: dict[str, Fraction] = {"leak": given.leak, "Ki": given.Ki, "Kp": given.Kp}
+    if given.Kd is not None:
+        numbers["Kd"] = given.Kd
+    for end, pair in (("", given.limits), ("_integral", given.integral_limits)):
+        if pair is not None:
+            numbers[f"low{end}"], numbers[f"high{end}"] = pair
+    if given.back is not None:
+        numbers["Kb"] = given.back
+    at = {name: i for i, name in enumerate(numbers)}
+    states = ["integral", *(["last"] if "Kd" in at else []), *(["excess"] if "Kb" in at else []), "y"]
+    build = Builder(len(states), 1)
+    state = dict(zip(states, build.states, strict=True))
+    error = build.inputs[0]
+    integral = build.add(build.multiply(at["leak"], state["integral"]), build.multiply(at["Ki"], error))
+    if "Kb" in at:
+        integral = build.add(integral, build.multiply(at["Kb"], state["excess"]))
+    if "low_integral" in at:
+        integral = build.at_most(at["high_integral"], build.at_least(at["low_integral"], integral))
+    steep = build.multiply(at["Kd"], build.subtract(error, state["last"])) if "Kd" in at else None
+    output = build.add(build.multiply(at["Kp"], error), integral)
+    if steep is not None:
+        output = build.add(output, steep)
+    limited = output
+    if "low" in at:
+        limited = build.at_most(at["high"], build.at_least(at["low"], output))
+    following = {"integral": integral, "last": error, "y": limited}
+    if "Kb" in at:
+        following["excess"] = build.subtract(limited, output)
+    program = build.finish([following[each] for each in states], len(numbers), 1, states, list(numbers))
+    return Structure(program, exact(list(numbers.values())))

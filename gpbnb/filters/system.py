@@ -1,0 +1,760 @@
+r"""Linear systems without a covariance: digital filters, controllers and observers with fixed coefficients.
+
+.. math:: x_{k+1} = A x_k + B u_k, \qquad y_k = C x_k + D u_k
+
+Each row of A and B, and of C and D, is one sum from left to right, unless the system has another structure, such as
+those of :mod:`gpbnb.filters.structures`. A :class:`LinearFilter` is any step written as a program; the same program is
+emulated and bounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.conversion import Numbers
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.backends import double_doubles
+from gpbnb.arithmetic.kernels.tags import DoubleDouble
+from gpbnb.arithmetic.rational import exact, rationals
+from gpbnb.filters.missing import real_numbers
+from gpbnb.filters.named import checked_name, checked_names, named, range_text, sized, whole_number
+from gpbnb.filters.opening import as_packed, widened_array
+from gpbnb.filters.program import AT_MOST, Program, advance, matrices
+from gpbnb.filters.sections import factored, repaired, scaled, sections_from_zeros
+from gpbnb.filters.structures import (
+    CASCADES,
+    DIRECT,
+    SUMS,
+    Controller,
+    Structure,
+    balanced,
+    cascade,
+    companion,
+    controller_structure,
+    expanded,
+    lattice,
+    sections_of,
+    smoother,
+    state_space_structure,
+    structure_named,
+    sum_structure,
+    transfer_function,
+)
+
+_TINY = 2.0**-700
+"""A decayed state below this becomes zero where its products would leave the range of float64."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFilter:
+    """A linear filter: the operations of a step, and its coefficients, exact.
+
+    Parameters
+    ----------
+    program : operations of a step.
+    coefficients : (c,), the exact design values; they are rounded when a format stores them.
+    name : name in tables.
+
+    Raises
+    ------
+    TypeError : a name that is not text.
+    ValueError : a program with products or quotients of values.
+    """
+
+    program: Program
+    coefficients: NDArray[Any]
+    name: str = "a linear filter"
+
+    def __post_init__(self) -> None:
+        checked_name(self.name)
+        if (self.program.operations[:, 0] > AT_MOST).any():
+            raise ValueError(
+                f"got {self.name} with products or quotients of values; needed sums, products with "
+                "coefficients, and limits"
+            )
+
+    def stored(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+        """Return the coefficients as a run in a format stores them, exact, (c,).
+
+        Stochastic rounding begins with its first random number, as in a run.
+        """
+        fmt.restart()
+        return np.asarray(fmt.array(self.coefficients).to_fractions(), dtype=object)
+
+    def packed(self, fmt: FloatFormat | FixedFormat) -> NDArray[Any]:
+        """Return the coefficients, rounded into a format, as the compiled loops expect them.
+
+        Raises
+        ------
+        OverflowError : a coefficient beyond the range of the format; the message names it.
+        """
+        try:
+            return as_packed(fmt, self.coefficients)
+        except OverflowError:
+            for name, value in zip(self.program.coefficient_names, self.coefficients, strict=False):
+                try:
+                    fmt.round(value)
+                except OverflowError as error:
+                    raise OverflowError(f"coefficient {name}: {error}") from None
+            raise
+
+
+def state_space(A: Any, B: Any, C: Any = None, D: Any = None, name: str = "a state-space filter") -> LinearFilter:
+    """Return a filter from its matrices; with C and D, outputs follow the states.
+
+    Raises
+    ------
+    ValueError : shapes that do not fit.
+    """
+    A, B = exact(A), exact(B)
+    n, m = B.shape
+    outputs = 0 if C is None else len(exact(C))
+    if A.shape != (n, n) or (C is not None and (exact(C).shape != (outputs, n) or exact(D).shape != (outputs, m))):
+        raise ValueError(
+            f"got A of shape {A.shape} and B of shape {B.shape}; needed (n, n) and (n, m), C (p, n), D (p, m)"
+        )
+    return _named(state_space_structure(A, B, *(() if C is None else (exact(C), exact(D)))), name)
+
+
+def biquad(b0: Any, b1: Any, b2: Any, a1: Any, a2: Any, name: str = "a second-order section") -> LinearFilter:
+    """Return a second-order section (b0 + b1/z + b2/z²)/(1 + a1/z + a2/z²), transposed form II; output is state 2."""
+    b, a = exact([b0, b1, b2]).tolist(), exact([a1, a2]).tolist()
+    return _named(cascade([(b, a)], "direct form II transposed"), name)
+
+
+def controller(leak: Any, Ki: Any, Kp: Any, Kd: Any, name: str = "a PID controller") -> LinearFilter:
+    """Return a PID controller whose integral decays by the factor `leak` per step; input is the error, output state 2.
+
+    With leak = 1 the integral keeps every rounding error, and there is no bound that holds for ever.
+    """
+    leak, Ki, Kp, Kd = exact([leak, Ki, Kp, Kd])
+    return _named(controller_structure(Controller(Kp, Ki, Kd, leak)), name)
+
+
+def _named(made: Structure, name: str) -> LinearFilter:
+    return LinearFilter(*made, name)
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class LinearSystem:
+    r"""A linear system with known inputs: :math:`x_{k+1} = Ax_k + Bu_k`, :math:`y_k = Cx_k + Du_k`.
+
+    Entries are stored exactly, as Fractions; numbers, strings and Decimals are read exactly.
+
+    Parameters
+    ----------
+    A : (n, n), transition matrix.
+    B : (n, m), input matrix.
+    C : (p, n), output matrix; by default the identity, so that the outputs are the states.
+    D : (p, m), feedthrough matrix; by default zero.
+    x0 : (n,), the first state; by default zeros.
+    name : name in tables and reports.
+    made : the program that computes a step, if it does not multiply by the matrices directly; see :meth:`from_filter`.
+    state_names, input_names, output_names : names of the n states, m inputs and p outputs, for messages, tables and
+        reports, each optionally with its unit, as in ``["speed (m/s)"]``; by default they are numbered.
+
+    Raises
+    ------
+    TypeError : an entry that is not a number, or a name that is not text.
+    ValueError : shapes that do not fit; NaN or infinity.
+
+    Examples
+    --------
+    Exponential smoothing that forgets a tenth in each step:
+
+    >>> system = LinearSystem([["0.9"]], [["0.1"]])
+    >>> system.n, system.m, system.p
+    (1, 1, 1)
+    """
+
+    A: NDArray[Any]
+    B: NDArray[Any]
+    C: NDArray[Any]
+    D: NDArray[Any]
+    x0: NDArray[Any]
+    name: str
+    made: LinearFilter | None
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
+
+    def __init__(
+        self,
+        A: Numbers,
+        B: Numbers,
+        C: Numbers | None = None,
+        D: Numbers | None = None,
+        x0: Numbers | None = None,
+        name: str = "a linear system",
+        made: LinearFilter | None = None,
+        state_names: Sequence[str] | None = None,
+        input_names: Sequence[str] | None = None,
+        output_names: Sequence[str] | None = None,
+    ) -> None:
+        given = (A, B, C, D, x0, name, made, state_names, input_names, output_names)
+        for each, value in zip(fields(self), given, strict=True):
+            object.__setattr__(self, each.name, value)
+        self._read()
+        for kind, count in (("state", self.n), ("input", self.m), ("output", self.p)):
+            names = checked_names(f"{kind}_names", getattr(self, f"{kind}_names"), count)
+            object.__setattr__(self, f"{kind}_names", names)
+
+    def __repr__(self) -> str:
+        """Describe the system in three lines: its sizes, and its matrices with the sizes of their entries."""
+        matrices = [
+            f"{letter} {getattr(self, letter).shape} {range_text(getattr(self, letter).flat)}"
+            for letter in ("A", "B", "C", "D", "x0")
+        ]
+        return (
+            f"LinearSystem {self.name!r}, {sized(self.n, 'state', self.state_names)}; "
+            f"{sized(self.m, 'input', self.input_names)}; {sized(self.p, 'output', self.output_names)}\n"
+            f"  {', '.join(matrices[:2])}\n  {', '.join(matrices[2:])}"
+        )
+
+    def _read(self) -> None:
+        checked_name(self.name)
+        for letter in ("A", "B", "C", "D", "x0"):
+            given = getattr(self, letter)
+            if given is None and letter in ("C", "D", "x0"):
+                n, m = self.A.shape[0], self.B.shape[1]
+                given = {
+                    "C": np.eye(n, dtype=int),
+                    "D": np.zeros((len(self.C) if letter == "D" else n, m), dtype=int),
+                    "x0": np.zeros(n, dtype=int),
+                }[letter]
+            try:
+                entries = exact(given)
+            except (TypeError, ValueError) as error:
+                raise type(error)(f"{letter}: {error}") from None
+            if letter != "x0" and (entries.ndim != 2 or not entries.size):
+                raise ValueError(f"got {letter} of shape {entries.shape}; needed a matrix")
+            entries.flags.writeable = False
+            object.__setattr__(self, letter, entries)
+        n, m, p = self.n, self.m, self.p
+        for letter, shape in (("A", (n, n)), ("B", (n, m)), ("C", (p, n)), ("D", (p, m)), ("x0", (n,))):
+            if getattr(self, letter).shape != shape:
+                raise ValueError(
+                    f"got {letter} of shape {getattr(self, letter).shape}; needed {shape}: A has {n} rows, B {m} "
+                    f"columns and C {p} rows"
+                )
+
+    @classmethod
+    def from_filter(cls, made: LinearFilter, x0: Any = None) -> LinearSystem:
+        """Return a system that a program computes; A, B, C and D are the exact matrices of the program.
+
+        Raises
+        ------
+        ValueError : the program has no states, or no outputs.
+        """
+        n = made.program.n - made.program.p
+        if not made.program.p or not n:
+            raise ValueError(f"got a program with {n} states and {made.program.p} outputs; needed at least one of each")
+        A, B = matrices(made.program, made.coefficients)
+        return cls(A[:n, :n], B[:n], A[n:, :n], B[n:], x0, made.name, made)
+
+    @classmethod
+    def from_coefficients(
+        cls,
+        b: Any,
+        a: Any = (1,),
+        structure: str = "direct form II transposed",
+        pairing: str = "nearest",
+        order: Any = "up",
+        name: str | None = None,
+    ) -> LinearSystem:
+        r"""Return a digital filter in a given structure from the coefficients of its transfer function.
+
+        .. math:: a_0 y_k = b_0 u_k + b_1 u_{k-1} + \dots - a_1 y_{k-1} - \dots
+
+        Parameters
+        ----------
+        b, a : b0 … bM and a0 … aN, as in ``scipy.signal``; both are divided by a0 first, exactly.
+        structure : one of :data:`gpbnb.filters.structures.STRUCTURES`, or "FIR" for a filter without feedback.
+        pairing, order : how the sections of a cascade are paired and ordered; see
+            :func:`gpbnb.filters.sections.factored`.
+        name : name in tables and reports; by default the structure.
+
+        Raises
+        ------
+        ValueError : there are no coefficients; ``a[0] = 0``; no coefficient belongs to a delayed input or output; the
+            structure is unknown, or the filter cannot be built in it.
+        TypeError : entries that are not numbers.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from gpbnb import BINARY16
+        >>> system = LinearSystem.from_coefficients([1], [1, "-0.9"], structure="direct form I")
+        >>> system.outputs(np.ones((3, 1)), BINARY16)[:, 0, 0].tolist()
+        [1.0, 1.900390625, 2.7109375]
+        """
+        top, bottom = transfer_function(b, a)
+        found = structure_named(structure)
+        if found in CASCADES:
+            made = cascade(factored(top, bottom, pairing, order), found.removeprefix("cascade of "))
+        elif found in DIRECT:
+            made = cascade([(top, bottom)], found)
+        elif found == "lattice":
+            made = lattice(top, bottom)
+        elif found == "FIR":
+            if bottom:
+                raise ValueError(f'got structure "FIR" and a of {len(bottom) + 1} coefficients; needed a = [1]')
+            made = cascade([(top, bottom)], "direct form I")
+        else:
+            A, B, C, D = companion(top, bottom)
+            made = state_space_structure(*(balanced((A, B, C, D)) if found == "balanced state space" else (A, B, C, D)))
+        return cls.from_filter(_named(made, found if name is None else name))
+
+    @classmethod
+    def from_sections(
+        cls,
+        sos: Any,
+        structure: str = "direct form II transposed",
+        pairing: str = "given",
+        order: Any = "given",
+        scale: bool = False,
+        name: str | None = None,
+    ) -> LinearSystem:
+        """Return a cascade of second-order sections, each in a direct form, or the whole filter in another structure.
+
+        Parameters
+        ----------
+        sos : (sections, 6), rows b0, b1, b2, a0, a1, a2, as in ``scipy.signal``.
+        structure : a direct form for each section; "lattice", "state space" or "balanced state space" for the filter as
+            a whole. For the whole filter in a direct form, multiply the sections, as ``scipy.signal.sos2tf`` does, and
+            use :meth:`from_coefficients`.
+        pairing, order : see :func:`gpbnb.filters.sections.repaired`; by default the sections stay as given.
+        scale : whether to multiply sections by powers of two, so that the numbers passed between sections stay within 1
+            for inputs within 1; see :func:`gpbnb.filters.sections.scaled`.
+        name : name in tables and reports; by default the structure.
+
+        Raises
+        ------
+        ValueError : a wrong shape, ``a0 = 0``, or an unknown structure, pairing or order; the message names the
+            section.
+        TypeError : entries that are not numbers.
+
+        Examples
+        --------
+        >>> from scipy import signal
+        >>> sos = signal.butter(4, 0.1, output="sos")
+        >>> LinearSystem.from_sections(sos, structure="direct form I").name
+        'cascade of direct form I'
+        """
+        sections = sections_of(sos)
+        found = structure_named(structure)
+        form = found.removeprefix("cascade of ")
+        if form not in DIRECT:
+            b, a = expanded(sections)
+            return cls.from_coefficients(b, a, found, name=name)
+        sections = repaired(sections, pairing, order)
+        if scale:
+            sections = scaled(sections, inner=form == "direct form II")
+        return cls.from_filter(_named(cascade(sections, form), f"cascade of {form}" if name is None else name))
+
+    @classmethod
+    def from_zeros(
+        cls, z: Any, p: Any, k: Any, structure: str = "cascade", pairing: str = "nearest", order: Any = "up"
+    ) -> LinearSystem:
+        """Return a digital filter in a given structure from its zeros, poles and gain, as in ``scipy.signal``.
+
+        Parameters
+        ----------
+        z, p, k : zeros, poles and gain; each complex number comes with its conjugate.
+        structure, pairing, order : as in :meth:`from_coefficients`.
+
+        Raises
+        ------
+        ValueError : a complex number without its conjugate; more zeros than poles; or for a reason given in
+            :meth:`from_coefficients`.
+        """
+        found = structure_named(structure)
+        sections = sections_from_zeros(z, p, k, pairing, order)
+        if found in CASCADES:
+            return cls.from_filter(_named(cascade(sections, found.removeprefix("cascade of ")), found))
+        b, a = expanded(sections)
+        return cls.from_coefficients(b, a, found)
+
+    @classmethod
+    def smoother(cls, alpha: Any, name: str = "exponential smoothing") -> LinearSystem:
+        """Return an exponential smoother, y ← y + α (u - y), that computes only one product in a step.
+
+        ``LinearSystem.from_coefficients([alpha], [1, alpha - 1])`` has the same transfer function but computes two
+        products.
+
+        Parameters
+        ----------
+        alpha : weight of a new input, between 0 and 2; the filter is not stable otherwise.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> system = LinearSystem.smoother("1/8")
+        >>> system.outputs(np.ones((2, 1)))[:, 0, 0].tolist()
+        [0.125, 0.234375]
+        """
+        return cls.from_filter(_named(smoother(exact([alpha])[0]), name))
+
+    @classmethod
+    def sum(
+        cls, count: int = 1, order: str = "pairwise", block: int = 32, running: bool = False, name: str | None = None
+    ) -> LinearSystem:
+        """Return a system that adds the inputs of each step in a given order.
+
+        Parameters
+        ----------
+        count : number of inputs in each step.
+        order : "left", "pairwise" or "blocked", as for :func:`gpbnb.arithmetic.linalg.matmul`; or "tree", which adds
+            neighbours level by level, as a parallel reduction does.
+        block : number of inputs in a block.
+        running : whether the sum of each step is added to the sum of all earlier steps, as a clock or an integrator
+            does.
+        name : name in tables and reports; by default the order.
+
+        Raises
+        ------
+        ValueError : an unknown order; `count` or `block` is not a whole number above 0; or there is a single input and
+            `running` is False.
+
+        Examples
+        --------
+        >>> from gpbnb import BINARY32
+        >>> clock = LinearSystem.sum(running=True)
+        >>> float(clock.outputs([["0.1"]] * 200, BINARY32)[-1, 0, 0])
+        20.00004005432129
+        """
+        count, block = whole_number("count", count), whole_number("block", block)
+        found = structure_named(order, SUMS)
+        if count == 1 and not running:
+            raise ValueError("got the sum of one input; needed at least two, or running=True")
+        made = sum_structure(count, found, block, running)
+        usual = "a running sum" if running else f"a {found} sum" if found != "left" else "a sum from left to right"
+        return cls.from_filter(_named(made, usual if name is None else name))
+
+    @classmethod
+    def pid(
+        cls,
+        Kp: Any,
+        Ki: Any,
+        Kd: Any = None,
+        leak: Any = 1,
+        limits: Any = None,
+        integral_limits: Any = None,
+        back_calculation: Any = None,
+        name: str | None = None,
+    ) -> LinearSystem:
+        r"""Return a PI or PID controller whose input is the control error e.
+
+        .. math::
+            i \leftarrow \lambda i + K_i e + K_b (y_{-1} - v_{-1}),\quad v = K_p e + i + K_d(e - e_{-1}),\quad
+            y = v \text{ limited}
+
+        Parameters
+        ----------
+        Kp, Ki, Kd : gains per step; without Kd, a PI controller.
+        leak : λ, the factor by which the integral decays in a step. With 1, it keeps every rounding error, and there is
+            no bound that holds for ever.
+        limits : lowest and highest output; by default none.
+        integral_limits : lowest and highest integral, one way to prevent windup; by default none.
+        back_calculation : :math:`K_b`, another way to prevent windup. The limiter changes the output by :math:`y_{-1} -
+            v_{-1}` in the last step, and :math:`K_b` times this change is added to the integral. This requires
+            `limits`.
+
+        Raises
+        ------
+        ValueError : limits that are not two numbers in ascending order; `back_calculation` without `limits`.
+        TypeError : entries that are not numbers.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> controller = LinearSystem.pid(2, "0.5", limits=(-3, 3))
+        >>> controller.outputs(np.ones((3, 1)))[:, 0, 0].tolist()
+        [2.5, 3.0, 3.0]
+        """
+        if back_calculation is not None and limits is None:
+            raise ValueError("got back_calculation without limits; needed limits=(low, high) of the output")
+        needed = exact([Kp, Ki, leak]).tolist()
+        given = Controller(
+            Kp=needed[0],
+            Ki=needed[1],
+            Kd=None if Kd is None else exact([Kd])[0],
+            leak=needed[2],
+            limits=_ascending("limits", limits),
+            integral_limits=_ascending("integral_limits", integral_limits),
+            back=None if back_calculation is None else exact([back_calculation])[0],
+        )
+        kind = "a PI controller" if Kd is None else "a PID controller"
+        return cls.from_filter(_named(controller_structure(given), kind if name is None else name))
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return int(self.A.shape[0])
+
+    @property
+    def m(self) -> int:
+        """Number of inputs."""
+        return int(self.B.shape[1])
+
+    @property
+    def p(self) -> int:
+        """Number of outputs."""
+        return int(self.C.shape[0])
+
+    def as_filter(self) -> LinearFilter:
+        """Return this system as the linear filter that a guarantee needs, in which the outputs follow the states."""
+        return self.made if self.made is not None else state_space(self.A, self.B, self.C, self.D, self.name)
+
+    def outputs(self, u: Any, fmt: FloatFormat | None = None) -> NDArray[np.float64]:
+        """Return the outputs of a run with every operation rounded to a format, or without a format in double-double.
+
+        Parameters
+        ----------
+        u : (steps, m), inputs; each is rounded into the format.
+
+        Returns
+        -------
+        y : (steps, p, 2), each output as a sum of two float64.
+
+        Notes
+        -----
+        Formats without a range run in float64. Where a response has decayed so far that a number would fall below
+        2**-960, states below 2**-700 become zero.
+
+        Raises
+        ------
+        OverflowError : a number leaves the range of float64 or of the format's compiled loops. The message names the
+            state or output, counted from 0, and the step, counted from 1.
+        """
+        out = np.ascontiguousarray(self._run(u, fmt)[:, self.n :])
+        return out if fmt is None else self._widened(out)
+
+    def states(self, u: Any, fmt: FloatFormat) -> NDArray[np.float64]:
+        """Return states and outputs after each step, (steps, n + p, 2), as :meth:`outputs` computes them.
+
+        Raises
+        ------
+        OverflowError : as for :meth:`outputs`.
+        """
+        return self._widened(self._run(u, fmt), 0)
+
+    def _run(self, u: Any, fmt: FloatFormat | None) -> NDArray[Any]:
+        """Return packed states and outputs after each step, (steps, n + p)."""
+        given, inputs = self.as_filter(), system_inputs(self, u)
+        start = np.concatenate([self.x0, exact([0] * self.p)])
+        if fmt is None:
+            tag: Any = DoubleDouble()
+            coefficients, z, x = (double_doubles(exact(each)) for each in (given.coefficients, inputs, start))
+        else:
+            tag = fmt.run_tag()
+            fmt.restart()
+            coefficients = given.packed(fmt)
+            try:
+                z = as_packed(fmt, inputs)
+            except OverflowError as error:
+                raise OverflowError(f"inputs: {error}") from None
+            x = as_packed(fmt, start)
+        program, first = given.program, x.copy()
+        out = _advanced(tag, program, coefficients, z, x)
+        if out is None:
+            place = self._overflow(tag, program, coefficients, z, first)
+            raise OverflowError(f"{place}: {self._beyond(fmt)}")
+        return out
+
+    def stored(self, fmt: FloatFormat | FixedFormat) -> tuple[NDArray[Any], ...]:
+        """Return the exact A, B, C and D that follow from the coefficients of the structure as a format stores them."""
+        made = self.as_filter()
+        A, B = matrices(made.program, made.stored(fmt))
+        return A[: self.n, : self.n], B[: self.n], A[self.n :, : self.n], B[self.n :]
+
+    def unstable(self, fmt: FloatFormat | FixedFormat | None = None) -> str:
+        """Return the reason why the system, as given or as stored in a format, is not stable; empty if both are stable.
+
+        The test is exact. A system with an eigenvalue of absolute value 1 counts as not stable.
+        """
+        if not is_stable(self.A):
+            return f"the system as given is not stable, since A has {_eigenvalue(self.A, self.state_names)}"
+        if fmt is not None and not is_stable(stored := self.stored(fmt)[0]):
+            growing = _eigenvalue(stored, self.state_names)
+            return f"the system is stable, but as stored in {fmt} it is not, since A has {growing}"
+        return ""
+
+    def _beyond(self, fmt: FloatFormat | None) -> str:
+        """Return why a number cannot be stored, and what to do about it."""
+        what = "a number beyond the range of float64"
+        if fmt is not None and (fmt.limits is not None or fmt.base == 10):
+            what = f"a number beyond the range of {fmt}"
+        if cause := self.unstable(fmt):
+            return f"got {what}; {cause}, so numbers grow without end; scaling delays that, no precision prevents it"
+        cure = "scale the numbers"
+        if fmt is not None and fmt.limits is not None:
+            cure += ", or use a format with a larger range"
+        elif fmt is not None and fmt.base != 10:
+            cure += ", or use base 10"
+        return f"got {what}; {cure}"
+
+    def _value(self, i: int) -> str:
+        """Name a state, or an output, which follow the states."""
+        if i < self.n:
+            return named("state", i, self.state_names)
+        return named("output", i - self.n, self.output_names)
+
+    def _overflow(self, tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> str:
+        """Return the first state or output that cannot be stored, and its step; `x` is the first state."""
+        for k in range(len(z)):
+            for i, value in enumerate(program.outputs):
+                count = max(value - len(x) - z.shape[1] + 1, 0)
+                operations = program.operations[:count]  # those that lead to this value
+                try:
+                    advance(
+                        tag,
+                        operations,
+                        np.minimum(program.outputs, value),
+                        coefficients[None],
+                        0,
+                        z[k : k + 1],
+                        x.copy(),
+                        np.empty((1, *x.shape), x.dtype),
+                    )
+                except OverflowError:
+                    return f"{self._value(i)} at step {k + 1}"
+            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[k : k + 1], x, x[None].copy())
+        return "the run"
+
+    def _widened(self, outputs: NDArray[Any], first: int | None = None) -> NDArray[np.float64]:
+        """Return packed outputs (steps, p) of any format, or states from the first, as pairs of float64."""
+        try:
+            return widened_array(outputs)
+        except OverflowError:
+            for k, i in np.ndindex(outputs.shape[:2]):
+                try:
+                    widened_array(outputs[k : k + 1, i : i + 1])
+                except OverflowError:
+                    place = self._value((self.n if first is None else first) + i)
+                    raise OverflowError(f"{place} at step {k + 1}: {self._beyond(None)}") from None
+            raise
+
+
+def _advanced(tag: Any, program: Program, coefficients: Any, z: Any, x: Any) -> NDArray[Any] | None:
+    """Take all steps from the state x; return the states, or None if a number is beyond the range of float64.
+
+    A number may be too small only because a state has decayed. Such a state becomes zero, and the run resumes.
+    """
+    out = np.zeros((len(z), *x.shape), x.dtype)
+    if x.dtype == np.float64:
+        out[:] = np.nan
+    done = 0
+    while True:
+        start = x.copy()
+        try:
+            advance(tag, program.operations, program.outputs, coefficients[None], 0, z[done:], x, out[done:])
+            return out
+        except OverflowError:
+            if x.dtype != np.float64:  # in base 10, nothing decays that far
+                return None
+        lost = np.isnan(out.reshape(len(out), -1)).any(axis=1)
+        at = int(np.argmax(lost))
+        x = out[at - 1].copy() if at > done else start
+        sizes = np.abs(x.reshape(len(x), -1)).max(axis=1)
+        tiny = (sizes > 0) & (sizes < _TINY)
+        if not tiny.any():
+            return None
+        x[tiny], done = 0.0, at
+
+
+def _ascending(name: str, given: Any) -> tuple[Fraction, Fraction] | None:
+    """Return a pair of limits, exact."""
+    if given is None:
+        return None
+    entries = exact(given)
+    if entries.shape != (2,) or not entries[0] < entries[1]:
+        raise ValueError(f"got {name}={given!r}; needed two numbers, the lower first")
+    return entries[0], entries[1]
+
+
+def system_inputs(system: LinearSystem, u: Any, steps: int | None = None) -> NDArray[Any]:
+    """Check the inputs of a system, (steps, m), and return them.
+
+    Raises
+    ------
+    ValueError, TypeError : a shape that does not fit; entries that are not numbers.
+    """
+    given = real_numbers(u)
+    if given.ndim != 2 or given.shape[1] != system.m or not len(given) or steps not in (None, len(given)):
+        column = "; write u.reshape(-1, 1)" if given.ndim == system.m == 1 else ""
+        raise ValueError(f"got inputs of shape {given.shape}; needed ({steps or 'steps'}, {system.m}){column}")
+    if given.dtype.kind != "f":
+        return exact(given)
+    for k, i in np.argwhere(~np.isfinite(given)):
+        which = named("input", int(i), system.input_names)
+        raise ValueError(f"got {given[k, i]} for {which} of step {k + 1}; needed a finite number: inputs are known")
+    return given
+
+
+def is_stable(A: NDArray[Any]) -> bool:
+    r"""Whether all eigenvalues of an exact matrix lie inside the unit circle, by the exact test of Schur and Cohn.
+
+    A polynomial p with the coefficients :math:`a_0 \dots a_n` is stable if :math:`|a_0| < |a_n|` and
+    :math:`(a_n\,p(x) - a_0\,x^n p(1/x))/x` is stable.
+    """
+    polynomial = rationals(A).charpoly()
+    p = [polynomial[i] for i in range(len(A) + 1)]
+    while len(p) > 1:
+        first, last = p[0], p[-1]
+        if not abs(first) < abs(last):
+            return False
+        share = first / last
+        p = [high - share * low for high, low in zip(p[1:], p[-2::-1], strict=True)]
+    return True
+
+
+def unobserved(Phi: NDArray[Any], H: NDArray[Any], names: tuple[str, ...] = ()) -> str:
+    """Return in words that no measurement observes a state which does not decay; empty if there is none.
+
+    The unobserved states are those that H Φᵏ maps to zero for every k; Φ maps them to each other. The test is exact.
+    """
+    n, rows = len(Phi), [H]
+    for _ in range(n - 1):
+        rows.append(rows[-1] @ Phi)
+    reduced, rank = rationals(np.concatenate(rows)).rref()
+    pivots = [next(j for j in range(n) if reduced[i, j]) for i in range(rank)]
+    free = [j for j in range(n) if j not in pivots]
+    if not free:
+        return ""
+    basis = np.full((n, len(free)), Fraction(0), dtype=object)
+    for at, j in enumerate(free):
+        basis[j, at] = Fraction(1)
+        for i, pivot in enumerate(pivots):
+            basis[pivot, at] = -Fraction(int(reduced[i, j].p), int(reduced[i, j].q))
+    moved = (Phi @ basis)[free]  # the coordinates in this basis are the free entries
+    if is_stable(moved):
+        return ""
+    return f"no measurement observes a part of the state that does not decay, with {_eigenvalue(moved, names, basis)}"
+
+
+def _eigenvalue(A: NDArray[Any], names: tuple[str, ...], basis: NDArray[Any] | None = None) -> str:
+    """Name the size of the largest eigenvalue of a matrix that is not stable, and the state that it moves most.
+
+    Parameters
+    ----------
+    names : names of the states; may be empty.
+    basis : (n, k), columns of which the rows of A are the coordinates; by default those of the states.
+    """
+    with np.errstate(all="ignore"):
+        entries = A.astype(np.float64)
+        if not np.isfinite(entries).all():
+            return "an eigenvalue of size 1 or more"
+        values, vectors = np.linalg.eig(entries)
+        largest = int(np.abs(values).argmax())
+        moved = np.abs(vectors[:, largest] if basis is None else basis.astype(np.float64) @ vectors[:, largest])
+    size = float(np.abs(values[largest]))
+    text = f"an eigenvalue of size {size:.6g}" if size > 1 + 1e-6 else "an eigenvalue of size 1 or more"
+    return f"{text}, mostly in {named('state', int(moved.argmax()), names)}"

@@ -1,0 +1,523 @@
+r"""Filters on a processor with integers: coefficients, data and sums in fixed-point formats of their own.
+
+A digital signal processor multiplies data by coefficients, adds the products in a long accumulator, and rounds a sum
+once, when it stores it. Which results stay in the accumulator follows from the program of the filter; see ``wide`` of
+:class:`gpbnb.filters.program.Program`. Each operation computes its exact result from integers and then
+
+1. rounds it to the fraction bits of the sums and applies their overflow;
+2. unless it stays there, rounds it to the fraction bits of the data and applies their overflow.
+
+Without an accumulator, only the second step remains, for each product and each sum. A limit, as of a controller's
+output, is stored in the format of the data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.kernels.compiling import compiled, inner
+from gpbnb.arithmetic.kernels.tags import Double
+from gpbnb.arithmetic.rational import exact
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.filters.program import ADD, AT_LEAST, MULTIPLY, SUBTRACT, Program, execute
+from gpbnb.filters.system import LinearFilter, LinearSystem, system_inputs
+
+_MODES = {
+    Rounding.NEAREST: 0,
+    Rounding.EVEN: 1,
+    Rounding.CHOP: 2,
+    Rounding.UP: 3,
+    Rounding.DOWN: 4,
+    Rounding.ODD: 5,
+}
+_NEAREST, _EVEN, _CHOP, _UP, _DOWN, _ODD = range(6)
+_POLICIES = ("raise", "saturate", "wrap")
+_RAISE, _SATURATE, _WRAP = range(3)
+_FITS = 62
+"""Bits of a product, or of a number of the data, without its sign, up to which compiled loops run."""
+_LONGEST_SUM = 63
+"""Bits of a sum without its sign up to which compiled loops run."""
+
+
+@dataclass(frozen=True)
+class WordFormats:
+    """Number formats for data, coefficients and sums in a fixed-point processor.
+
+    Parameters
+    ----------
+    data : format of inputs, states, outputs, and of each result that is stored.
+    coefficients : format of all coefficients; or a number of significant bits, where each coefficient has its own
+        binary point. By default the format of the data.
+    sums : format of the accumulator, with at least the fraction bits of the data; by default there is no accumulator,
+        and each product and each sum is stored in the format of the data.
+
+    Raises
+    ------
+    TypeError : a format that is not fixed point, or bits that are not a whole number.
+    ValueError : a number of bits below 1; stochastic rounding; sums with fewer fraction bits than the data.
+
+    Examples
+    --------
+    Coefficients in Q14, data in Q15, sums of 32 bits with one rounding when they are stored:
+
+    >>> from gpbnb import FixedFormat
+    >>> words = WordFormats(data=FixedFormat(0, 15), coefficients=FixedFormat(1, 14), sums=FixedFormat(2, 29))
+    >>> words.gap
+    14
+    """
+
+    data: FixedFormat
+    coefficients: FixedFormat | int | None = None
+    sums: FixedFormat | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.coefficients, int) and not isinstance(self.coefficients, bool):
+            if self.coefficients < 1:
+                raise ValueError(f"got {self.coefficients} bits for coefficients; needed at least 1")
+        elif self.coefficients is not None and not isinstance(self.coefficients, FixedFormat):
+            raise TypeError(f"got coefficients {self.coefficients!r}; needed a FixedFormat or a number of bits")
+        for name, fmt in (("data", self.data), ("sums", self.sums)):
+            if fmt is None and name == "sums":
+                continue
+            if not isinstance(fmt, FixedFormat):
+                raise TypeError(f"got {name} {fmt!r}; needed a FixedFormat")
+            if fmt.rounding is Rounding.STOCHASTIC:
+                raise ValueError(f"got stochastic rounding for the {name}; needed another rounding for integers")
+        if self.sums is not None and self.sums.fraction_bits < self.data.fraction_bits:
+            raise ValueError(
+                f"got sums with {self.sums.fraction_bits} fraction bits and data with {self.data.fraction_bits}; "
+                "needed at least as many for the sums"
+            )
+
+    @property
+    def accumulator(self) -> FixedFormat:
+        """The format in which products and sums are computed; the format of the data if there is no accumulator."""
+        return self.data if self.sums is None else self.sums
+
+    @property
+    def gap(self) -> int:
+        """Number of fraction bits that a sum loses when it is stored."""
+        return self.accumulator.fraction_bits - self.data.fraction_bits
+
+    def __str__(self) -> str:
+        def named(fmt: FixedFormat) -> str:
+            return f"{1 + fmt.precision} bits with {fmt.fraction_bits} after the point"
+
+        text = f"data of {named(self.data)}"
+        if isinstance(self.coefficients, FixedFormat):
+            text += f", coefficients of {named(self.coefficients)}"
+        elif self.coefficients is not None:
+            text += f", coefficients of {self.coefficients} significant bits"
+        return text + (f", sums of {named(self.sums)}" if self.sums is not None else "")
+
+
+class IntegerProgram(NamedTuple):
+    """A program on integers, in some formats of words.
+
+    Parameters
+    ----------
+    program : the operations.
+    words : the formats.
+    factors : (o,), integer of the coefficient of each product, and of each limit in units of the data; else 0.
+    shifts : (o,), fraction bits that a product loses on its way to the accumulator, negative if it gains some.
+    coefficients : (c,), exact value of each stored coefficient.
+    """
+
+    program: Program
+    words: WordFormats
+    factors: tuple[int, ...]
+    shifts: tuple[int, ...]
+    coefficients: NDArray[Any]
+
+    @property
+    def is_short(self) -> bool:
+        """Whether every integer fits in 64 bits, so that compiled loops run it."""
+        data, gap = self.words.data.precision, self.words.gap
+        sizes = [abs(each).bit_length() + data for each in self.factors]
+        products = [size + max(-shift, 0) for size, shift in zip(sizes, self.shifts, strict=True)]
+        most = max([data + gap, *products, *self.shifts])
+        return most <= _FITS and self.words.accumulator.precision <= _LONGEST_SUM
+
+
+def integer_program(made: LinearFilter, words: WordFormats) -> IntegerProgram:
+    """Store the coefficients of a filter in words.
+
+    Raises
+    ------
+    OverflowError : a coefficient beyond the range of its format; the message names it.
+    """
+    program = made.program
+    limits = {a for code, a, _ in program.operations.tolist() if code >= AT_LEAST}
+    stored = np.empty(len(made.coefficients), dtype=object)
+    for i, value in enumerate(made.coefficients):
+        fmt = words.data if i in limits else words.coefficients if words.coefficients is not None else words.data
+        try:
+            stored[i] = FloatFormat(2, fmt).round(value) if isinstance(fmt, int) else fmt.round(value)
+        except OverflowError:
+            name = program.coefficient_names[i] if program.coefficient_names else f"coefficient {i}"
+            raise OverflowError(
+                f"got {name} = {float(value):.6g}, beyond the range of {fmt}; needed coefficients with more integer "
+                "bits, or a number of significant bits"
+            ) from None
+    point, target = words.data.fraction_bits, words.accumulator.fraction_bits
+    factors, shifts = list[int](), list[int]()
+    for code, a, _ in program.operations.tolist():
+        if code == MULTIPLY:
+            shift = stored[a].denominator.bit_length() - 1
+            factors.append(stored[a].numerator)
+            shifts.append(shift + point - target)
+        else:
+            factors.append(int(stored[a] / words.data.unit) if code >= AT_LEAST else 0)
+            shifts.append(0)
+    return IntegerProgram(program, words, tuple(factors), tuple(shifts), stored)
+
+
+class IntegerRun(NamedTuple):
+    """States of a run on integers, and its outputs.
+
+    Parameters
+    ----------
+    states : (steps, n), integers in units of the data after each step, outputs last.
+    unit : the unit.
+    """
+
+    states: NDArray[Any]
+    unit: Fraction
+
+    def outputs(self, p: int) -> NDArray[np.float64]:
+        """Return the last p states as sums of two float64, (steps, p, 2)."""
+        integers, unit = self.states[:, len(self.states[0]) - p :], float(self.unit)
+        high = integers.astype(np.float64)
+        if integers.dtype == object:
+            low = np.vectorize(lambda n, h: float(int(n) - int(h)), otypes=[float])(integers, high)
+        else:
+            low = (integers - high.astype(np.int64)).astype(np.float64)
+        return np.stack([high * unit, low * unit], axis=-1)
+
+
+def run_words(given: LinearSystem | LinearFilter, u: Any, words: WordFormats, x0: Any = None) -> IntegerRun:
+    """Run a filter on integers.
+
+    Parameters
+    ----------
+    given : the filter; a system starts from its own x0.
+    u : (steps, m), inputs; each is rounded into the format of the data.
+    x0 : (n,), the first state of a filter, with its outputs; by default zeros.
+
+    Raises
+    ------
+    OverflowError : a result overflows in a format that neither saturates nor wraps; the message names operation and
+        step. Or a coefficient or an input beyond its range.
+    """
+    if isinstance(given, LinearSystem):
+        start = np.concatenate([given.x0, exact([0] * given.p)])
+        u, given = system_inputs(given, u), given.as_filter()
+    else:
+        start = exact([0] * given.program.n if x0 is None else x0)
+    made = integer_program(given, words)
+    data = words.data
+    return IntegerRun(run_integers(made, integers_of(u, data), integers_of(start[None], data)[0]), data.unit)
+
+
+def integers_of(values: Any, fmt: FixedFormat) -> NDArray[Any]:
+    """Round numbers into a format, and return them in its units, as int64, or as Python integers if those are longer.
+
+    Raises
+    ------
+    OverflowError : a number beyond the range of a format that neither saturates nor wraps.
+    """
+    given = np.asarray(values)
+    if given.dtype.kind == "f" and fmt.precision <= 52 and -900 < fmt.fraction_bits < 900:
+        scaled = given.astype(np.float64) * 2.0**fmt.fraction_bits
+        low = np.floor(scaled)
+        if np.abs(low).max(initial=0.0) < 2.0**52:
+            found = low.astype(np.int64) + _rounded_up(low, scaled - low, fmt.rounding)
+            if fmt.overflow == "saturate":
+                return np.clip(found, int(fmt.lowest / fmt.unit), int(fmt.largest / fmt.unit))
+            if (found >= int(fmt.lowest / fmt.unit)).all() and (found <= int(fmt.largest / fmt.unit)).all():
+                return found
+    stored = fmt.array(exact(given)).to_fractions()
+    counts = [int(each / fmt.unit) for each in np.ravel(stored)]
+    return np.array(counts, dtype=np.int64 if fmt.precision <= _FITS else object).reshape(given.shape)
+
+
+def _rounded_up(low: NDArray[np.float64], rest: NDArray[np.float64], rounding: Rounding) -> NDArray[np.int64]:
+    """Return 1 where a number rounds up, and 0 elsewhere."""
+    if rounding is Rounding.NEAREST:
+        up = (rest > 0.5) | ((rest == 0.5) & (low >= 0))
+    elif rounding is Rounding.EVEN:
+        up = (rest > 0.5) | ((rest == 0.5) & (low % 2 == 1))
+    elif rounding is Rounding.CHOP:
+        up = (rest > 0) & (low < 0)
+    elif rounding is Rounding.ODD:
+        up = (rest > 0) & (low % 2 == 0)
+    else:
+        up = (rest > 0) & (rounding is Rounding.UP)
+    return np.asarray(up, dtype=np.int64)
+
+
+def largest_values(made: LinearFilter, u: NDArray[np.float64], start: Any = None) -> NDArray[np.float64]:
+    """Return the largest size of each value in a run in float64, (n + m + o,).
+
+    Parameters
+    ----------
+    u : (steps, m). start : (n,), the first state; by default zeros.
+    """
+    program = made.program
+    x = np.zeros(program.n) if start is None else np.array(start, dtype=np.float64)
+    coefficients = made.coefficients.astype(np.float64)
+    return np.asarray(_sizes(program.operations, program.outputs, coefficients, x, np.ascontiguousarray(u)))
+
+
+@compiled
+def _sizes(operations: Any, outputs: Any, coefficients: Any, x: Any, u: Any) -> Any:
+    n, m = x.shape[0], u.shape[1]
+    values = np.empty(n + m + operations.shape[0])
+    sizes = np.zeros_like(values)
+    for k in range(u.shape[0]):
+        execute(Double(), operations, outputs, coefficients, x, u[k], values)
+        for i in range(len(values)):
+            sizes[i] = max(sizes[i], abs(values[i]))
+    for i in range(n):
+        sizes[i] = max(sizes[i], abs(x[i]))
+    return sizes
+
+
+# -- the loops --------------------------------------------------------------------------------------------------------
+
+
+class _Store(NamedTuple):
+    """How a format stores an integer; `spare` is 64 less the bits of its word."""
+
+    mode: int
+    policy: int
+    low: int
+    high: int
+    spare: int
+
+
+def _store(fmt: FixedFormat) -> _Store:
+    low, high = int(fmt.lowest / fmt.unit), int(fmt.largest / fmt.unit)
+    return _Store(_MODES[fmt.rounding], _POLICIES.index(fmt.overflow), low, high, 63 - fmt.precision)
+
+
+class _Code(NamedTuple):
+    """A program on 64-bit integers, as the compiled loops take it."""
+
+    operations: NDArray[np.int64]
+    factors: NDArray[np.int64]
+    shifts: NDArray[np.int64]
+    wide: NDArray[np.bool_]
+    outputs: NDArray[np.int64]
+    data: _Store
+    sums: _Store
+    gap: int
+    accumulates: bool
+
+
+def _code(made: IntegerProgram) -> _Code:
+    program, words = made.program, made.words
+    return _Code(
+        program.operations,
+        np.array(made.factors, np.int64),
+        np.array(made.shifts, np.int64),
+        program.wide,
+        program.outputs,
+        _store(words.data),
+        _store(words.accumulator),
+        words.gap,
+        words.sums is not None,
+    )
+
+
+def run_integers(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> NDArray[Any]:
+    """Run a program on integers; return the states after each step, (steps, n).
+
+    Parameters
+    ----------
+    u, x : (steps, m) and (n,), inputs and first state in units of the data.
+
+    Raises
+    ------
+    OverflowError : a result overflows in a format that neither saturates nor wraps.
+    """
+    if made.is_short and u.dtype != object and x.dtype != object:
+        states = np.zeros((len(u), made.program.n), np.int64)
+        step, operation = _advance(_code(made), x.astype(np.int64), u, states)
+    else:
+        states, step, operation = _advance_in_python(made, u, x)
+    if step >= 0:
+        code = made.program.operations[operation, 0]
+        kind = "a product" if code == MULTIPLY else "a sum"
+        raise OverflowError(
+            f"overflow in {kind}, operation {operation + 1} of {len(made.program.operations)}, at step {step + 1}"
+        )
+    return states
+
+
+def successors(
+    made: IntegerProgram, u: NDArray[np.int64], low: NDArray[np.int64], counts: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return, for each state in a box of integers, the number of the state that follows it, (states,).
+
+    States are numbered like the entries of an array of the shape `counts`. A state that leaves the box, or overflows in
+    a format that neither saturates nor wraps, has the successor -1.
+
+    Parameters
+    ----------
+    u : (m,), the constant input in units of the data.
+    low, counts : (n,), the lowest integer and the number of integers of each state. A state with a count of 0 is never
+        read; it counts as one integer, and its own value does not matter.
+
+    Raises
+    ------
+    ValueError : words too long for compiled loops.
+    """
+    if not made.is_short:
+        raise ValueError(f"got words too long for compiled loops: {made.words}; needed products of up to {_FITS} bits")
+    found = np.empty(int(np.maximum(counts, 1).prod()), np.int64)
+    _follow(_code(made), u.reshape(1, -1), low, counts, found)
+    return found
+
+
+@compiled
+def _follow(code: Any, u: Any, low: Any, counts: Any, found: Any) -> None:
+    n = low.shape[0]
+    x, states = np.empty(n, np.int64), np.empty((1, n), np.int64)
+    for number in range(found.shape[0]):
+        rest = number
+        for i in range(n - 1, -1, -1):
+            size = max(counts[i], 1)
+            x[i] = low[i] + rest % size
+            rest //= size
+        step, _ = _advance(code, x, u, states)
+        following = 0 if step < 0 else -1
+        for i in range(n):
+            at = states[0, i] - low[i] if counts[i] > 0 else 0
+            size = max(counts[i], 1)
+            if following >= 0:
+                following = following * size + at if 0 <= at < size else -1
+        found[number] = following
+
+
+@inner
+def _shifted(n: int, shift: int, mode: int) -> int:
+    """Return n / 2**shift, rounded."""
+    if shift <= 0:
+        return n << -shift
+    m = n >> shift
+    rest, unit = n - (m << shift), 1 << shift
+    if rest == 0 or mode == _DOWN:
+        return m
+    if mode == _NEAREST:
+        up = 2 * rest > unit or (2 * rest == unit and n > 0)
+    elif mode == _EVEN:
+        up = 2 * rest > unit or (2 * rest == unit and m % 2 == 1)
+    elif mode == _ODD:
+        up = m % 2 == 0
+    else:
+        up = mode == _UP or n < 0
+    return m + 1 if up else m
+
+
+@inner
+def _kept(n: int, over: int, store: Any) -> Any:
+    """Return an integer as a format keeps it, and whether it must not; `over` is the sign of a lost 64-bit overflow."""
+    if over == 0 and store.low <= n <= store.high:
+        return n, False
+    if store.policy == _SATURATE:
+        return (store.high if over > 0 or (over == 0 and n > 0) else store.low), False
+    if store.policy == _WRAP:
+        return (n << store.spare) >> store.spare, False
+    return n, True
+
+
+@compiled
+def _advance(code: Any, x: Any, u: Any, states: Any) -> Any:
+    """Take a step with each row of u; return the step and the operation of an overflow, or -1 for each."""
+    operations, factors, shifts, wide, outputs, data, sums, gap, accumulates = code
+    n, m, count = x.shape[0], u.shape[1], operations.shape[0]
+    values = np.zeros(n + m + count, np.int64)
+    bad = False
+    for k in range(u.shape[0]):
+        for i in range(n):
+            values[i] = x[i]
+        for i in range(m):
+            values[n + i] = u[k, i]
+        for o in range(count):
+            kind, a, b = operations[o, 0], operations[o, 1], operations[o, 2]
+            right, over = values[b], 0
+            if kind == MULTIPLY:
+                value = _shifted(factors[o] * right, shifts[o], sums.mode)
+            elif kind in (ADD, SUBTRACT):
+                left = values[a]
+                if a < n + m or not wide[a - n - m]:
+                    left <<= gap
+                if b < n + m or not wide[b - n - m]:
+                    right <<= gap
+                value = left + right if kind == ADD else left - right
+                same = (left ^ right) >= 0 if kind == ADD else (left ^ right) < 0
+                if same and (value ^ left) < 0:
+                    over = 1 if left >= 0 else -1
+            else:
+                beyond = right < factors[o] if kind == AT_LEAST else right > factors[o]
+                values[n + m + o] = factors[o] if beyond else right
+                continue
+            value, bad = _kept(value, over, sums)
+            if accumulates and not bad and not wide[o]:
+                value, bad = _kept(_shifted(value, gap, data.mode), 0, data)
+            if bad:
+                return k, o
+            values[n + m + o] = value
+        for i in range(n):
+            x[i] = values[outputs[i]]
+            states[k, i] = x[i]
+    return -1, -1
+
+
+def _kept_in_python(n: int, store: _Store) -> tuple[int, bool]:
+    if store.low <= n <= store.high:
+        return n, False
+    if store.policy == _SATURATE:
+        return (store.high if n > 0 else store.low), False
+    if store.policy == _WRAP:
+        return (n - store.low) % (store.high - store.low + 1) + store.low, False
+    return n, True
+
+
+def _advance_in_python(made: IntegerProgram, u: NDArray[Any], x: NDArray[Any]) -> tuple[NDArray[Any], int, int]:
+    """Run on Python's integers, of any length; see :func:`_advance`."""
+    data, sums = _store(made.words.data), _store(made.words.accumulator)
+    program, gap, first = made.program, made.words.gap, made.program.n + made.program.m
+    shifted, kept = _shifted.py_func, _kept_in_python
+    states = np.zeros((len(u), program.n), object)
+    state = [int(each) for each in x]
+    lift = [gap] * first + [0 if each else gap for each in program.wide.tolist()]
+    for k, row in enumerate(u.tolist()):
+        values = [*state, *map(int, row)]
+        for o, (code, a, b) in enumerate(program.operations.tolist()):
+            factor = made.factors[o]
+            if code >= AT_LEAST:
+                values.append(max(factor, values[b]) if code == AT_LEAST else min(factor, values[b]))
+                continue
+            if code == MULTIPLY:
+                value = shifted(factor * values[b], made.shifts[o], sums.mode)
+            else:
+                left, right = values[a] << lift[a], values[b] << lift[b]
+                value = left + right if code == ADD else left - right
+            value, bad = kept(value, sums)
+            if made.words.sums is not None and not bad and not program.wide[o]:
+                value, bad = kept(shifted(value, gap, data.mode), data)
+            if bad:
+                return states, k, o
+            values.append(value)
+        state = [values[i] for i in program.outputs.tolist()]
+        states[k] = state
+    return states, -1, -1

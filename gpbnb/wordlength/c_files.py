@@ -1,0 +1,236 @@
+"""The files of a filter in C: header, source, test with its vectors, and Makefile."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.wordlength.c_source import CodeNumbers, CodeSource, CodeStep
+
+FLAGS = "-std=c99 -Wall -Wextra -pedantic -ffp-contract=off"
+"""Flags under which the code compiles without a warning and has the digits of the emulation."""
+
+
+class Described(NamedTuple):
+    """What a header says about a filter.
+
+    Parameters
+    ----------
+    title, structure, fmt : name, structure or form, and format, in words.
+    bound : what is proven about its errors, in words; may be empty.
+    floating : whether it computes in floating point.
+    """
+
+    title: str
+    structure: str
+    fmt: str
+    bound: str
+    floating: bool
+
+
+class Vectors(NamedTuple):
+    """Inputs of some steps, and what the emulation makes of them, as float64 or as integers in units of the data.
+
+    Parameters
+    ----------
+    inputs : (steps, m), as stored.
+    states : (steps, n), states after each step, outputs last; a step in which the emulation ends keeps them.
+    status : (steps,), 0 if all is well, 1 if a variance is not positive for the first time, -1 after that, -2 if the
+        emulation ends.
+    """
+
+    inputs: NDArray[Any]
+    states: NDArray[Any]
+    status: NDArray[np.int64]
+
+
+def written_files(
+    step: CodeStep, arithmetic: CodeNumbers, name: str, described: Described, vectors: Vectors
+) -> dict[str, str]:
+    """Return the text of each file by its name."""
+    source = CodeSource(step, arithmetic, name)
+    return {
+        f"{name}.h": _header(source, described),
+        f"{name}.c": _source(source, described),
+        f"test_{name}.c": _test(source, described),
+        f"{name}_vectors.txt": _vectors(source, vectors),
+        "Makefile": _makefile(name),
+    }
+
+
+def _comment(*paragraphs: str) -> str:
+    """Return a comment; texts that could end it are changed."""
+    lines = list[str]()
+    for each in filter(None, paragraphs):
+        text = " ".join(each.replace("*/", "* /").replace("/*", "/ *").replace("??/", "?? /").split())
+        plain = "".join(c if 32 <= ord(c) < 127 else "?" for c in text)
+        lines += [*([""] if lines else []), *textwrap.wrap(plain, 110, break_on_hyphens=False)]
+    return "\n".join(["/*", *(f" * {line}".rstrip().rstrip("\\") for line in lines), " */", ""])
+
+
+def _header(source: CodeSource, described: Described) -> str:
+    name, guard = source.name, f"{source.name.upper()}_H"
+    order = (
+        "Each statement of the step is one operation, rounded once, in the order in which gpbnb emulates the filter "
+        "and bounds its errors. Compilers keep this order unless told otherwise"
+    )
+    flags = (
+        f"{order}: compile with -ffp-contract=off, and never with -ffast-math." if described.floating else f"{order}."
+    )
+    what = dict.fromkeys(each for each in (described.title, described.structure) if each)
+    program, statuses = source.step.program, source.statuses
+    paragraphs = _comment(f"{', '.join(what)}, in {described.fmt}. Written by gpbnb.", flags, described.bound)
+    values = ",\n".join(f"    {status.name} = {status.value}" for status in statuses)
+    meanings = "\n".join(f" * {status.name}: {status.meaning}." for status in statuses)
+    takes = f"input: {program.m}" + (f"; output: {program.p}" if program.p else "; the estimate is in the state")
+    include = "" if described.floating else "#include <stdint.h>\n\n"
+    return f"""{paragraphs}
+#ifndef {guard}
+#define {guard}
+
+{include}typedef {source.arithmetic.number} {name}_number;
+
+{source.structure()}
+
+enum {{
+{values}
+}};
+
+/* Set the first state. */
+void {name}_start({name}_state *state);
+
+/*
+ * Take a step ({takes}). Return one of:
+{meanings}
+ */
+{source.prototype};
+
+#endif
+"""
+
+
+_KEPT = """#include <float.h>
+#include <math.h>
+
+#if defined FLT_EVAL_METHOD && FLT_EVAL_METHOD != 0
+#error "This processor rounds to more digits than the type has; use another mode, such as -msse2 -mfpmath=sse."
+#endif
+#if defined __FAST_MATH__ && !defined {guard}
+#error "-ffast-math changes the order of operations; define {guard} to compile anyway."
+#endif
+#ifdef __clang__
+#pragma STDC FP_CONTRACT OFF
+#endif
+"""
+
+
+def _source(source: CodeSource, described: Described) -> str:
+    function, used = source.function()
+    constants = source.constants(used)
+    includes = _KEPT.format(guard=f"{source.name.upper()}_FAST_MATH") if described.floating else ""
+    helpers = source.arithmetic.helpers(function)
+    parts = [f'#include "{source.name}.h"', includes, constants, helpers, source.start(), function]
+    return "\n".join(f"{part.rstrip()}\n" for part in parts if part)
+
+
+def _test(source: CodeSource, described: Described) -> str:
+    name, program = source.name, source.step.program
+    number = f"{name}_number"
+    fields = [f"&state.{place}" for place in source.states] + [f"&output[{i}]" for i in range(program.p)]
+    listed = "\n".join(textwrap.wrap(", ".join(fields), 100, initial_indent=" " * 8, subsequent_indent=" " * 8))
+    if described.floating:
+        read = f'"%{"l" if source.arithmetic.number == "double" else ""}f"'
+        variable, convert, same = number, "value", "a == b && !signbit(a) == !signbit(b)"
+        include = "#include <math.h>\n"
+    else:
+        read, variable, convert, same, include = '"%" SCNd64', "int64_t", f"({number})value", "a == b", ""
+        include = "#include <inttypes.h>\n"
+    output = f"    {number} output[{program.p}] = {{0}};\n" if program.p else ""
+    passed = ", output" if program.p else ""
+    return f"""/* Compare {name}.c with the test vectors of its emulation, bit for bit. */
+{include}#include <stdio.h>
+
+#include "{name}.h"
+
+static int same({number} a, {number} b)
+{{
+    return {same};
+}}
+
+static int read_number(FILE *file, {number} *found)
+{{
+    {variable} value;
+    if (fscanf(file, {read}, &value) != 1)
+        return 0;
+    *found = {convert};
+    return 1;
+}}
+
+int main(int count, char **arguments)
+{{
+    FILE *file = fopen(count > 1 ? arguments[1] : "{name}_vectors.txt", "r");
+    {name}_state state;
+    {number} input[{program.m}], expected;
+{output}    const {number} *const found[] = {{
+{listed}
+    }};
+    int status, returned, i;
+    long step = 0;
+
+    if (!file) {{
+        fprintf(stderr, "no test vectors\\n");
+        return 2;
+    }}
+    {name}_start(&state);
+    while (fscanf(file, "%d", &status) == 1) {{
+        step++;
+        for (i = 0; i < {program.m}; i++)
+            if (!read_number(file, &input[i]))
+                return 2;
+        returned = {name}_step(&state, input{passed});
+        if (status == -2 ? returned < 2 : status == -1 ? returned > 1 : returned != status) {{
+            fprintf(stderr, "step %ld: status %d\\n", step, returned);
+            return 1;
+        }}
+        for (i = 0; i < {program.n}; i++) {{
+            if (!read_number(file, &expected))
+                return 2;
+            if (!same(*found[i], expected)) {{
+                fprintf(stderr, "step %ld: number %d differs\\n", step, i);
+                return 1;
+            }}
+        }}
+    }}
+    fclose(file);
+    printf("%ld steps with the digits of the emulation\\n", step);
+    return step == 0;
+}}
+"""
+
+
+def _vectors(source: CodeSource, vectors: Vectors) -> str:
+    """Return a line for each step: status, inputs, states and outputs."""
+    rows = zip(*(each.tolist() for each in vectors), strict=True)
+    text = source.arithmetic.vector_text
+    lines = [" ".join([str(status), *map(text, [*inputs, *states])]) for inputs, states, status in rows]
+    return "\n".join([*lines, ""])
+
+
+def _makefile(name: str) -> str:
+    return f"""CC = cc
+CFLAGS = {FLAGS} -O2
+
+test: test_{name}
+	./test_{name} {name}_vectors.txt
+
+test_{name}: test_{name}.c {name}.c {name}.h
+	$(CC) $(CFLAGS) -o $@ test_{name}.c {name}.c
+
+clean:
+	rm -f test_{name}
+
+.PHONY: test clean
+"""

@@ -1,0 +1,372 @@
+"""C99 code of a filter that agrees with the emulation digit for digit: source, test vectors and a Makefile.
+
+The statements are those of the list of operations that is emulated and bounded, see :mod:`gpbnb.filters.program` and
+:mod:`gpbnb.filters.tracing`, one for each operation, in the same order. So what is computed about a filter holds for
+the code, if the compiler keeps the order and rounds each operation, as C99 demands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import lcm
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BINARY32, BINARY64, format_text, rounding_text
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guarantee import check_limits, guarantee
+from gpbnb.bounds.system import output_errors
+from gpbnb.bounds.words import WordGuarantee
+from gpbnb.caching import replace_file
+from gpbnb.filters.design import FilterDesign
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import compiled_form
+from gpbnb.filters.run import Run
+from gpbnb.filters.settled import settled_filter
+from gpbnb.filters.simulation import simulated_measurements
+from gpbnb.filters.system import LinearSystem, system_inputs
+from gpbnb.filters.tracing import kalman_program, without_exact
+from gpbnb.filters.words import WordFormats, integer_program, integers_of, run_words
+from gpbnb.wordlength.c_files import Described, Vectors, written_files
+from gpbnb.wordlength.c_source import CodeFloats, CodeNumbers, CodeStep, checked_identifier, word_arithmetic
+
+CONSTANT_GAIN = "constant gain"
+"""Name of the form of a Kalman filter whose gain is the one that it approaches."""
+
+VECTORS = 100
+"""Steps of the test vectors."""
+
+Filter = LinearSystem | LinearModel | FilterDesign
+"""What code is written for."""
+
+AnyFormat = FloatFormat | FixedFormat | WordFormats
+"""Formats that may have types in C."""
+
+
+class Prepared(NamedTuple):
+    """A filter with what is needed to write its code.
+
+    Parameters
+    ----------
+    step, arithmetic : its operations, and how they are written.
+    title : what it is. structure : its structure or form.
+    emulate : function that returns the vectors for inputs, (steps, m).
+    inputs : function that returns inputs for a number of steps.
+    bound : function that returns what is proven about the errors, in words, for limits.
+    """
+
+    step: CodeStep
+    arithmetic: CodeNumbers
+    title: str
+    structure: str
+    emulate: Callable[[Any], Vectors]
+    inputs: Callable[[int], NDArray[np.float64]]
+    bound: Callable[[FilterLimits], str]
+
+
+def write_code(
+    given: Filter,
+    fmt: AnyFormat,
+    form_or_structure: Form | str | None,
+    folder: str | Path,
+    name: str = "filter",
+    inputs: Any = None,
+    within: FilterLimits | None = None,
+    structure: str | None = None,
+) -> tuple[Path, ...]:
+    """Write a filter as C99 without dependencies; its results agree with the emulation digit for digit.
+
+    Parameters
+    ----------
+    given : a linear system in its structure, a design, or a model of a Kalman filter.
+    fmt : BINARY32 or BINARY64; fixed point of at most 64 bits; or a :class:`~gpbnb.filters.words.WordFormats`.
+    form_or_structure : for a design, its structure; for a Kalman filter, a form with compiled loops, or "constant
+        gain"; None for a linear system, which already has a structure, or for the default.
+    folder : folder for the files, which is created if necessary.
+    name : name of the files, and prefix of all that the header declares.
+    inputs : (steps, m), inputs or measurements of the test vectors; by default 100 steps of noise, or of simulated
+        measurements.
+    within : limits from :func:`gpbnb.bounds.guarantee.limits`; the header states the error bound that holds
+        within them.
+    structure : the name of the structure of a linear system in the header; by default the header names none.
+
+    Returns
+    -------
+    paths : header, source, test, test vectors and Makefile.
+
+    Raises
+    ------
+    TypeError : `given` or `fmt` is of another type.
+    ValueError : a format without a type in C99; a structure or form that the filter does not have; a model with known
+        inputs; inputs that do not fit; a name that is not an identifier in C.
+    OverflowError : a coefficient or an initial state is beyond the range of the format.
+    OSError : a file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from gpbnb import BINARY32, LinearSystem
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paths = write_code(LinearSystem.smoother("1/8"), BINARY32, None, folder)
+    ...     print(*(path.name for path in paths))
+    filter.h filter.c test_filter.c filter_vectors.txt Makefile
+    """
+    checked_identifier(name)
+    found = prepared(given, fmt, form_or_structure)
+    vectors = found.emulate(found.inputs(VECTORS) if inputs is None else inputs)
+    bound = found.bound(within) if within is not None else ""
+    described = Described(
+        found.title, structure or found.structure, format_words(fmt), bound, isinstance(fmt, FloatFormat)
+    )
+    files = written_files(found.step, found.arithmetic, name, described, vectors)
+    target = Path(folder)
+    target.mkdir(parents=True, exist_ok=True)
+    for file, text in files.items():
+        replace_file(target / file, text.encode())
+    return tuple(target / file for file in files)
+
+
+def prepared(given: Filter, fmt: AnyFormat, form_or_structure: Form | str | None) -> Prepared:
+    """Return a filter with what is needed to write its code; for the arguments, see :func:`write_code`."""
+    if isinstance(given, LinearModel):
+        if form_or_structure == CONSTANT_GAIN:
+            found = _of_system(settled_filter(given), fmt, CONSTANT_GAIN)
+            return found._replace(inputs=lambda steps: simulated_measurements(given, steps), title=given.name)
+        return _of_model(given, fmt, Form.INNOVATION if form_or_structure is None else form_or_structure)
+    if isinstance(given, FilterDesign):
+        structure = None if form_or_structure is None else str(form_or_structure)
+        return _of_system(given.system(structure), fmt, given.usual if structure is None else structure)
+    if not isinstance(given, LinearSystem):
+        raise TypeError(f"got a {type(given).__name__}; needed a LinearSystem, a FilterDesign or a LinearModel")
+    if form_or_structure is not None:
+        raise ValueError(
+            f"got {form_or_structure!r} for a LinearSystem, which has its structure; needed None; choose the structure "
+            "in LinearSystem.from_coefficients or from_sections"
+        )
+    return _of_system(given, fmt, "")
+
+
+def format_words(fmt: AnyFormat) -> str:
+    """Describe a format for a header, with its rounding and what happens to overflows."""
+    if isinstance(fmt, FloatFormat):
+        return format_text(fmt)
+    words = _words(fmt)
+    text = f"fixed point, data of {_word(words.data)}; a number n stands for n / 2**{words.data.fraction_bits}"
+    if isinstance(words.coefficients, FixedFormat) and words.coefficients != words.data:
+        text += f"; coefficients of {_word(words.coefficients)}"
+    elif isinstance(words.coefficients, int):
+        text += f"; coefficients of {words.coefficients} significant bits"
+    return text if words.sums is None else f"{text}; sums of {_word(words.sums)}"
+
+
+def _word(fmt: FixedFormat) -> str:
+    overflow = {"raise": "which must not overflow", "saturate": "saturated", "wrap": "wrapped around"}[fmt.overflow]
+    rounding = "ties away from zero" if fmt.rounding is Rounding.NEAREST else rounding_text(fmt.rounding)
+    return f"{1 + fmt.precision} bits with {fmt.fraction_bits} after the point ({rounding}, {overflow})"
+
+
+def _type_of(fmt: Any) -> str:
+    """Return the type of a floating-point format in C.
+
+    Raises
+    ------
+    ValueError : it has none.
+    """
+    if fmt == BINARY32:
+        return "float"
+    if fmt == BINARY64:
+        return "double"
+    cure = "BINARY32 or BINARY64"
+    if fmt.base == 2 and fmt.precision in (24, 53):
+        cure = f"BINARY{32 if fmt.precision == 24 else 64}, which rounds ties to even and has a range"
+    elif fmt.base == 2 and fmt.precision < 53:
+        cure = f"BINARY{32 if fmt.precision < 24 else 64}, which has more digits"
+    raise ValueError(f"got {format_text(fmt)}, for which C99 has no type; needed {cure}, or fixed point")
+
+
+def _words(fmt: FixedFormat | WordFormats) -> WordFormats:
+    words = WordFormats(fmt) if isinstance(fmt, FixedFormat) else fmt
+    for each in (words.data, words.accumulator, words.coefficients):
+        if isinstance(each, FixedFormat) and each.rounding is Rounding.STOCHASTIC:
+            raise ValueError("got stochastic rounding; needed a rounding that code can repeat")
+    return words
+
+
+def _checked(fmt: Any) -> None:
+    if not isinstance(fmt, (FloatFormat, FixedFormat, WordFormats)):
+        raise TypeError(f"got the format {fmt!r}; needed BINARY32, BINARY64, a FixedFormat or WordFormats")
+
+
+# -- linear systems ---------------------------------------------------------------------------------------------------
+
+
+def _of_system(system: LinearSystem, fmt: AnyFormat, structure: str) -> Prepared:
+    _checked(fmt)
+    made = system.as_filter()
+    arithmetic: CodeNumbers
+    if isinstance(fmt, FloatFormat):
+        arithmetic = CodeFloats(_type_of(fmt))
+        stored = made.stored(fmt)[None]
+        start = np.asarray(fmt.array(system.x0).to_fractions(), dtype=object)
+        step = CodeStep(without_exact(made.program, stored), stored, start)
+    else:
+        words = _words(fmt)
+        stored = integer_program(made, words).coefficients[None]
+        # With sums of their own, also a sum with zero may round or overflow.
+        program = made.program if words.sums is not None else without_exact(made.program, stored)
+        start = np.asarray(words.data.array(system.x0).to_fractions(), dtype=object)
+        step = CodeStep(program, stored, start)
+        arithmetic = word_arithmetic(step, words)
+
+    def emulate(u: Any) -> Vectors:
+        u = system_inputs(system, u)
+        return _float_vectors(system, u, fmt) if isinstance(fmt, FloatFormat) else _word_vectors(system, u, _words(fmt))
+
+    def inputs(steps: int) -> NDArray[np.float64]:
+        level = 1.0 if isinstance(fmt, FloatFormat) else float(_words(fmt).data.largest) / 4
+        return np.random.default_rng(0).uniform(-level, level, (steps, system.m))
+
+    def bound(within: FilterLimits) -> str:
+        try:
+            if isinstance(fmt, FloatFormat):
+                found = output_errors(system, fmt, within.measurement)
+            else:
+                found = WordGuarantee(system, within.measurement).errors(_words(fmt))
+        except (ValueError, OverflowError) as error:
+            return f"No bound: {error}"
+        largest = ", ".join(f"{each:.6g}" for each in np.ravel(within.measurement).tolist())
+        errors = ", ".join(f"{each:.3g}" for each in found.tolist())
+        return (
+            f"For inputs of at most {largest} in size, each output stays within {errors} of that of the exact filter, "
+            "whose coefficients are not rounded, for ever."
+        )
+
+    return Prepared(step, arithmetic, system.name, structure, emulate, inputs, bound)
+
+
+def _longest(run: Callable[[int], Any], steps: int) -> tuple[int, Any]:
+    """Return the most steps that a run takes without an overflow, and what it returns."""
+    try:
+        return steps, run(steps)
+    except OverflowError:
+        low, high, found = 0, steps, None
+    while high - low > 1:
+        middle = (low + high) // 2
+        try:
+            found, low = run(middle), middle
+        except OverflowError:
+            high = middle
+    return low, found
+
+
+def _ended(inputs: NDArray[Any], start: NDArray[Any], states: NDArray[Any], status: NDArray[np.int64]) -> Vectors:
+    """Return the vectors of a run; if it has fewer steps than inputs, it ends in the step after its last."""
+    done = len(states)
+    if done < len(inputs):
+        states = np.concatenate([states, states[-1:] if done else start[None]])
+        status = np.append(status, -2)
+    return Vectors(inputs[: len(states)], states, status)
+
+
+def _float_vectors(system: LinearSystem, u: NDArray[Any], fmt: FloatFormat) -> Vectors:
+    # float64 holds the numbers of these formats exactly
+    stored, start = fmt.array(u).to_float(), np.append(fmt.array(system.x0).to_float(), np.zeros(system.p))
+    done, pairs = _longest(lambda steps: system.states(u[:steps], fmt), len(u))
+    states = np.zeros((0, len(start))) if pairs is None else pairs[..., 0]
+    return _ended(stored, start, states, np.zeros(done, np.int64))
+
+
+def _word_vectors(system: LinearSystem, u: NDArray[Any], words: WordFormats) -> Vectors:
+    stored, first = integers_of(u, words.data), integers_of(system.x0[None], words.data)[0]
+    start = np.append(first, np.zeros(system.p, np.int64))
+    done, run = _longest(lambda steps: run_words(system, u[:steps], words), len(u))
+    states = np.zeros((0, len(start)), np.int64) if run is None else run.states
+    return _ended(stored, start, states, np.zeros(done, np.int64))
+
+
+# -- Kalman filters ---------------------------------------------------------------------------------------------------
+
+
+def _of_model(model: LinearModel, fmt: AnyFormat, form: Form | str) -> Prepared:
+    _checked(fmt)
+    chosen = compiled_form(form)
+    if isinstance(fmt, WordFormats):
+        raise ValueError(
+            f"got formats of words for the {chosen} form; needed BINARY32, BINARY64 or a FixedFormat, or the form "
+            f"{CONSTANT_GAIN!r}"
+        )
+    kind = _type_of(fmt) if isinstance(fmt, FloatFormat) else ""
+    if isinstance(fmt, FixedFormat):
+        _words(fmt)
+    run = Run(model, fmt, chosen, ())  # type: ignore[arg-type]
+    stored = model_coefficients(run)
+    program = without_exact(kalman_program(model.n, model.m, chosen), stored)
+    start = _flat(run.exactly(run.x[None]), run.exactly(run.P[None]), chosen)[0]
+    step = CodeStep(program, stored, start)
+    arithmetic = word_arithmetic(step, _words(fmt)) if isinstance(fmt, FixedFormat) else CodeFloats(kind)
+
+    def bound(within: FilterLimits) -> str:
+        try:
+            check_limits(within, model.n, model.m, model.x0)
+            found = guarantee(model, fmt, within, chosen)
+        except (ValueError, OverflowError) as error:
+            return f"No bound: {error}"
+        time = "for ever" if found.for_ever else f"for {found.steps} steps, since {found.why}"
+        errors = ", ".join(f"{each:.3g}" for each in found.bound.tolist())
+        return (
+            f"Within the given limits on state, innovation and measurement, rounding moves the estimates by at most "
+            f"{errors}, {time}."
+        )
+
+    return Prepared(
+        step,
+        arithmetic,
+        model.name,
+        f"{chosen} form",
+        lambda z: _model_vectors(model, z, fmt, chosen),
+        lambda steps: simulated_measurements(model, steps),
+        bound,
+    )
+
+
+def model_coefficients(run: Run) -> NDArray[Any]:
+    """Return the coefficients of each step of a cycle, (p, c), ordered as the program of a step expects."""
+    given = run.matrices
+    Q, R = (run.UQ, run.UR) if run.form is Form.UD else (given.Q, given.R)
+    members = [run.exactly(each) for each in (given.Phi, given.H, Q, R)]
+    period = lcm(*(len(each) for each in members))
+    rows = [np.concatenate([each[k % len(each)].ravel() for each in members]) for k in range(period)]
+    constants = np.full((period, 1), Fraction(0), dtype=object)
+    one = np.asarray(run.exactly(given.identity), dtype=object)[0, 0]
+    return np.concatenate([np.array(rows, dtype=object), constants, constants + one], axis=1)
+
+
+def _flat(x: NDArray[Any], P: NDArray[Any], form: Form) -> NDArray[Any]:
+    """Return estimates and covariances, or factors, as :func:`gpbnb.filters.tracing.kalman_program` has its states."""
+    n = x.shape[1]
+    kept = [(i, j) for i in range(n) for j in range(n) if form is not Form.UD or i <= j]
+    return np.concatenate([x[..., 0], np.stack([P[:, i, j] for i, j in kept], axis=-1)], axis=-1)
+
+
+def _model_vectors(model: LinearModel, z: Any, fmt: FloatFormat | FixedFormat, form: Form) -> Vectors:
+    run = Run(model, fmt, form, ())  # type: ignore[arg-type]
+
+    def stored(numbers: NDArray[np.float64]) -> NDArray[Any]:
+        """Return numbers, exact in float64, as the code stores them."""
+        return numbers if isinstance(fmt, FloatFormat) else np.ldexp(numbers, fmt.fraction_bits).astype(np.int64)
+
+    start = stored(_flat(run.x[None], run.P[None], form))
+    states = np.concatenate([start[:0], *(stored(_flat(x[1:], P[1:], form)) for x, P in run.blocks(z))])
+    status = np.zeros(len(states), np.int64)
+    if run.indefinite is not None:
+        status[run.indefinite - 1 :] = -1
+        status[run.indefinite - 1 : run.indefinite] = 1
+    return _ended(stored(fmt.array(z).to_float()), start[0], states, status)

@@ -1,0 +1,96 @@
+"""Judge one format for a filter: whether it meets a tolerance, in place of a search for the smallest precision."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, NamedTuple, cast
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import format_text
+from gpbnb.arithmetic.search import Outcome
+from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guarantee import check_limits
+from gpbnb.filters.forms import Form
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import compiled_form, form_named
+from gpbnb.filters.system import LinearSystem
+from gpbnb.wordlength.precision import Guaranteed, Probable, survey_formats
+from gpbnb.wordlength.requirement import Asked, Basis, checked_tolerance, evidence
+from gpbnb.wordlength.system import BoundedSystem, over_steps, system_strategy
+
+
+class Judgement(NamedTuple):
+    """Whether a format meets a tolerance.
+
+    Parameters
+    ----------
+    ratio : largest error or bound / tolerance; infinite if there is none. why : why it is infinite.
+    ends : whether a guarantee holds for the steps only, because there is none for ever.
+    """
+
+    fmt: FloatFormat | FixedFormat
+    basis: Basis
+    steps: int
+    ratio: float
+    why: str
+    ends: bool = False
+
+    @property
+    def met(self) -> bool:
+        """Whether the format meets the tolerance."""
+        return self.ratio <= 1
+
+    def __str__(self) -> str:
+        how = evidence(self.basis, self.steps, self.ends)
+        verdict = f"{format_text(self.fmt)} {'meets' if self.met else 'misses'} the tolerance"
+        if math.isinf(self.ratio):
+            return f"{verdict}, {how}: {self.why}"
+        return f"{verdict}: {self.ratio:.2g} of it, {how}"
+
+
+def judge(
+    model: LinearModel | LinearSystem,
+    fmt: FloatFormat | FixedFormat,
+    steps: int,
+    tolerance: Any,
+    form: Any = Form.INNOVATION,
+    basis: Basis = "emulation",
+    z: Any = None,
+    within: FilterLimits | None = None,
+) -> Judgement:
+    """Judge one format; for the arguments, see :func:`gpbnb.wordlength.precision.required_precision`.
+
+    Raises
+    ------
+    ValueError : for a reason given there; a format without compiled loops.
+    """
+    fmt.check_compiled()
+    kind = cast(FloatFormat, fmt)  # strategies take fixed point, too, where there are loops for it
+    asked = Asked(steps, basis, kind, None, False)
+    ends = False
+    if isinstance(model, LinearSystem):
+        of_system = system_strategy(model, asked, tolerance, z, within)
+        found = of_system.error(kind)
+        ends = isinstance(of_system, BoundedSystem) and of_system.steps is not None
+        if math.isinf(found.ratio) and (later := over_steps(of_system, asked)):
+            found, ends = _or(found, later.error(kind))
+    elif basis in ("emulation", "bound"):
+        (found,) = survey_formats(model, z, tolerance, [kind], form_named(form), basis)
+    else:
+        if within is None:
+            raise ValueError(f'got basis "{basis}" without limits; needed within=limits(...) on state and innovation')
+        check_limits(within, model.n, model.m, model.x0)
+        tolerances = checked_tolerance(tolerance, model.n, "states", fmt.base, basis)
+        strategy = Guaranteed if basis == "guarantee" else Probable
+        of_model = strategy(model, compiled_form(form), within, tolerances)
+        found = of_model.error(kind)
+        if math.isinf(found.ratio) and basis == "guarantee":
+            found, ends = _or(found, replace(of_model, steps=steps).error(kind))
+    return Judgement(fmt, basis, steps, *found, ends)
+
+
+def _or(for_ever: Outcome, for_steps: Outcome) -> tuple[Outcome, bool]:
+    """Return the outcome for some steps, if it is finite, in place of one for ever, and whether it was taken."""
+    return (for_ever, False) if math.isinf(for_steps.ratio) else (for_steps, True)

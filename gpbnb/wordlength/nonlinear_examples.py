@@ -1,0 +1,148 @@
+"""Examples of nonlinear filters: a beacon seen in range and bearing, an attitude, and the height of an aircraft."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.derivatives import jacobian
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.nonlinear import NonlinearModel
+
+_WIDE = FloatFormat(2, 53)
+
+
+def tracked_motion(x: FloatArray) -> Any:
+    """Return the next x, y and velocities of a target, after one second."""
+    return np.stack([x[0] + x[2], x[1] + x[3], x[2], x[3]])
+
+
+def tracked_sight(x: FloatArray) -> Any:
+    """Return range and bearing of a target from the origin."""
+    return np.stack([np.hypot(x[0], x[1]), np.arctan2(x[1], x[0])])
+
+
+def beacon() -> NonlinearModel:
+    """A surveying instrument that follows a vehicle by range, to 1 cm, and bearing, to 0.1 mrad; n = 4 and m = 2.
+
+    The vehicle is 2 km away and known to 1 km and 10 m/s at first. It passes behind the instrument, so that its
+    bearing crosses 180°. The states are east and north in metres, and their rates in metres per second.
+    """
+    return NonlinearModel(
+        tracked_motion,
+        None,
+        tracked_sight,
+        None,
+        Q=np.diag([0, 0, 2.0**-10, 2.0**-10]),
+        R=[["1e-4", 0], [0, "1e-8"]],
+        x0=[-2000, 600, 0, -30],
+        P0=np.diag([10**6, 10**6, 100, 100]),
+        angles=["bearing (rad)"],
+        state_names=["east (m)", "north (m)", "east rate (m/s)", "north rate (m/s)"],
+        measurement_names=["range (m)", "bearing (rad)"],
+        name="range and bearing",
+    )
+
+
+def turned(q: FloatArray, u: FloatArray) -> Any:
+    """Return a quaternion turned by three small angles u (rad), to first order."""
+    half = u / 2
+    rows = [
+        [q[0], -q[1], -q[2], -q[3]],
+        [q[1], q[0], -q[3], q[2]],
+        [q[2], q[3], q[0], -q[1]],
+        [q[3], -q[2], q[1], q[0]],
+    ]
+    return np.stack([row[0] + row[1] * half[0] + row[2] * half[1] + row[3] * half[2] for row in rows])
+
+
+def seen_directions(q: FloatArray, u: FloatArray) -> Any:
+    """Return the third and the first row of the rotation matrix: down and north as the body sees them."""
+    w, x, y, z = q
+    return np.stack(
+        [
+            2 * (x * z - w * y),
+            2 * (w * x + y * z),
+            w * w - x * x - y * y + z * z,
+            w * w + x * x - y * y - z * z,
+            2 * (x * y - w * z),
+            2 * (x * z + w * y),
+        ]
+    )
+
+
+def unit(q: FloatArray) -> Any:
+    """Return a quaternion scaled to length one."""
+    return q / np.linalg.norm(q)
+
+
+def attitude(steps: int = 40) -> NonlinearModel:
+    """An attitude quaternion from gyroscopes, accelerometers and a magnetometer, n = 4 and m = 6.
+
+    The gyroscopes, which turn at 0.3 rad/s and swing, are the inputs, 100 times a second. The vehicle does not
+    accelerate, so that the accelerometers see the direction of gravity.
+    """
+    t = np.arange(steps) * 0.01
+    rates = np.stack([0.2 * np.sin(t), 0.1 * np.cos(0.7 * t), np.full(steps, 0.3)], axis=1)
+    return NonlinearModel(
+        turned,
+        None,
+        seen_directions,
+        None,
+        Q=np.eye(4) * 2.0**-22,
+        R=np.diag([2.0**-8] * 3 + [2.0**-6] * 3),
+        x0=[1, 0, 0, 0],
+        P0=np.eye(4) / 16,
+        u=np.rint(rates * 0.01 * 2**20) / 2**20,
+        normalize=unit,
+        name="attitude quaternion",
+    )
+
+
+LEVEL_HEADING = 0.7
+"""Heading of the aircraft in :func:`height_channel`, rad."""
+
+
+def height_channel(constrained: bool = False) -> LinearModel:
+    """The covariance of an autopilot's attitude, vertical speed, height and accelerometer bias; n = 7 and m = 2.
+
+    It is a reduced model of the filters that ArduPilot's pull request 18008 and PX4-ECL's 1026 correct. The aircraft
+    flies level and straight without a magnetometer. The accelerometer, at 100 Hz, is turned into the vertical by the
+    quaternion; every fifth step has a height and a vertical speed from the satellite receiver. Phi is the Jacobian of
+    these equations at the level attitude. All numbers but the structure are ours.
+
+    Parameters
+    ----------
+    constrained : whether the rotation takes the length of the quaternion as one before it is differentiated, as the
+        corrected filters do.
+    """
+    step, c, s = 2.0**-7, np.cos(LEVEL_HEADING / 2), np.sin(LEVEL_HEADING / 2)
+
+    def moved(x: FloatArray) -> Any:
+        w, i, j, k, speed, height, bias = x
+        gravity = x.format.array("9.80665")
+        down = 1 - 2 * (i * i + j * j) if constrained else w * w - i * i - j * j + k * k
+        faster = speed + (gravity - down * (gravity + bias)) * step
+        return np.stack([w, i, j, k, faster, height + speed * step, bias])
+
+    start = np.array([c, 0, 0, s, 0, 0, 0])
+    Phi = jacobian(moved, _WIDE.array(start))[1].to_float()
+    turns = np.array([[0, 0, -s], [c, -s, 0], [s, c, 0], [0, 0, c]]) / 2
+    P0, Q = np.diag([0, 0, 0, 0, 0.25, 4, 0.04]), np.diag([0, 0, 0, 0, (0.35 * step) ** 2, 0, (0.003 * step) ** 2])
+    P0[:4, :4] += _outer(turns, np.array([0.05, 0.05, 0.5]))
+    Q[:4, :4] += _outer(turns, np.full(3, 0.015 * step))
+    H = np.zeros((5, 2, 7))
+    H[0, 0, 4] = H[0, 1, 5] = 1
+    return LinearModel(Phi, H, Q, np.diag([0.09, 4]), np.zeros(7), P0, name="height channel")
+
+
+def _outer(turns: NDArray[np.float64], deviations: NDArray[np.float64]) -> NDArray[Any]:
+    """Return the covariance of a quaternion, for standard deviations of three angles, in plain loops of float64."""
+    found = np.zeros((4, 4))
+    for turn, deviation in zip(turns.T, deviations.tolist(), strict=True):
+        found = found + np.multiply.outer(turn * deviation, turn * deviation)
+    return found

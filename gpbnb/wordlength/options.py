@@ -1,0 +1,270 @@
+"""The options of ``python -m gpbnb.wordlength``, read and checked before the libraries that compute are imported."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import gpbnb
+from gpbnb.filters.named import form_named, rounding_named
+from gpbnb.names import NAMED_FORMATS, WITHOUT_LOOPS, format_parts
+from gpbnb.sweeps.numbers import plain_integer, plain_number
+
+BASES = ("emulation", "bound", "guarantee", "probable")
+"""What an answer may be based on, as in ``gpbnb.wordlength.requirement.Basis``."""
+
+BASES_OF_NUMBERS = (2, 10, 16)
+"""Bases of the formats that are searched."""
+
+_FORMATS = tuple(name for name in NAMED_FORMATS if name not in WITHOUT_LOOPS)
+
+QUANTITIES = ("state", "innovation", "measurement")
+"""What may have limits, as in :class:`gpbnb.bounds.envelope.FilterLimits`."""
+
+SIGNALS = ("step", "sine", "noise")
+"""Inputs that are simulated, as by :func:`gpbnb.filters.simulation.simulated_inputs`."""
+
+EPILOG = """
+The model is a TOML file with Phi, H, Q, R, x0 and P0, or with A, B and perhaps C, D, x0. A filter may have known inputs
+B and u (or --inputs) and known offsets b of the states and d of the measurements. A digital filter has b and a, or sos,
+and perhaps structure, such as "direct form I", "cascade of direct form II transposed", "lattice" or "all"; its
+structures are compared side by side. Numbers are read as decimals.
+The file may name states, measurements, inputs and outputs, each with its unit: states = ["tilt (°)", "rate (°/s)"].
+The bases guarantee and probable hold for ever and need limits: --state and --innovation, or --measurement. A system
+needs --measurement.
+Exit status: 0 if a precision meets the tolerance, 1 if none does, 2 if a file or an option is wrong.
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    made = argparse.ArgumentParser(
+        prog="python -m gpbnb.wordlength",
+        description="Find how many digits a filter needs, so that rounding stays within a tolerance.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    made.add_argument("--version", action="version", version=f"gpbnb {gpbnb.__version__}")
+    made.add_argument("model", type=Path, help="TOML file")
+    made.add_argument(
+        "--tolerance",
+        required=True,
+        metavar="NUMBERS",
+        help="largest allowed error: one number, or one per state or output, such as 0.01,inf",
+    )
+    made.add_argument(
+        "--measurements",
+        type=Path,
+        metavar="FILE",
+        help="CSV file with one row per step: measurements of a filter, by default simulated, or inputs of a system",
+    )
+    made.add_argument(
+        "--inputs", type=Path, metavar="FILE", help="CSV file with the known inputs u of the filter, one row per step"
+    )
+    made.add_argument("--simulate", choices=SIGNALS, help="inputs of a linear system, in place of --measurements")
+    made.add_argument(
+        "--level",
+        metavar="NUMBERS",
+        help="of the simulated inputs: height of a step or sine, standard deviation of noise; one number, or one for "
+        "each input; default: 1",
+    )
+    made.add_argument("--steps", metavar="N", help="number of steps to simulate; default: 1000")
+    made.add_argument(
+        "--format",
+        metavar="NAME",
+        help=f"judge one format in place of a search: {', '.join(_FORMATS)}, Q15, or fixed 4.12 with 4 integer "
+        "bits and 12 fraction bits",
+    )
+    made.add_argument("--digits", metavar="N", help="judge this precision in place of a search")
+    made.add_argument("--base", metavar="BASE", help="2, 10 or 16; default: 2")
+    made.add_argument("--rounding", help='rounding rule, such as "nearest" or "chop"; default: nearest')
+    made.add_argument("--emin", metavar="N", help="exponent of the smallest normal number; default: unlimited")
+    made.add_argument("--emax", metavar="N", help="exponent of the largest number; default: unlimited")
+    made.add_argument(
+        "--form",
+        help='form of the covariance update of a Kalman filter, such as "innovation", "Joseph", "UD" or "Cholesky"; '
+        "default: innovation",
+    )
+    _add_kinds(made)
+    made.add_argument(
+        "--basis",
+        action="append",
+        choices=BASES,
+        help="how to find the precision; may be given more than once; default: emulation and bound",
+    )
+    for quantity in QUANTITIES:
+        made.add_argument(
+            f"--{quantity}",
+            metavar="LIMITS",
+            help=f"for the bases guarantee and probable: largest size of each {quantity} of the filter without "
+            "rounding, one number or one for each, such as 5,0.1",
+        )
+    _add_files(made)
+    return made
+
+
+def _add_files(made: argparse.ArgumentParser) -> None:
+    """Add the options that name what is written."""
+    made.add_argument(
+        "--report", type=Path, metavar="FILE", help="HTML file to write, with a JSON file of the same name beside it"
+    )
+    made.add_argument(
+        "--certificate",
+        type=Path,
+        metavar="FILE",
+        help="for the basis guarantee: JSON file to write, which python -m gpbnb.bounds.check verifies on its own",
+    )
+    made.add_argument(
+        "--code",
+        type=Path,
+        metavar="DIR",
+        help="folder for the filter as C99 with test vectors, in the format judged, in the answer of --fixed, or in "
+        "binary32 or binary64 if one of them meets the tolerance",
+    )
+
+
+def _add_kinds(made: argparse.ArgumentParser) -> None:
+    """Add the options for fixed point, and for several formats in one filter."""
+    made.add_argument(
+        "--fixed",
+        action="store_true",
+        help="answer for a linear system in fraction bits of fixed point, by emulation and by a guarantee for inputs "
+        "no larger than these; with --mixed, find formats of data, coefficients and sums",
+    )
+    made.add_argument(
+        "--mixed",
+        action="store_true",
+        help="also lower each block of a Kalman filter (state, gain, covariance, innovation covariance) to its "
+        "smallest precision, and name the block that limits the filter",
+    )
+
+
+def read(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Read the command line, and convert the texts of numbers to numbers.
+
+    Raises
+    ------
+    ValueError : a value that its option does not take; options that are not compatible; one file for two purposes; a
+        report that cannot be written.
+    OSError : a file cannot be read.
+    SystemExit : after showing help or the version, or if the command line has an unknown option.
+    """
+    given = parser().parse_args(arguments)
+    for name in ("tolerance", "level", *QUANTITIES):
+        _replace(given, name, _numbers, "numbers with commas between: 0.01,inf")
+    for name in ("steps", "digits", "base", "emin", "emax"):
+        _replace(given, name, plain_integer, "a whole number")
+    _replace(given, "rounding", lambda text: rounding_named(text).value)
+    form_named(given.form or "innovation")
+    _replace(given, "format", format_parts)
+    if given.format in WITHOUT_LOOPS:
+        raise ValueError(
+            f"got --format {given.format}, which has no compiled loops; needed one of {', '.join(_FORMATS)}, Q15, or "
+            "fixed 4.12; to search up to 53 bits or 18 decimal digits, leave --format away"
+        )
+    sources = [each for each in (given.model, given.measurements, given.inputs) if each]
+    check_files(given.report, sources, given.certificate)
+    for source in sources:
+        try:
+            source.open("rb").close()
+        except OSError as error:
+            raise ValueError(f"got {source}, which cannot be read: {error.strerror}; needed a file") from None
+    _check(given)
+    return given
+
+
+def _check(given: argparse.Namespace) -> None:
+    """Reject options that are not compatible."""
+    if given.base not in (None, *BASES_OF_NUMBERS):
+        raise ValueError(f"got --base {given.base}; needed one of {', '.join(map(str, BASES_OF_NUMBERS))}")
+    if (given.emin is None) != (given.emax is None):
+        raise ValueError("got one of --emin and --emax; needed both, or neither for unlimited exponents")
+    others = [f"--{name}" for name in ("digits", "base", "emin", "emax") if getattr(given, name) is not None]
+    if given.format and others:
+        raise ValueError(f"got --format and {', '.join(others)}; needed --format alone, which sets them all")
+    if given.simulate and given.measurements:
+        raise ValueError("got --simulate and --measurements; needed one of them")
+    if given.code and given.code.exists() and not given.code.is_dir():
+        raise ValueError(f"got --code {given.code}, which is a file; needed a folder")
+    if given.level is not None and not given.simulate:
+        raise ValueError(f"got --level without --simulate; needed --simulate with one of {', '.join(SIGNALS)}")
+    if given.fixed:
+        others = [
+            f"--{name}" for name in ("format", "digits", "base", "emin", "emax", "certificate") if getattr(given, name)
+        ]
+        if others or {"bound", "probable"} & {*(given.basis or ())}:
+            needed = "it without these, and the bases emulation and guarantee"
+            raise ValueError(f"got --fixed with {', '.join(others) or '--basis bound or probable'}; needed {needed}")
+    if given.mixed and (given.format or given.digits is not None):
+        raise ValueError("got --mixed and one format; needed a search: leave out --format and --digits")
+    if given.certificate and "guarantee" not in (given.basis or ()):
+        raise ValueError(f"got --certificate {given.certificate} without a guarantee; needed --basis guarantee")
+    limited = ", ".join(f"--{each}" for each in QUANTITIES if getattr(given, each) is not None)
+    if given.fixed and limited:
+        raise ValueError(f"got --fixed and {limited}; needed none: the guarantee takes the largest of the inputs")
+    asked = [each for each in given.basis or () if each in ("guarantee", "probable")]
+    if limited and not asked:
+        raise ValueError(f"got {limited} without a basis that uses limits; needed --basis guarantee or probable")
+
+
+def check_files(report: Path | None, sources: Sequence[Path], certificate: Path | None = None) -> None:
+    """Reject one file for two purposes, and a file that cannot be written, before anything is computed.
+
+    Raises
+    ------
+    ValueError : one file has two purposes, or a file cannot be written.
+    """
+    written: list[tuple[str, Path]] = []
+    if report:
+        if not report.name or report.suffix.lower() == ".json":
+            raise ValueError(f"got --report {report}; needed the name of an HTML file; JSON is written beside it")
+        written = [(f"--report {report}", report), (f"--report {report}", report.with_suffix(".json"))]
+    if certificate:
+        written.append((f"--certificate {certificate}", certificate))
+    for option, path in written:
+        try:
+            path.resolve().exists()
+        except OSError as error:
+            raise ValueError(f"got {option}, which cannot be written: {error.strerror}; needed another name") from None
+        what = "is in no folder that exists" if not path.parent.is_dir() else ""
+        if path.exists() and not path.is_file():
+            what = "is a folder" if path.is_dir() else "is a device or pipe"
+        if what:
+            raise ValueError(f"got {option}, but {path} {what}; needed a file in a folder; create it first")
+    files = [*sources, *(path for _, path in written)]
+    for place, path in enumerate(files):
+        for other in files[:place]:
+            if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
+                raise ValueError(f"got {other} and {path}, which are one file; needed a file for each purpose")
+    for option, path in written:
+        try:
+            tempfile.TemporaryFile(dir=path.resolve().parent).close()
+        except OSError as error:
+            raise ValueError(
+                f"got {option}, but its folder cannot be written to: {os.strerror(error.errno or 0)}; needed "
+                "a folder that you can write to, on a disk with space"
+            ) from None
+
+
+def _numbers(text: str) -> float | list[float]:
+    found = [plain_number(each.strip()) for each in text.split(",")]
+    return found if len(found) > 1 else found[0]
+
+
+def _replace(given: argparse.Namespace, name: str, convert: Callable[[str], Any], needed: str = "") -> None:
+    """Replace the text of an option by what it means."""
+    if (text := getattr(given, name)) is None:
+        return
+    try:
+        setattr(given, name, convert(text))
+    except ValueError as error:
+        raise ValueError(f"got --{name} {text}; needed {needed}" if needed else str(error)) from None
+
+
+def printable(text: str) -> str:
+    """Return a text of the command line with escapes in place of bytes that are not UTF-8."""
+    return text.encode(errors="surrogateescape").decode(errors="backslashreplace")

@@ -1,0 +1,247 @@
+"""Answer a question of the command line, and write its report."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gpbnb.arithmetic.fixed import FixedFormat
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BINARY32, BINARY64, NAMED
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.bounds.envelope import FilterLimits
+from gpbnb.bounds.guarantee import from_schedule, guarantee, limits
+from gpbnb.bounds.linear import filter_schedule
+from gpbnb.caching import replace_file
+from gpbnb.filters.model import LinearModel
+from gpbnb.filters.named import form_named
+from gpbnb.filters.simulation import simulated_inputs, simulated_measurements
+from gpbnb.filters.system import LinearSystem
+from gpbnb.filters.words import WordFormats
+from gpbnb.wordlength.blocks import required_word_formats
+from gpbnb.wordlength.code import write_code
+from gpbnb.wordlength.fixed_point import Basis as FixedBasis
+from gpbnb.wordlength.fixed_point import required_fraction_bits
+from gpbnb.wordlength.judging import judge
+from gpbnb.wordlength.models import read_measurements, read_model, read_structures
+from gpbnb.wordlength.options import QUANTITIES
+from gpbnb.wordlength.report import DEFAULT_STEPS, Question, Report, study
+from gpbnb.wordlength.requirement import Basis
+
+
+def answer(given: argparse.Namespace, command: str, tell: Callable[[str], Any]) -> Report:
+    """Answer the question of a command line that :func:`gpbnb.wordlength.options.read` has read.
+
+    Parameters
+    ----------
+    command : the command line, for the report.
+    tell : function called with a line of text before and after each search.
+
+    Raises
+    ------
+    ValueError, ArithmeticError : for a reason given in :func:`gpbnb.wordlength.report.study`.
+    OSError : a file cannot be read.
+    """
+    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
+    bases = _bases(given)
+    z, source = _inputs(given, model, bases)
+    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
+    asked = Question(
+        model,
+        given.tolerance,
+        z,
+        given.steps,
+        given.base or 2,
+        given.rounding or "nearest",
+        given.form or "innovation",
+        bases,
+        None if given.fixed else _limits(model, bases, sizes),
+        given.emin,
+        given.emax,
+        _format(given),
+        read_structures(given.model),
+        given.mixed,
+        given.fixed,
+    )
+    return study(asked, source, command, tell)
+
+
+def _bases(given: argparse.Namespace) -> Sequence[Basis]:
+    """Return the bases of a command line, or those that suit its numbers."""
+    return given.basis or ("emulation", "guarantee" if given.fixed else "bound")
+
+
+def _inputs(given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis]) -> tuple[Any, str]:
+    """Return the measurements or inputs of a command line, None if a model simulates them, and their origin."""
+    z = read_measurements(given.measurements) if given.measurements else None
+    source = (
+        str(given.measurements).encode(errors="surrogateescape").decode(errors="backslashreplace")
+        if z is not None
+        else ""
+    )
+    if z is not None:
+        _check_rows(given, z, model)
+    if isinstance(model, LinearSystem):
+        if given.form:
+            raise ValueError(
+                f"got --form {given.form} for a linear system; needed none: only a Kalman filter has forms"
+            )
+        if given.mixed and not given.fixed:
+            raise ValueError("got --mixed for a linear system; needed --fixed with it: only a Kalman filter has blocks")
+        if given.simulate:
+            z = simulated_inputs(given.simulate, _level(given), given.steps or DEFAULT_STEPS, model.m)
+            source = f"simulated, {given.simulate} of level {_shown(_level(given))}"
+        if z is None and (given.fixed or {"emulation", "bound"} & {*bases}):
+            raise ValueError(
+                "got a linear system without inputs; needed --measurements, a CSV file with its inputs, or --simulate"
+            )
+    elif given.fixed:
+        raise ValueError("got --fixed for a Kalman filter; needed --format, such as --format Q15, to judge fixed point")
+    elif given.simulate:
+        raise ValueError(f"got --simulate {given.simulate} for a Kalman filter; needed none: its model simulates them")
+    return z, source
+
+
+def _check_rows(given: argparse.Namespace, z: NDArray[np.float64], model: LinearModel | LinearSystem) -> None:
+    """Reject a file with other columns than the model has measurements or inputs, or with other rows than steps."""
+    kind = "input" if isinstance(model, LinearSystem) else "measurement"
+    rows, columns = z.shape
+    if columns != model.m:
+        raise ValueError(
+            f"{given.measurements.name}: got {columns} columns; needed {model.m}, one for each {kind}; remove others, "
+            "such as the time, and write decimal points, not commas"
+        )
+    if given.steps not in (None, rows):
+        raise ValueError(
+            f"{given.measurements.name}: got {rows} rows and --steps {given.steps}; needed one row for each step; "
+            "leave --steps away, which is for simulated numbers"
+        )
+
+
+def certificate(given: argparse.Namespace, report: Report) -> str:
+    """Return the certificate of the first guarantee in a report; that of a linear system bounds its roundings only.
+
+    Raises
+    ------
+    ValueError : no precision has a guarantee, or the format is fixed point.
+    """
+    digits = next(each.digits for each in report.answers if each.basis == "guarantee")
+    fmt = _format(given)
+    if digits is None:
+        raise ValueError("got no precision with a guarantee; needed one for a certificate; allow a larger tolerance")
+    if isinstance(fmt, FixedFormat):
+        raise ValueError(f"got --certificate with {fmt}; needed floating point: the checker covers no fixed point")
+    if fmt is None:
+        fmt = FloatFormat(report.base, digits, Rounding(report.rounding), given.emin, given.emax)
+    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
+    chosen = next(iter(read_structures(given.model).values()), model)
+    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
+    if isinstance(chosen, LinearModel):
+        within = limits(chosen.n, chosen.m, **sizes)
+        form = form_named(given.form or "innovation")
+        return guarantee(chosen, fmt, within, form, horizon=report.steps).certificate()
+    made = filter_schedule(chosen.as_filter(), fmt)
+    return from_schedule(made, limits(made.program.n, made.program.m, **sizes), report.steps).certificate()
+
+
+def write_code_of(given: argparse.Namespace) -> tuple[Path, ...]:
+    """Write the filter of a command line as C, into the folder of its option ``--code``.
+
+    The format is the one that is judged, or the answer in fixed point, or else the first of binary32 and binary64 that
+    meets the tolerance, on the first basis. A digital filter has the structure that its file names, or the usual one.
+
+    Raises
+    ------
+    ValueError : neither meets the tolerance; no type of C for the format; or for a reason given in
+        :func:`gpbnb.wordlength.code.write_code`.
+    OSError : a file cannot be written.
+    """
+    model = read_model(given.model, read_measurements(given.inputs) if given.inputs else None)
+    structure, model = next(iter(read_structures(given.model).items()), (None, model))
+    bases = _bases(given)
+    if given.fixed and isinstance(model, LinearSystem):
+        words, largest = _words_that_meet(given, model, bases)
+        return write_code(model, words, None, given.code, within=largest, structure=structure)
+    sizes = {each: size for each in QUANTITIES if (size := getattr(given, each)) is not None}
+    within = _limits(model, bases, sizes)
+    fmt = _format(given) or _type_that_meets(given, model, bases, within)
+    form = None if isinstance(model, LinearSystem) else given.form
+    return write_code(model, fmt, form, given.code, within=within, structure=structure)
+
+
+def _words_that_meet(
+    given: argparse.Namespace, system: LinearSystem, bases: Sequence[Basis]
+) -> tuple[WordFormats, FilterLimits]:
+    """Return the formats that a search in fixed point finds on the first basis, and the largest inputs as limits."""
+    z, _ = _inputs(given, system, bases)
+    search = required_word_formats if given.mixed else required_fraction_bits
+    words = search(system, z, given.tolerance, cast(FixedBasis, bases[0]), given.rounding or "nearest").words
+    if words is None:
+        raise ValueError(f"got --code {given.code}, and no format meets the tolerance; needed a larger tolerance")
+    return words, limits(system.n, system.m, measurement=np.abs(z).max(axis=0))
+
+
+def _type_that_meets(
+    given: argparse.Namespace, model: LinearModel | LinearSystem, bases: Sequence[Basis], within: FilterLimits | None
+) -> FloatFormat:
+    """Return binary32 if it meets the tolerance of a command line, else binary64."""
+    z, _ = _inputs(given, model, bases)
+    steps = given.steps or (DEFAULT_STEPS if z is None else len(z))
+    if z is None and isinstance(model, LinearModel):
+        z = simulated_measurements(model, steps)
+    for fmt in (BINARY32, BINARY64):
+        if judge(model, fmt, steps, given.tolerance, given.form or "innovation", bases[0], z, within).met:
+            return fmt
+    raise ValueError(
+        f"got --code {given.code}, and neither binary32 nor binary64 meets the tolerance; needed a larger tolerance, "
+        "or --format with fixed point"
+    )
+
+
+def write(report: Report, page: Path) -> None:
+    """Write a report as a page and as JSON of the same name; each file is written completely or not at all.
+
+    Raises
+    ------
+    OSError : a file cannot be written; its old contents are kept.
+    """
+    replace_file(page, report.to_html().encode())
+    replace_file(page.with_suffix(".json"), f"{report.to_json()}\n".encode())
+
+
+def _level(given: argparse.Namespace) -> Any:
+    return 1.0 if given.level is None else given.level
+
+
+def _shown(level: Any) -> str:
+    return ", ".join(f"{each:.6g}" for each in np.ravel(level).tolist())
+
+
+def _format(given: argparse.Namespace) -> FloatFormat | FixedFormat | None:
+    """Return the one format that is judged; None for a search."""
+    rounding = None if given.rounding is None else Rounding(given.rounding)
+    if given.format is None:
+        if given.digits is None:
+            return None
+        return FloatFormat(given.base or 2, given.digits, rounding or Rounding.NEAREST, given.emin, given.emax)
+    fmt = NAMED[given.format] if isinstance(given.format, str) else FixedFormat(*given.format)
+    return fmt if rounding is None else replace(fmt, rounding=rounding)
+
+
+def _limits(model: LinearModel | LinearSystem, bases: Sequence[Basis], sizes: Mapping[str, Any]) -> FilterLimits | None:
+    """Return the limits that the bases need; None if they need none."""
+    asked = [each for each in bases if each in ("guarantee", "probable")]
+    if not asked:
+        return None
+    of_system = isinstance(model, LinearSystem)
+    needed = "--measurement" if of_system else "--state and --innovation, or --measurement"
+    if not sizes or (of_system and set(sizes) != {"measurement"}):
+        options = ", ".join(f"--{each}" for each in sizes)
+        raise ValueError(f"got --basis {asked[0]} with {options or 'no limits'}; needed {needed}")
+    return limits(model.n, model.m, **sizes)
