@@ -101,7 +101,7 @@ def rotation(angles: ArrayLike, sequence: Sequence[int] = SEQUENCE) -> Floats:
 
     Raises
     ------
-    ValueError : the last axis is not of length 3, an angle is not finite, or `sequence` is no permutation.
+    ValueError : the last axis is not of length 3, an angle is not finite, or `sequence` is not a permutation.
     """
     each = _angles("angles", angles, 3)
     if sorted(sequence) != [1, 2, 3]:

@@ -26,9 +26,9 @@ def budget_curve(printed: tuple[float, float], totals: Sequence[float], ax: Axes
     n = np.arange(1, most + 1)
     goal, larger = totals
     artists: list[Artist] = []
-    for total, style in ((goal, "-"), (larger, "--")):
-        artists += ax.plot(n, [theory.equal_error(total, int(k)) for k in n], style, color=VALID)
-    artists += ax.plot(n, goal / n, "-.", color=REFERENCE)
+    for total in (goal, larger):
+        artists += ax.plot(n, [theory.equal_error(total, int(k)) for k in n], color=VALID)
+    artists += ax.plot(n, goal / n, ":", color=REFERENCE)
     artists += ax.plot(*printed, "o", mfc="none", mew=1.6, color=BLACK, ms=9)
     artists.append(
         name(ax, f"independent,\ntotal {larger:g} mas/yr", (9, theory.equal_error(larger, 9)), VALID, (7, 3))
@@ -64,7 +64,8 @@ def shares(budget: Budget, ax: Axes) -> list[Artist]:
 def distribution(result: Draws, ax: Axes) -> list[Artist]:
     """Draw the distribution of random total errors, with the root-sum-square, the sum of all errors and the goal."""
     total, worst = result.budget.total, result.budget.worst_case
-    heights, edges = np.histogram(result.errors, bins=60, density=True)
+    widest = 1.02 * max(worst, float(np.abs(result.errors).max()))
+    heights, edges = np.histogram(result.errors, bins=61, range=(-widest, widest), density=True)
     bars = ax.bar(edges[:-1], heights, np.diff(edges), align="edge", color=OBSERVED, alpha=0.55)
     artists: list[Artist] = list(bars)
     top = float(heights.max())
@@ -76,8 +77,8 @@ def distribution(result: Draws, ax: Axes) -> list[Artist]:
         colour = REFERENCE if text == "goal" else BLACK
         artists.append(ax.vlines((-value, value), 0, height * top, color=colour, ls=style, lw=1.4))
         artists.append(name(ax, text, (value, height * top), colour, (4, -1)))
-    artists.append(name(ax, "random draws", (0, top), OBSERVED, (0, 3)))
+    artists.append(name(ax, "random draws", (-theory.GOAL, 0.9 * top), OBSERVED, (-6, 0)))
     ax.set_ylim(0, 1.42 * top)
-    ax.set_xlim(-1.15 * worst, 1.5 * worst)
+    ax.set_xlim(-widest, widest)
     label(ax, "total error (mas/yr)", "density (yr/mas)")
     return artists

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gpbnb.report.budget.theory import METHODS, Budget, Reading
+from gpbnb.report.budget.theory import METHODS, Budget, ReadBudget
 from gpbnb.report.display.tables import Table
 
 
@@ -32,7 +32,7 @@ def sources(budget: Budget) -> Table:
     return Table(f"{len(budget.sources)} sources", header, tuple(body))
 
 
-def refused(reading: Reading) -> Table:
+def refused(reading: ReadBudget) -> Table:
     """Tabulate the rejected rows by line."""
     body = tuple((str(row.line), ", ".join(row.cells), row.reason) for row in reading.refused)
     return Table(f"{len(body)} rejected rows", ("line", "row", "reason"), body)

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import Enum
 from functools import cached_property
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import TypeVar
 
@@ -268,14 +269,14 @@ class Refused:
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadBudget:
     """Contents of a file: the budget from its valid rows, and the rejected rows."""
 
     budget: Budget
     refused: tuple[Refused, ...]
 
 
-def read(path: str | Path) -> Reading:
+def read(path: str | Path | Traversable) -> ReadBudget:
     """Read a budget from a CSV file, which is not changed.
 
     The first line names the columns: ``name, kind, form, error_mas`` and any of ``roll, orbit, filter, group, note``,
@@ -287,15 +288,15 @@ def read(path: str | Path) -> Reading:
     OSError : the file cannot be read.
     ValueError : the file is not UTF-8, or its first line lacks a column, repeats one, or names an unknown one.
     """
-    path = Path(path)
+    file = Path(path) if isinstance(path, str) else path
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = file.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ValueError(f"{path.name} is not UTF-8 ({error}); save it as UTF-8") from error
-    return parse(text, path.name)
+        raise ValueError(f"{file.name} is not UTF-8 ({error}); save it as UTF-8") from error
+    return parse(text, file.name)
 
 
-def parse(text: str, name: str = "the text") -> Reading:
+def parse(text: str, name: str = "the text") -> ReadBudget:
     """Read a budget from the text of a CSV file, as :func:`read` does; error messages call it `name`."""
     reader = csv.reader(io.StringIO(text, newline=""))
     header = tuple(cell.strip() for cell in next(reader, []))
@@ -332,7 +333,7 @@ def parse(text: str, name: str = "the text") -> Reading:
             refused.append(Refused(line, str(error), tuple(cells)))
         else:
             sources[source.name], lines[source.name] = source, line
-    return Reading(Budget(tuple(sources.values())), tuple(refused))
+    return ReadBudget(Budget(tuple(sources.values())), tuple(refused))
 
 
 def write(budget: Budget, path: str | Path) -> None:

@@ -1,4 +1,4 @@
-// Calculators of the page. Their formulas come after, made from sympy; here is what is the same for all of them.
+// Calculators and pictures of the page. What each computes comes after; here is what is the same for all of them.
 window.gpbnbCalculators ??= (() => {
   "use strict";
   const known = new Map();
@@ -39,7 +39,8 @@ window.gpbnbCalculators ??= (() => {
 
   const shorten = (text) => (text.length > 24 ? `${text.slice(0, 23)}…` : text);
   const limit = (x) => (x !== 0 && (Math.abs(x) >= 1e6 || Math.abs(x) < 1e-3) ? x.toExponential().replace("+", "") : String(x));
-  const fill = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => show(values[name]));
+  const say = (value) => (typeof value === "string" ? value : show(value));
+  const fill = (template, values) => template.replace(/\{(\w+)\}/g, (_, name) => say(values[name]));
 
   function element(name, attributes, text) {
     const made = document.createElementNS(SVG, name);
@@ -136,6 +137,19 @@ window.gpbnbCalculators ??= (() => {
     );
   }
 
+  // A picture draws itself: its own function gets an empty drawing, the numbers, and a way to set them.
+  function drawPicture(spec, box, values, set) {
+    const width = Math.max(box.clientWidth, 240);
+    box.classList.remove("calculator-old");
+    const svg = element("svg", { width, "aria-hidden": "true" });
+    box.replaceChildren(svg);
+    const add = (name, attributes, text) => svg.appendChild(element(name, attributes, text));
+    const height = spec.draw({ add, svg, width, values, data: spec.data, set, scale, show, superscript });
+    svg.setAttribute("height", height);
+    svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    box.setAttribute("aria-label", `${spec.figure.title}. ${fill(spec.sentence, values)}`);
+  }
+
   // The curve of earlier numbers stays, but looks and sounds old.
   function age(box) {
     if (box.classList.contains("calculator-old")) return;
@@ -144,7 +158,7 @@ window.gpbnbCalculators ??= (() => {
   }
 
   function legend(spec, list) {
-    spec.figure.curves.forEach(([, label], i) => {
+    (spec.figure.curves ?? []).forEach(([, label], i) => {
       const item = document.createElement("li");
       const swatch = element("svg", { width: 30, height: 10, "aria-hidden": "true" });
       swatch.append(element("path", { class: `curve curve-${i}`, d: "M0 5H30" }));
@@ -168,7 +182,7 @@ window.gpbnbCalculators ??= (() => {
       return Math.min(input.most, Math.max(input.least, input.whole ? Math.round(value) : value));
     }
 
-    function say(text, now) {
+    function speak(text, now) {
       clearTimeout(timer);
       if (now) sentence.textContent = text;
       else timer = setTimeout(() => (sentence.textContent = text), SPOKEN_AFTER);
@@ -207,13 +221,23 @@ window.gpbnbCalculators ??= (() => {
       if (!latest) {
         form.dataset.state = "waiting";
         age(box);
-        say(`Nothing computed: see what is said below ${wrong.join(" and ")}.`, now);
+        speak(`Nothing computed: see what is said below ${wrong.join(" and ")}.`, now);
         return;
       }
       form.dataset.state = "computed";
       drawn = latest;
-      draw(spec, box, drawn);
-      say(fill(spec.sentence, latest), now);
+      redraw();
+      speak(fill(spec.sentence, latest), now);
+    }
+
+    function redraw() {
+      if (spec.draw) drawPicture(spec, box, drawn, set);
+      else draw(spec, box, drawn);
+    }
+
+    function set(name, text) {
+      of(name).value = text;
+      update();
     }
 
     for (const input of spec.inputs) {
@@ -224,8 +248,7 @@ window.gpbnbCalculators ??= (() => {
       });
     }
     form.addEventListener("submit", (event) => event.preventDefault());
-    const table = form.parentElement.querySelector(".calculator-examples");
-    for (const cell of table.querySelectorAll("[data-numbers]")) {
+    for (const cell of form.parentElement.querySelectorAll(".calculator-examples [data-numbers]")) {
       const button = document.createElement("button");
       button.type = "button";
       button.textContent = cell.textContent;
@@ -241,18 +264,20 @@ window.gpbnbCalculators ??= (() => {
     legend(spec, form.querySelector(".calculator-legend"));
     update(true);
     new ResizeObserver(() => {
-      if (drawn) draw(spec, box, drawn);
+      if (drawn) redraw();
       if (!latest) age(box);
     }).observe(box);
   }
 
   return {
-    add(spec, compute) {
-      spec.compute = compute;
+    add(spec, compute, draw) {
+      spec.compute = (given) => compute(given, spec.data);
+      spec.draw = draw;
       known.set(spec.id, spec);
       bring(spec);
     },
     compute: (id, given) => known.get(id).compute(given),
     show,
+    superscript,
   };
 })();

@@ -114,7 +114,7 @@ def forgotten() -> Derivation:
     return Derivation(
         (
             Step("sum of $f^{k-i}$: one more step", f * over(1 - f**k, 1 - f) + 1, over(1 - f ** (k + 1), 1 - f)),
-            Step("$a_0$ is not below $a_i$, $i = j+1$", start, later, sp.expand(start - later)),
+            Step("$a_0$ is at least $a_i$, with $i = j+1$", start, later, sp.expand(start - later)),
         )
     )
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -12,118 +10,11 @@ from gpbnb.arithmetic.bounds import gamma
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.calculators import derivation
-from gpbnb.report.calculators.javascript import Definition
-from gpbnb.report.calculators.page import form
+from gpbnb.report.calculators.page import Calculator, Figure, Input, Line, Values
 from gpbnb.report.integration import theory as integration
 from gpbnb.report.kalman import report_bounds
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory as rolling
-
-Values = Mapping[str, float]
-
-
-@dataclass(frozen=True)
-class Input:
-    """A number that the reader enters.
-
-    Parameters
-    ----------
-    name : its name in the formulas.
-    label : its name for the reader, including letter and unit.
-    least, most : accepted range.
-    slider : range of the slider, which may be smaller; if `log`, the slider moves in decades.
-    whole : whether it must be a whole number.
-    choices : names for 0, 1, …, if only these values are accepted.
-    cure : advice at the end of the message that rejects a number.
-    """
-
-    name: str
-    label: str
-    least: float
-    most: float
-    slider: tuple[float, float] = (0.0, 1.0)
-    whole: bool = False
-    log: bool = False
-    choices: tuple[str, ...] = ()
-    cure: str = ""
-
-    def number(self, text: str) -> float:
-        """Read a value of an example, or a name among `choices`."""
-        if self.choices:
-            return self.choices.index(text)
-        return int(text) if self.whole else float(text)
-
-
-@dataclass(frozen=True)
-class Line:
-    """A line of results: its label and the names in its cells."""
-
-    label: str
-    names: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure of results against one input.
-
-    Parameters
-    ----------
-    sweep : name of the input.
-    title, axis : title of the figure, and label of the vertical axis with its unit.
-    curves : names of results and their labels. The vertical axis and the axis of a `log` input are logarithmic.
-    """
-
-    sweep: str
-    title: str
-    axis: str
-    curves: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class Calculator:
-    """A calculator, which notebooks display as HTML.
-
-    Parameters
-    ----------
-    id : unique name in lower-case letters.
-    title : title of the form.
-    inputs : inputs, with the names that the definitions use.
-    definitions : function that returns the definitions from :mod:`gpbnb.report.calculators.derivation`.
-    columns, lines : headers and rows of the results; there is one header more than a row has names.
-    sentence : the result in words, with names in braces.
-    figure : the figure.
-    examples : label → value of each input as typed; the form starts with the first example.
-    shown : names in the table of examples, and their headers.
-    reference : function that computes the results with the chapters' Python functions.
-    formulas : names whose formulas are displayed; `letters` holds the TeX of these names and of the symbols in them.
-    missing : name → why this result may not exist.
-    """
-
-    id: str
-    title: str
-    inputs: tuple[Input, ...]
-    definitions: Callable[[], tuple[Definition, ...]]
-    columns: tuple[str, ...]
-    lines: tuple[Line, ...]
-    sentence: str
-    figure: Figure
-    examples: Mapping[str, Mapping[str, str]]
-    shown: Mapping[str, str]
-    reference: Callable[[Values], dict[str, Any]]
-    formulas: tuple[str, ...]
-    letters: Mapping[str, str]
-    missing: Mapping[str, str] = field(default_factory=dict)
-
-    def values(self, example: str) -> dict[str, float]:
-        """Return the inputs of an example as numbers."""
-        return {each.name: each.number(self.examples[example][each.name]) for each in self.inputs}
-
-    def _repr_html_(self) -> str:
-        return form(self)
-
-    def __repr__(self) -> str:
-        return f"<calculator: {self.title}>"
-
 
 _BASE = Input("b", "Base b", 2, 1000, (2, 16), whole=True)
 _PLACES = Input("t", "Digits t", 1, 90, (1, 60), whole=True)
@@ -307,16 +198,17 @@ DEROLL = Calculator(
         Line("its error Δω (rad/s)", ("error",)),
         Line("period of the off-tuned signal, 2π/Δω (years)", ("beat",)),
         Line("phase at the end (rad)", ("phase",)),
-        Line("share of the signal lost at the end, one dimension", ("lost",)),
+        Line("loss of the signal at the end, one dimension (above 1: sign reversed)", ("lost",)),
         Line("cross drift, two dimensions (mas a year)", ("across",)),
     ),
     sentence="The roll rate may be off by {error} rad/s. After {duration} days the phase is off by {phase} rad; in one "
-    "dimension a share of {lost} of the signal is lost; in two, a cross drift of {across} mas a year appears.",
+    "dimension the signal loses {lost} of its size (above 1, its sign is reversed); in two, a cross drift of "
+    "{across} mas a year appears.",
     figure=Figure(
         "t",
-        "Share of the signal lost at the end, against the places of the register",
-        "share lost",
-        (("lost", "share of the signal lost, one dimension"),),
+        "Share of the signal lost by the end of the record, against the places of the register",
+        "loss / signal",
+        (("lost", "loss of the signal, one dimension"),),
     ),
     examples={
         "sample calculation 1": {

@@ -1,24 +1,131 @@
-"""Write a calculator as HTML: a form, which a script shows, and a table of examples, which needs no script."""
+"""What a calculator consists of, and its HTML: a form, which a script shows, and a table, which needs no script."""
 
 from __future__ import annotations
 
 import json
 import math
 import re
-from dataclasses import asdict
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
 from html import escape
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import sympy as sp
 
 from gpbnb.report.calculators.javascript import Definition, print_function
 from gpbnb.report.display.derivation import Step
 
-if TYPE_CHECKING:
-    from gpbnb.report.calculators.forms import Calculator, Input
-
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Input:
+    """A number that the reader enters.
+
+    Parameters
+    ----------
+    name : its name in the formulas.
+    label : its name for the reader, including letter and unit.
+    least, most : accepted range.
+    slider : range of the slider, which may be smaller; if `log`, the slider moves in decades.
+    whole : whether it must be a whole number.
+    choices : names for 0, 1, …, if only these values are accepted.
+    cure : advice at the end of the message that rejects a number.
+    """
+
+    name: str
+    label: str
+    least: float
+    most: float
+    slider: tuple[float, float] = (0.0, 1.0)
+    whole: bool = False
+    log: bool = False
+    choices: tuple[str, ...] = ()
+    cure: str = ""
+
+    def number(self, text: str) -> float:
+        """Read a value of an example, or a name among `choices`."""
+        if self.choices:
+            return self.choices.index(text)
+        return int(text) if self.whole else float(text)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of results: its label and the names in its cells."""
+
+    label: str
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of results against one input.
+
+    Parameters
+    ----------
+    sweep : name of the input.
+    title, axis : title of the figure, and label of the vertical axis with its unit.
+    curves : names of results and their labels. The vertical axis and the axis of a `log` input are logarithmic.
+    """
+
+    sweep: str
+    title: str
+    axis: str
+    curves: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Calculator:
+    """A calculator, which notebooks display as HTML.
+
+    Parameters
+    ----------
+    id : unique name in lower-case letters.
+    title : title of the form.
+    inputs : inputs, with the names that the definitions use.
+    definitions : function that returns the definitions from :mod:`gpbnb.report.calculators.derivation`.
+    columns, lines : headers and rows of the results; there is one header more than a row has names.
+    sentence : the result in words, with names in braces.
+    figure : the figure.
+    examples : label → value of each input as typed; the form starts with the first example.
+    shown : names in the table of examples, and their headers.
+    reference : function that computes the results with the chapters' Python functions.
+    formulas : names whose formulas are displayed; `letters` holds the TeX of these names and of the symbols in them.
+    missing : name → why this result may not exist.
+    """
+
+    id: str
+    title: str
+    inputs: tuple[Input, ...]
+    definitions: Callable[[], tuple[Definition, ...]]
+    columns: tuple[str, ...]
+    lines: tuple[Line, ...]
+    sentence: str
+    figure: Figure
+    examples: Mapping[str, Mapping[str, str]]
+    shown: Mapping[str, str]
+    reference: Callable[[Values], dict[str, Any]]
+    formulas: tuple[str, ...]
+    letters: Mapping[str, str]
+    missing: Mapping[str, str] = field(default_factory=dict)
+
+    def values(self, example: str) -> dict[str, float]:
+        """Return the inputs of an example as numbers."""
+        return {each.name: each.number(self.examples[example][each.name]) for each in self.inputs}
+
+    def _repr_html_(self) -> str:
+        return form(self)
+
+    def __repr__(self) -> str:
+        return f"<calculator: {self.title}>"
+
+
+# -- HTML --------------------------------------------------------------------------------------------
 
 
 class Runtime:
@@ -48,10 +155,11 @@ def show(value: Any) -> str:
 def form(calculator: Calculator) -> str:
     """Return the HTML of a calculator."""
     title, every = escape(calculator.title), " ".join(_id(calculator, each) for each in calculator.inputs)
+    first = next(iter(calculator.examples.values()))
     parts = (
         f'<form class="calculator" id="calculator-{calculator.id}" aria-label="{title}" hidden novalidate>',
         '<div class="calculator-inputs">',
-        *(_field(calculator, each) for each in calculator.inputs),
+        *(input_field(calculator.id, each, first[each.name]) for each in calculator.inputs),
         "</div>",
         f'<output class="calculator-sentence" for="{every}"></output>',
         '<div class="calculator-scroll">',
@@ -86,9 +194,9 @@ def _id(calculator: Calculator, each: Input) -> str:
     return f"calculator-{calculator.id}-{each.name}"
 
 
-def _field(calculator: Calculator, each: Input) -> str:
-    name, label = _id(calculator, each), escape(each.label)
-    value = next(iter(calculator.examples.values()))[each.name]
+def input_field(form: str, each: Input, value: str) -> str:
+    """Return the HTML of an input of the form with this id, with the value that it shows at first."""
+    name, label = f"calculator-{form}-{each.name}", escape(each.label)
     if each.choices:
         options = "".join(
             f'<option value="{i}"{" selected" if text == value else ""}>{escape(text)}</option>'

@@ -69,7 +69,7 @@ def up_to(order: int, expression: sp.Expr, small: Iterable[sp.Symbol]) -> sp.Exp
 
     Raises
     ------
-    PolynomialError : the expression is no polynomial of the symbols and of their sines and cosines.
+    PolynomialError : the expression is not a polynomial in the symbols and in their sines and cosines.
     """
     small = tuple(small)
     polynomial = expression.replace(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb.report.geometry.theory import Case, Effect
+from gpbnb.report.geometry.theory import Effect, Misalignments
 from gpbnb.report.measurement import YEAR, apply, deroll, into_spacecraft, rotation
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ CHUNK = 2**16
 
 
 @dataclass(frozen=True)
-class Year:
+class MisalignedYear:
     """A simulated year of one case.
 
     Parameters
@@ -37,7 +37,7 @@ class Year:
     line : amplitude at the roll frequency, averaged over the year; radians.
     """
 
-    case: Case
+    case: Misalignments
     roll_period: float | None
     step: float
     block: int
@@ -56,7 +56,7 @@ class Year:
         return Effect((float(angle[0]), float(angle[1])), (float(drift[0]), float(drift[1])), self.line)
 
 
-def difference(case: Case, years: ArrayLike, phase: ArrayLike) -> Floats:
+def difference(case: Misalignments, years: ArrayLike, phase: ArrayLike) -> Floats:
     """Return the derolled difference of gyro and telescope as φ2 and φ3 (..., 2) in radians, with exact rotations.
 
     Parameters
@@ -73,14 +73,16 @@ def difference(case: Case, years: ArrayLike, phase: ArrayLike) -> Floats:
     return np.stack([z, -y], axis=-1)
 
 
-def spin_axis(case: Case, years: ArrayLike) -> Floats:
+def spin_axis(case: Misalignments, years: ArrayLike) -> Floats:
     """Return the direction (..., 3) of the spin axis in the absolute frame: the first column of the rotation by φ."""
     since = np.asarray(years, dtype=float)
     phi2, phi3 = case.drift[0] * since, case.drift[1] * since
     return np.stack([np.cos(phi2) * np.cos(phi3), -np.sin(phi3), np.sin(phi2) * np.cos(phi3)], axis=-1)
 
 
-def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, progress: bool = False) -> Year:
+def year(
+    case: Misalignments, roll_period: float | None = 600.0, step: float = 60.0, *, progress: bool = False
+) -> MisalignedYear:
     """Simulate a year of samples and measure the drift.
 
     Parameters
@@ -98,7 +100,7 @@ def year(case: Case, roll_period: float | None = 600.0, step: float = 60.0, *, p
 
 
 @lru_cache(maxsize=64)  # a chapter shows some years several times
-def _year(case: Case, roll_period: float | None, step: float, progress: bool) -> Year:
+def _year(case: Misalignments, roll_period: float | None, step: float, progress: bool) -> MisalignedYear:
     block = _block(roll_period, step)
     count = int(YEAR / step) // block * block
     rate = 0.0 if roll_period is None else 2 * math.pi / roll_period
@@ -125,7 +127,7 @@ def _year(case: Case, roll_period: float | None, step: float, progress: bool) ->
     slope = _slope(time, phi)
     offset: Floats = phi.mean(axis=0) - slope * time.mean()
     spread = count * (count**2 - 1) / 12
-    return Year(
+    return MisalignedYear(
         case,
         roll_period,
         step,
@@ -141,8 +143,8 @@ def _year(case: Case, roll_period: float | None, step: float, progress: bool) ->
 
 
 def years(
-    cases: Mapping[str, Case], step: float = 60.0, roll_period: float = 600.0, *, progress: bool = False
-) -> dict[str, tuple[Year, Year]]:
+    cases: Mapping[str, Misalignments], step: float = 60.0, roll_period: float = 600.0, *, progress: bool = False
+) -> dict[str, tuple[MisalignedYear, MisalignedYear]]:
     """Simulate each case without and with roll; see :func:`year`."""
     return {
         name: (year(case, None, step), year(case, roll_period, step))
@@ -158,7 +160,7 @@ class Part:
     turning: float
 
 
-def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
+def parts(case: Misalignments, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
     """Return the errors of the derolled readings over one roll: ``telescope``, ``gyro`` and their ``difference``.
 
     The telescope is compared with the star, and the gyro with the spin axis, both in the intermediate frame. The
@@ -195,9 +197,9 @@ def parts(case: Case, years: float = 1.0, samples: int = 24) -> dict[str, Part]:
     return found
 
 
-def misalignment_cases(size: float) -> dict[str, Case]:
+def misalignment_cases(size: float) -> dict[str, Misalignments]:
     """Return cases with one angle of `size` radians, pairs of angles, and angles that grow by `size` per year."""
-    none = Case()
+    none = Misalignments()
     single = {name: none.with_angle(name, size) for which in ("alpha", "beta", "gamma") for name in _three(which)}
     pairs = {
         f"{a} and {b}": none.with_angle(a, size).with_angle(b, size)
@@ -221,7 +223,7 @@ def small_angle_errors(name: str, sizes: ArrayLike, drift: tuple[float, float], 
     for size in np.atleast_1d(np.asarray(sizes, dtype=float)):
         worst = 0.0
         for signed in (size, -size):
-            case = Case(drift=drift).with_angle(name, float(signed))
+            case = Misalignments(drift=drift).with_angle(name, float(signed))
             truth = rotation((0.0, *drift))[1:, 0]
             mean = difference(case, np.ones(phases), turns).mean(axis=0)
             angles = np.array([math.asin(truth[1] / math.cos(drift[1])), -math.asin(truth[0])])

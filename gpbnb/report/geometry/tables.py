@@ -9,12 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from gpbnb.report.display.tables import Table
-from gpbnb.report.geometry.experiment import Part, Year
+from gpbnb.report.geometry.experiment import MisalignedYear, Part
 from gpbnb.report.geometry.theory import effect
 from gpbnb.report.measurement import ARCSEC, MAS
 
 
-def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
+def misalignments(results: Mapping[str, tuple[MisalignedYear, MisalignedYear]]) -> Table:
     """Tabulate the effect of each misalignment in milliarcseconds, from theory; for the drift, also from simulation.
 
     Parameters
@@ -44,7 +44,7 @@ def misalignments(results: Mapping[str, tuple[Year, Year]]) -> Table:
         "rolling: drift",
         "drift, simulated",
     )
-    return Table(f"{len(body)} cases, errors of $\\varphi_2, \\varphi_3$ in milliarcseconds", header, tuple(body))
+    return Table("errors due to misalignments, in milliarcseconds", header, tuple(body))
 
 
 def fates(results: Mapping[str, Mapping[str, Part]]) -> Table:

@@ -74,7 +74,7 @@ def aberration(altitude: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class Case:
+class Misalignments:
     """Angles of an experiment that lasts one year.
 
     Parameters
@@ -102,7 +102,7 @@ class Case:
             if len(value) != needed or not all(math.isfinite(v) for v in value):
                 raise ValueError(f"got {name} = {value}; needed {needed} finite numbers, in radians")
 
-    def with_angle(self, name: str, size: float) -> Case:
+    def with_angle(self, name: str, size: float) -> Misalignments:
         """Return a copy with one angle changed, as in ``case.with_angle("gamma1", size)`` or ``"alpha_rate3"``."""
         which, axis = str(name)[:-1], str(name)[-1:]
         if which == "drift" or which not in vars(self) or axis not in ("1", "2", "3"):
@@ -138,7 +138,7 @@ def printed_deroll(readings: ArrayLike, phase: ArrayLike) -> Floats:
     return -deroll(readings, -np.asarray(phase, dtype=float))
 
 
-def measured(case: Case, rolling: bool, years: ArrayLike = 0.0, phase: float = 0.0) -> Floats:
+def measured(case: Misalignments, rolling: bool, years: ArrayLike = 0.0, phase: float = 0.0) -> Floats:
     r"""Return the errors of the measured φ2, φ3 to second order; if rolling, those of the mean over a roll.
 
     .. math:: \Delta\varphi_2 &= (\alpha_1 + \beta_1 + \gamma_1)\varphi_3 + \gamma_1\alpha_3 + m_2 \\
@@ -176,7 +176,7 @@ def standing(beta: ArrayLike, gamma: ArrayLike) -> Floats:
     return np.asarray((apply(rotation(gamma), boresight) - boresight)[..., 1:])
 
 
-def effect(case: Case, rolling: bool, phase: float = 0.0) -> Effect:
+def effect(case: Misalignments, rolling: bool, phase: float = 0.0) -> Effect:
     """Return the errors of angle and drift to second order, from the values at the start and after a year.
 
     The drift is the slope of a straight line through both ends. In between, the error of a product of two changing

@@ -16,6 +16,8 @@ from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.kalman import report_bounds
 
+_REPORT = (2, Form.HUNG, Rounding.NEAREST)
+
 
 def decimal_digits(fmt: FloatFormat) -> float:
     """Return the t for which the unit roundoff of a format is β = 0.5 × 10^(1-t), (8) of hung1984, ch. II."""
@@ -41,10 +43,14 @@ class Answers(NamedTuple):
     printed: tuple[int, int]
     #: The digits that its formula gives.
     formula: tuple[int, int]
-    #: The digits by the formula with all its faults corrected.
+    #: The digits by the formula with all its errors corrected.
     corrected: tuple[int, int]
     #: The fewest digits with which an emulated year stayed within the tolerance.
     observed: dict[Rounding, float]
+    #: The fewest bits with which Hung's form, rounded to nearest, stayed within the tolerance.
+    bits: int
+    #: Its largest error in the year, in mas or mas/yr.
+    error: float
 
 
 def find_answers(tolerance: float = 1.0) -> Answers:
@@ -76,11 +82,21 @@ def find_answers(tolerance: float = 1.0) -> Answers:
         _both(report_bounds.coefficients(*report_bounds.EXAMPLE)),
         _both(corrected),
         observed,
+        *_fewest_bits(runs, tolerance),
     )
 
 
 def _good(run: year.Year, rounding: Rounding, tolerance: float) -> FloatFormat | None:
     return run.case.fmt if run.case.rounding is rounding and largest(run) <= tolerance else None
+
+
+def _fewest_bits(runs: tuple[year.Year, ...], tolerance: float) -> tuple[int, float]:
+    """Return the fewest bits of a run in Hung's form, rounded to nearest, within the tolerance, and its error."""
+    usual = [run for run in runs if (run.case.base, run.case.form, run.case.rounding) == _REPORT]
+    enough = [(int(run.case.precision), largest(run)) for run in usual if largest(run) <= tolerance]
+    if not enough:
+        raise ValueError(f"got a tolerance of {tolerance}; needed one that a run in bits meets: {_best(runs):.2g}")
+    return min(enough)
 
 
 def _best(runs: tuple[year.Year, ...]) -> float:
@@ -187,7 +203,7 @@ def single_record(runs: Sequence[year.Year], precision: int = 24) -> tuple[Moved
     KeyError : a year that is needed was not run.
     """
     by_case = {run.case: run for run in runs}
-    usual = year.Case(year.MODELS[0], 2, precision, Rounding.NEAREST, Form.HUNG)
+    usual = year.YearCase(year.MODELS[0], 2, precision, Rounding.NEAREST, Form.HUNG)
     changes = [
         *(("roll and process noise", usual.model, name, usual._replace(model=name)) for name in year.MODELS[1:]),
         ("rounding", "nearest", "chop", usual._replace(rounding=Rounding.CHOP)),

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from numpy.typing import ArrayLike, NDArray
 
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BINARY32, BINARY64, arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.report.display.style import (
     BLACK,
-    COLOURS,
     OBSERVED,
     OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
+    TEXT,
     VALID,
-    colours,
+    bits_colour,
     label,
     legend,
     loglog,
+    name,
+    name_ends,
 )
-from gpbnb.report.display.tables import arithmetic
 from gpbnb.report.gravity_probe_b.answers import Answers, decimal_digits, largest
 from gpbnb.report.gravity_probe_b.threshold import Share
 from gpbnb.report.gravity_probe_b.year import Year
@@ -33,28 +39,40 @@ from gpbnb.report.kalman.figures import bound_by_digits
 _QUANTITIES = {
     "drift": "error of the drift angle (mas)",
     "rate": "error of the drift rate (mas/yr)",
-    "gain": "relative gain error (no unit)",
-    "covariance": "relative covariance error (no unit)",
+    "gain": "relative error of the gain",
+    "covariance": "relative error of the covariance",
 }
-_MARKERS = {Form.HUNG: "o", Form.HUNG_SECOND_GAIN: "P", Form.INNOVATION: "^", Form.JOSEPH: "s", Form.UD: "D"}
 
 
-def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None = None) -> list[Artist]:
-    """Draw the error of one quantity against the step, one curve for each run.
+class Limit(NamedTuple):
+    """A bound to draw beside the errors: its name, and its value after each of some steps or after all of them."""
+
+    name: str
+    steps: ArrayLike
+    values: ArrayLike
+    holds: bool = False
+
+
+def years(
+    runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None = None, limits: Sequence[Limit] = ()
+) -> list[Artist]:
+    """Draw the error of one quantity against the step, one curve for each run, with bounds.
 
     Parameters
     ----------
     quantity : "drift" or "rate", the larger of two errors; "gain" or "covariance", norms.
     tolerance : tolerance to draw as a line, in the unit of the quantity.
+    limits : at most two that fail, and any number that hold.
 
     Raises
     ------
-    ValueError : another quantity, or more curves than there are colours.
+    ValueError : another quantity, or the reference among the runs.
     """
     if quantity not in _QUANTITIES:
         raise ValueError(f"got quantity {quantity!r}; needed one of {', '.join(_QUANTITIES)}")
     artists: list[Artist] = []
-    for run, colour in zip(runs, colours(len(runs), (*COLOURS, BLACK, REFERENCE)), strict=True):
+    ends: dict[str, tuple[float, str]] = {}
+    for run in runs:
         values = np.abs(getattr(run, quantity))
         if values.ndim > 1:
             values = values.max(axis=1)
@@ -62,30 +80,23 @@ def years(runs: Sequence[Year], quantity: str, ax: Axes, tolerance: float | None
             raise ValueError(
                 "got the reference among the runs; needed only rounded runs, because the reference has no error"
             )
-        seen = values > 0
-        artists += ax.plot(
-            run.steps[seen], values[seen], marker=_MARKERS[run.case.form], color=colour, lw=0.8, label=_name(run)
-        )
+        seen, colour, name = values > 0, bits_colour(run.case.fmt), _name(run)
+        face = "none" if run.case.rounding is Rounding.CHOP else colour
+        artists += ax.plot(run.steps[seen], values[seen], "o-", color=colour, mfc=face, lw=0.8, label=name)
+        ends[name] = float(values[seen][-1]), colour
+    broken = iter(("--", "-."))
+    for limit in limits:
+        values = np.broadcast_to(limit.values, np.shape(limit.steps))
+        colour = VALID if limit.holds else REFUTED
+        artists += ax.plot(limit.steps, values, color=colour, ls="-" if limit.holds else next(broken), label=limit.name)
+        ends[limit.name] = float(values[-1]), colour
     if tolerance is not None:
         artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
+        ends["tolerance"] = tolerance, REFERENCE
     loglog(ax)
     label(ax, "step $k$", _QUANTITIES[quantity])
+    name_ends(ax, ends)
     return artists
-
-
-def lines(curves: Sequence[tuple[str, Sequence[float], Sequence[float]]], ax: Axes) -> list[Artist]:
-    """Draw bounds against the step, given as name, steps and values; the last bound holds and the others fail."""
-    artists: list[Artist] = []
-    for number, (name, steps, values) in enumerate(curves):
-        last = number == len(curves) - 1
-        style = "-" if last else ("-", "--", "-.")[number % 3]
-        artists += ax.plot(steps, values, color=VALID if last else REFUTED, ls=style, label=name)
-    return artists
-
-
-def level(name: str, value: float, ax: Axes) -> Artist:
-    """Draw a printed bound that is the same at each step and that the errors exceed."""
-    return ax.axhline(value, color=REFUTED, label=name)
 
 
 def _name(run: Year) -> str:
@@ -95,105 +106,90 @@ def _name(run: Year) -> str:
     return arithmetic(fmt) + ("" if run.case.form is Form.HUNG else f", {run.case.form}")
 
 
-def year_end(
-    runs: Sequence[Year],
-    ax: Axes,
-    tolerance: float,
-    faults: Mapping[str, Mapping[str, bool]],
-    answers: Sequence[tuple[str, Sequence[float]]],
-) -> list[Artist]:
-    """Draw the largest error of drift or rate in a year against the digits, with (125) and the answers.
+def digits_needed(found: Answers, ax: Axes, others: bool = False) -> list[Artist]:
+    """Draw the largest error of drift or rate in a year against digits and bits, with (125), and ring the answer.
 
     Parameters
     ----------
-    tolerance : tolerance in mas and mas/yr.
-    faults : names, and the corrected faults of (125), as for
-        :func:`gpbnb.report.kalman.report_bounds.gravity_probe_b_bound`.
-    answers : names and numbers of digits. The report's answers are open markers at the error that they allow, which is
-        as large as the drift of a year; the last answer is a vertical bar through the tolerance.
+    found : printed and observed answers, and the emulated years.
+    others : also mark the digits that the printed formula and the corrected one ask for.
     """
     artists: list[Artist] = []
-    for form, rounding in [(form, rounding) for rounding in Rounding.documented() for form in Form]:
-        group = [run for run in runs if run.case.form is form and run.case.rounding is rounding]
-        if points := _points(group):
-            colour = OBSERVED if rounding is Rounding.NEAREST else OBSERVED_OTHERS[2]
-            name = f"{form}, {rounding.value}"
-            artists += ax.plot(*zip(*sorted(points), strict=True), _MARKERS[form], color=colour, label=name, alpha=0.7)
-    for (name, corrected), style in zip(faults.items(), ("-", "--", "-."), strict=False):
-        artists += bound_by_digits(ax, corrected, ls=style, label=name)
-    artists.append(ax.axhline(tolerance, color=REFERENCE, ls=":", label="tolerance"))
-    for (name, places), marker in zip(answers[:-1], "os^", strict=False):
-        colour = REFUTED if marker == "o" else BLACK
-        height = [float(report_bounds.YEAR_SIZE)] * len(places)
-        artists += ax.plot(list(places), height, marker, mfc="none", mec=colour, ms=9, label=name)
-    for name, places in answers[-1:]:
-        artists += ax.plot(
-            list(places), [tolerance] * len(places), "|", color=BLACK, ms=26, mew=2, ls="none", label=name
-        )
-    ax.set_yscale("log")
-    legend(ax, fontsize=8.5, loc="upper left", bbox_to_anchor=(1.0, 1.0), markerscale=0.6)
-    label(ax, r"decimal digits, $1-\log_{10} 2\beta$", "largest error in a year (mas, mas/yr)")
-    return artists
-
-
-def digits_needed(found: Answers, ax: Axes) -> list[Artist]:
-    """Draw the answers for the digits of a year, and the error of every emulated year; see :func:`year_end`."""
-    lines: dict[str, Mapping[str, bool]] = {
-        "(125), printed formula": {},
-        "(125), all faults corrected": report_bounds.ALL_CORRECTED,
-    }
-    marked: list[tuple[str, Sequence[float]]] = [
-        ("printed answers", found.printed),
-        ("formula", found.formula),
-        ("all faults corrected", found.corrected),
-        ("observed", [found.observed[Rounding.NEAREST]]),
-    ]
-    return year_end(found.runs, ax, found.tolerance, lines, marked)
-
-
-def headline(found: Answers, ax: Axes) -> list[Artist]:
-    """Draw :func:`digits_needed` for the front page, with direct labels and without the forms of the filter."""
-    artists: list[Artist] = []
-    for rounding, colour, word in (
-        (Rounding.CHOP, OBSERVED_OTHERS[2], "emulated, chopped"),
+    for rounding, face, word in (
         (Rounding.NEAREST, OBSERVED, "emulated, rounded"),
+        (Rounding.CHOP, "none", "emulated, chopped"),
     ):
         group = [run for run in found.runs if run.case.rounding is rounding]
-        artists += ax.plot(*zip(*_points(group), strict=True), "o", color=colour, ms=6, alpha=0.75, label=word)
-    for word, faults, style, place, away in (
-        ("(125) as printed", {}, "-", 0, (2, -38)),
-        ("(125) with its faults corrected", report_bounds.ALL_CORRECTED, "--", 12, (6, 6)),
+        artists += ax.plot(*zip(*_points(group), strict=True), "o", color=OBSERVED, mfc=face, ms=5, label=word)
+    for word, faults, style, place in (
+        ("(125)\nas printed", {}, "--", (3.3, 1e9)),
+        ("(125), errors corrected", report_bounds.ALL_CORRECTED, "-.", (17.4, 5e9)),
     ):
-        (line,) = bound_by_digits(ax, faults, ls=style)
-        x, y = np.asarray(line.get_xdata())[place], np.asarray(line.get_ydata())[place]
-        artists += [line, _beside(ax, word, (x, y), away, REFUTED)]
-    artists.append(ax.axhline(found.tolerance, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "tolerance: one milliarcsecond", (3.5, found.tolerance), (0, -14), REFERENCE))
+        artists += bound_by_digits(ax, faults, ls=style)
+        artists.append(name(ax, word, place, REFUTED, (0, 0), ha="left"))
     size = float(report_bounds.YEAR_SIZE)
-    artists.append(ax.axhline(size, color=REFERENCE, ls=":"))
-    artists.append(_beside(ax, "the drift in a year", (16.4, size), (0, -13), REFERENCE, ha="right"))
-    artists += ax.plot(found.printed, [size] * 2, "o", mfc="none", mec=REFUTED, ms=11, mew=1.5)
-    artists += [
-        _beside(ax, f"{place} printed", (place, size), (-6, 9), REFUTED, ha="center") for place in found.printed
-    ]
+    marks = [("o", REFUTED, found.printed, "asked for in print")]
+    if others:
+        marks += [("s", BLACK, found.formula, "by the printed formula")]
+        marks += [("^", BLACK, found.corrected, "by the corrected formula")]
+    for marker, colour, places, word in marks:
+        artists += ax.plot(places, [size] * 2, marker, mfc="none", mec=colour, ms=10, mew=1.5, ls="none", label=word)
+    artists += _standards(ax)
+    artists += _levels(ax, found.tolerance, size)
+    artists += _answer(ax, found)
     ax.set_yscale("log")
-    ax.set_ylim(1e-11, 1e23)
+    ax.set_xlim(3, 23.5)
+    ax.set_ylim(1e-12, 1e24)
     ax.set_yticks(10.0 ** np.arange(-8, 24, 8))
     ax.set_xticks(range(4, 24, 2))
-    legend(ax, loc="lower left")
-    label(ax, "decimal digits of the arithmetic", "largest error in a year (mas, mas/yr)")
+    legend(ax, loc="upper right")
+    label(ax, "decimal digits, $1-\\log_{10} 2\\beta$", "largest error in a year (mas, mas/yr)")
     return artists
+
+
+def _standards(ax: Axes) -> list[Artist]:
+    """Draw the two standard formats, and an axis of bits at the top."""
+    bits = ax.secondary_xaxis("top", functions=(_bits, _digits))
+    bits.set_xlabel("bits")
+    bits.set_xticks([16, 24, 32, 40, 53, 64])
+    bits.tick_params(labelsize=TEXT)
+    bits.xaxis.label.set_fontsize(TEXT)
+    artists: list[Artist] = []
+    for word, fmt in (("binary32", BINARY32), ("binary64", BINARY64)):
+        place = decimal_digits(fmt)
+        artists.append(ax.axvline(place, ymax=0.6, color=REFERENCE, ls=":"))
+        artists.append(name(ax, word, (place, 1e-12), REFERENCE, (-4 if fmt is BINARY32 else 4, 3)))
+    return artists
+
+
+def _levels(ax: Axes, tolerance: float, size: float) -> list[Artist]:
+    artists: list[Artist] = []
+    for height, words in ((tolerance, "tolerance"), (size, "drift in\na year")):
+        artists.append(ax.axhline(height, color=REFERENCE, ls=":"))
+        artists += name_ends(ax, {words: (height, REFERENCE)})
+    return artists
+
+
+def _answer(ax: Axes, found: Answers) -> list[Artist]:
+    """Ring the run with the fewest bits that stayed within the tolerance, and write its bits and digits beside it."""
+    place, height = decimal_digits(FloatFormat(2, found.bits)), found.error
+    artists: list[Artist] = [*ax.plot([place], [height], "o", mfc="none", mec=BLACK, ms=13, mew=2)]
+    artists += ax.plot([place, place], [1e-12, height / 30], color=BLACK, lw=1.4)
+    artists.append(name(ax, f"{found.bits} bits or\n{place:.1f} digits", (place, 1e-6), BLACK, (5, 0)))
+    return artists
+
+
+def _bits(digits: ArrayLike) -> NDArray[np.float64]:
+    return 1 + (np.asarray(digits, dtype=np.float64) - 1) * math.log2(10)
+
+
+def _digits(bits: ArrayLike) -> NDArray[np.float64]:
+    return 1 + (np.asarray(bits, dtype=np.float64) - 1) / math.log2(10)
 
 
 def _points(runs: Sequence[Year]) -> list[tuple[float, float]]:
     """List the digits of each rounded run and its largest error in the year."""
     return [(decimal_digits(fmt), largest(run)) for run in runs if (fmt := run.case.fmt) is not None]
-
-
-def _beside(
-    ax: Axes, text: str, at: tuple[float, float], away: tuple[float, float], colour: str, ha: str = "left"
-) -> Artist:
-    return ax.annotate(text, at, away, textcoords="offset points", color=colour, ha=ha)
 
 
 def shares(found: Sequence[Share], ax: Axes, tolerance: float = 1.0) -> list[Artist]:

@@ -3,14 +3,10 @@
 Gravity Probe B's filter is an example: its drift rates have a time constant of months. Gains and disturbances of a year
 would fill 10 GB, so this module keeps only those of one cycle of the model at a time. Several limits share a pass. The
 two choices of states, drift or deviations from the predicted drift, have the same gains.
-
-``python -m gpbnb.report.gravity_probe_b.horizon`` computes ``horizon.csv`` and resumes where it was interrupted. The
-rows that it has written hold for the steps done so far.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 import pickle
 from collections.abc import Iterator, Sequence
@@ -24,24 +20,23 @@ from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.kernels.backends import double_doubles
-from gpbnb.bounds.bounded_run import BoundedRun
-from gpbnb.bounds.envelope import GAIN, LOOP, ROUNDING, Disturbances, Limits, columns, disturbances, units
-from gpbnb.bounds.gains import check_deterministic, packed_coefficients, widened_array
+from gpbnb.bounds.envelope import GAIN, LOOP, ROUNDING, Disturbances, FilterLimits, Steps, columns, disturbances, units
+from gpbnb.bounds.gains import check_deterministic, packed_coefficients
 from gpbnb.bounds.guarantee import check_limits, limits
 from gpbnb.bounds.reach import Reach, forward, nothing, units_of_trace
 from gpbnb.bounds.storing import stored_sizes
 from gpbnb.filters.forms import Form
-from gpbnb.filters.kernels.step import NEXT_CHECKPOINT
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.opening import widened_array
+from gpbnb.filters.program import Program
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.gravity_probe_b.model import YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS
 from gpbnb.report.gravity_probe_b.year import model as year_model
-from gpbnb.sweeps import Column, machine, read, write
+from gpbnb.sweeps import Column, Sweep, as_computed, read_record, write_record
 
 FILE = Path(__file__).with_name("horizon.csv")
-COMMAND = "python -m gpbnb.report.gravity_probe_b.horizon"
 COLUMNS = (
     Column("precision", "integer", 2, 53),
     Column("steps", "integer", 1),
@@ -58,7 +53,7 @@ SAVE_EVERY = 50
 class _Carried:
     """State that is carried from block to block for one choice of limits."""
 
-    within: Limits
+    within: FilterLimits
     assumed: NDArray[np.float64]
     last: NDArray[np.float64]
     worst: NDArray[np.float64]
@@ -68,8 +63,8 @@ class _Carried:
     size: NDArray[np.float64] = field(default_factory=lambda: np.ones(1))
 
 
-class Bounds(NamedTuple):
-    """Bounds of the error of each state at any step so far, (n,), for one choice of limits."""
+class HorizonBounds(NamedTuple):
+    """HorizonBounds of the error of each state at any step so far, (n,), for one choice of limits."""
 
     worst: NDArray[np.float64]
     last: NDArray[np.float64]
@@ -80,14 +75,14 @@ class Bounds(NamedTuple):
 def bounds_in_blocks(
     model: LinearModel,
     fmt: FloatFormat,
-    within: Sequence[Limits],
+    within: Sequence[FilterLimits],
     assumed: Sequence[Any],
     steps: int,
     form: Form | str = Form.INNOVATION,
     block: int | None = None,
     window: int = 8,
     saved: Path | None = None,
-) -> Iterator[tuple[int, list[Bounds]]]:
+) -> Iterator[tuple[int, list[HorizonBounds]]]:
     """Bound the effect of rounding on the estimates of the first steps, block by block.
 
     Parameters
@@ -114,87 +109,88 @@ def bounds_in_blocks(
     model.refuse_inputs("bounds in blocks")
     model.check_steps(steps)
     stored = model.rounded(fmt)
-    for limit, error in zip(within, assumed, strict=True):
-        check_limits(limit, model.n, model.m, stored.x0)
-        if not (np.isfinite(limit.state).all() and np.isfinite(limit.innovation).all()):
-            raise ValueError(
-                f"got limits {limit.state} on the state and {limit.innovation} on the innovation; needed finite ones: "
-                "bounds in blocks do not derive them from limits on the measurements"
-            )
-        if np.shape(error) != (model.n,):
-            raise ValueError(f"got assumed errors of shape {np.shape(error)}; needed ({model.n},), one for each state")
-    n, m, cycle = stored.n, stored.m, stored.cycle
-    block = cycle if block is None else block
+    _check(stored, within, assumed)
+    block = stored.cycle if block is None else block
     run, true = (
         Run(model, fmt, form, range(1, block + 1)),
-        BoundedRun(stored, None, Form.INNOVATION, range(1, block + 1)),
+        Run(stored, None, Form.INNOVATION, range(1, block + 1), bounded=True),
     )
-    products = np.array([stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(cycle)])
-    HPhi, Phi = double_doubles(products), double_doubles(stored.Phi)
-    none = np.zeros(n)
-    each = [
-        _Carried(
-            w._replace(measurement=stored_sizes(fmt, w.measurement)),
-            np.asarray(a, dtype=np.float64),
-            none,
-            none,
-            np.zeros((n, 4)),
-        )
-        for w, a in zip(within, assumed, strict=True)
-    ]
-    silence = ((run, fmt.array(np.zeros((block, m)))), (true, np.zeros((block, m))))
-    done = 0
+    silence = ((run, fmt.array(np.zeros((block, stored.m)))), (true, np.zeros((block, stored.m))))
+    wide = _wide(stored)
+    done, each = 0, _begun(fmt, within, assumed)
     if saved is not None and saved.exists():
         done, each = _restored(saved, run, true)
     while done < steps:
         count = min(block, steps - done)
         for filter_run, z in silence:
-            filter_run.checkpoint_steps = np.arange(done + 1, done + count + 1)
-            filter_run.notes[NEXT_CHECKPOINT] = 0
+            filter_run.save_at(np.arange(done + 1, done + count + 1))
             filter_run.take(z[:count])
             if filter_run.stopped or filter_run.indefinite:
                 raise ArithmeticError(
                     f"{model.name} in {fmt}: the filter stopped or its covariance lost definiteness by "
                     f"step {done + count}"
                 )
-        rows = np.arange(count)
-        at = (done + rows) % cycle
-        program, packed = packed_coefficients(run, rows, done)
-        coefficients = widened_array(packed)
-        arrays = (
-            coefficients,
-            np.zeros(coefficients.shape[:2]),
-            units(fmt),
-            np.ascontiguousarray(Phi[at % len(Phi)]),
-            np.ascontiguousarray(HPhi[at]),
-            np.ascontiguousarray(true.G[:count].reshape(count, n, m, 2)),
-            true.bounds[1][:count],
-        )
+        program, numbers = _of_block(run, true, wide, done, count)
         caps = np.full(len(program.operations), np.inf)
-        part = np.array([ROUNDING] * len(program.roots) + [LOOP] * n + [GAIN] * m)
+        part = np.array([ROUNDING] * len(program.roots) + [LOOP] * stored.n + [GAIN] * stored.m)
         for one in each:
-            found = Disturbances(
-                *disturbances(
-                    program.operations,
-                    program.outputs,
-                    program.groups,
-                    program.roots,
-                    *arrays,
-                    one.within,
-                    one.assumed,
-                    caps,
-                )
-            )
+            found = Disturbances(*disturbances(program.compiled, numbers, units(fmt), one.within, one.assumed, caps))
             _follow(one, found, part, done, count, window)
             if not (one.worst <= one.assumed).all():
                 raise ArithmeticError(f"the bound {one.worst} exceeds the assumed {one.assumed} by step {done + count}")
         done += count
         if saved is not None and (done // block) % SAVE_EVERY == 0:
             _save(saved, done, run, true, each)
-        yield done, [Bounds(one.worst, one.last, one.parts) for one in each]
+        yield done, [HorizonBounds(one.worst, one.last, one.parts) for one in each]
 
 
-def _save(file: Path, done: int, run: Run, true: BoundedRun, each: list[_Carried]) -> None:
+def _check(stored: LinearModel, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> None:
+    """Reject limits that are not finite, and assumed errors of another shape."""
+    for limit, error in zip(within, assumed, strict=True):
+        check_limits(limit, stored.n, stored.m, stored.x0)
+        if not (np.isfinite(limit.state).all() and np.isfinite(limit.innovation).all()):
+            raise ValueError(
+                f"got limits {limit.state} on the state and {limit.innovation} on the innovation; needed finite ones: "
+                "bounds in blocks do not derive them from limits on the measurements"
+            )
+        if np.shape(error) != (stored.n,):
+            raise ValueError(f"got assumed errors of shape {np.shape(error)}; needed ({stored.n},), one for each state")
+
+
+def _begun(fmt: FloatFormat, within: Sequence[FilterLimits], assumed: Sequence[Any]) -> list[_Carried]:
+    """Return the state before the first step, for each choice of limits."""
+    found = []
+    for limit, error in zip(within, assumed, strict=True):
+        none, most = np.zeros(len(error)), limit._replace(measurement=stored_sizes(fmt, limit.measurement))
+        found.append(_Carried(most, np.asarray(error, dtype=np.float64), none, none, np.zeros((len(error), 4))))
+    return found
+
+
+def _wide(stored: LinearModel) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the cycles of Phi and of H Phi in double-double."""
+    products = [stored.H[k % len(stored.H)] @ stored.Phi[k % len(stored.Phi)] for k in range(stored.cycle)]
+    return double_doubles(stored.Phi), double_doubles(np.array(products))
+
+
+def _of_block(
+    run: Run, true: Run, wide: tuple[NDArray[np.float64], NDArray[np.float64]], done: int, count: int
+) -> tuple[Program, Steps]:
+    """Return the program of a step, and the numbers of a block that its disturbances follow from."""
+    (Phi, HPhi), rows = wide, np.arange(count)
+    at = (done + rows) % len(HPhi)
+    program, packed = packed_coefficients(run, rows, done)
+    coefficients = widened_array(packed)
+    return program, Steps(
+        coefficients,
+        np.zeros(coefficients.shape[:2]),
+        np.ascontiguousarray(Phi[at % len(Phi)]),
+        np.ascontiguousarray(HPhi[at]),
+        np.ascontiguousarray(true.G[:count].reshape(count, program.n, program.m, 2)),
+        true.bounds.gain[:count],
+    )
+
+
+def _save(file: Path, done: int, run: Run, true: Run, each: list[_Carried]) -> None:
     """Write the state that the next block needs; an existing file is replaced as a whole."""
     draft = file.with_suffix(".draft")
     runs = [(given.x, given.P, given.notes) for given in (run, true)]
@@ -202,7 +198,7 @@ def _save(file: Path, done: int, run: Run, true: BoundedRun, each: list[_Carried
     draft.replace(file)
 
 
-def _restored(file: Path, run: Run, true: BoundedRun) -> tuple[int, list[_Carried]]:
+def _restored(file: Path, run: Run, true: Run) -> tuple[int, list[_Carried]]:
     """Restore both runs from a file written by :func:`_save`; return the rest of it."""
     done, runs, true.bound, each = pickle.loads(file.read_bytes())
     for given, state in zip((run, true), runs, strict=True):
@@ -240,22 +236,14 @@ INNOVATION = (1000.0, 200.0)
 """Limits of the innovations in mas. They are 20 standard deviations of gyro and telescope noise, with some margin."""
 
 
-class Row(NamedTuple):
-    """Bounds after some steps of the year for one choice of states."""
+class HorizonRow(NamedTuple):
+    """HorizonBounds after some steps of the year for one choice of states."""
 
     precision: int
     steps: int
     states: str
     bounds: tuple[float, ...]
     gain_parts: tuple[float, ...]
-
-
-def load(file: Path = FILE) -> tuple[Row, ...]:
-    """Return the stored rows."""
-    return tuple(
-        Row(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13])), tuple(map(float, line[13:])))
-        for line in read(file, COLUMNS, COMMAND).rows
-    )
 
 
 def table() -> Table:
@@ -278,7 +266,7 @@ def table() -> Table:
     return Table("Gravity Probe B in binary64", header, tuple(body))
 
 
-def bits(row: Row, tolerance: float = 1.0) -> int:
+def bits(row: HorizonRow, tolerance: float = 1.0) -> int:
     """Return the bits for which the bound of each drift and rate, scaled with the unit roundoff, meets a tolerance.
 
     The bounds are nearly proportional to the unit roundoff, so this extrapolates; it is not a guarantee by itself.
@@ -288,7 +276,7 @@ def bits(row: Row, tolerance: float = 1.0) -> int:
 
 def gravity_probe_b_bounds(
     precision: int, steps: int = YEAR, saved: Path | None = None
-) -> Iterator[tuple[int, list[Bounds]]]:
+) -> Iterator[tuple[int, list[HorizonBounds]]]:
     """Yield bounds for a year of Gravity Probe B in a binary format, first for absolute states, then for deviations."""
     within = [limits(10, 2, state=state, innovation=INNOVATION) for state in (ABSOLUTE, DEVIATION)]
     assumed = [1e-2 * np.array(state) for state in (ABSOLUTE, DEVIATION)]
@@ -296,29 +284,59 @@ def gravity_probe_b_bounds(
     return bounds_in_blocks(year_model(MODELS[0], 2), fmt, within, assumed, steps, saved=saved)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Follow a year of Gravity Probe B in a format; write two lines to the file after each 1 % of it."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Compute error bounds for a year of Gravity Probe B.")
-    parser.add_argument("precision", nargs="?", type=int, default=53, help="bits of the significand")
-    parser.add_argument("--steps", type=int, default=YEAR, help="steps of 10 s")
-    parser.add_argument("--output", type=Path, default=Path(".cache/horizon"), help=f"folder for {FILE.name}")
-    given = parser.parse_args(arguments)
-    given.output.mkdir(parents=True, exist_ok=True)
-    file, saved = given.output / FILE.name, given.output / f"state_{given.precision}.pickle"
-    rows = list(read(file, COLUMNS, COMMAND).rows) if saved.exists() and file.exists() else []
+# -- the stored table -------------------------------------------------------------------------------------------------
+
+
+def year_of_bounds(precision: int, directory: Path | None = None, steps: int = YEAR) -> list[list[str]]:
+    """Return two rows after each hundredth of the year and at the end; they hold for the steps done so far.
+
+    Parameters
+    ----------
+    directory : folder that holds the state of the run and its rows, from which it continues; None saves nothing.
+    """
+    saved = record = None
+    rows: list[list[str]] = []
+    if directory is not None:
+        saved, record = directory / f"state_{precision}.pickle", directory / f"rows_{precision}.json"
+        if saved.exists() and record.exists():
+            rows = read_record(record, SWEEP.command)["rows"]
     every = int(rows[-1][1]) + YEAR // 100 if rows else 0
-    with tqdm(total=given.steps, unit="step") as bar:
-        for done, found in gravity_probe_b_bounds(given.precision, given.steps, saved):
+    with tqdm(total=steps, unit="step", disable=directory is None) as bar:
+        for done, found in gravity_probe_b_bounds(precision, steps, saved):
             bar.update(done - bar.n)
-            if done == given.steps or done >= every:
+            if done == steps or done >= every:
                 every = done + YEAR // 100
                 rows = [row for row in rows if int(row[1]) < done]
                 for name, each in zip(("absolute", "deviation"), found, strict=True):
                     bounds, parts = (f"{b:.6g}" for b in each.worst), (f"{b:.3g}" for b in each.parts[:, GAIN])
-                    rows.append((str(given.precision), str(done), name, *bounds, *parts))
-                write(file, COLUMNS, rows, {"command": COMMAND, **machine()})
-    return 0
+                    rows.append([str(precision), str(done), name, *bounds, *parts])
+                if record is not None:
+                    write_record(record, {"rows": rows})
+    return rows
 
 
-if __name__ == "__main__":
-    raise SystemExit(main())
+def first_cycle(precision: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
+    """Return the rows after the first cycle of the model."""
+    return as_computed(precision, year_of_bounds(precision, steps=year_model(MODELS[0], 2).cycle))
+
+
+SWEEP: Sweep[int] = Sweep(
+    name="gravity_probe_b/horizon",
+    file=FILE,
+    columns=COLUMNS,
+    key=3,
+    cells=lambda: (53,),
+    compute=year_of_bounds,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute gravity_probe_b/horizon",
+    seed=0,
+    sample=first_cycle,
+)
+
+
+def load(file: Path = FILE) -> tuple[HorizonRow, ...]:
+    """Return the stored rows."""
+    return tuple(
+        HorizonRow(int(line[0]), int(line[1]), line[2], tuple(map(float, line[3:13])), tuple(map(float, line[13:])))
+        for line in SWEEP.load(file).rows
+    )

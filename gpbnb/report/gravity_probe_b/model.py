@@ -57,7 +57,7 @@ def gravity_probe_b(roll: str = "600", process_noise: bool = True) -> LinearMode
     Parameters
     ----------
     roll : period in seconds, "600" (as in the reports) or "77.5" (as flown); or another multiple of half a second.
-    process_noise : whether drift, misalignments and scale perform a random walk; without it, gains decrease forever.
+    process_noise : whether drift, misalignments and scale perform a random walk; without it, gains decrease for ever.
 
     References
     ----------

@@ -8,10 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.bounds.bounded_run import BoundedHistory
 from gpbnb.filters import contraction
+from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
-from gpbnb.report.display.tables import Table, arithmetic, short
+from gpbnb.report.display.tables import Table, short
 from gpbnb.report.gravity_probe_b import threshold, year
 from gpbnb.report.gravity_probe_b.answers import Moved
 from gpbnb.report.gravity_probe_b.mission import PARAMETERS
@@ -60,10 +62,10 @@ def year_ends(runs: Sequence[year.Year]) -> Table:
         "relative error of the covariance",
         "smallest eigenvalue",
     )
-    return Table(f"{len(body)} years", header, tuple(body))
+    return Table("errors after a year", header, tuple(body))
 
 
-def slack(runs: Sequence[year.Year], bounds: Sequence[year.Bounds], terms: Terms) -> Table:
+def slack(runs: Sequence[year.Year], bounds: Sequence[year.YearBounds], terms: Terms) -> Table:
     """Tabulate bound / error of the drift rate after a year, for the smallest value of (125) and the companion bound.
 
     Parameters
@@ -107,8 +109,8 @@ def shares(found: Sequence[Share]) -> Table:
     """Tabulate the share of records within the tolerance for a year, with its 95 % limits, and quantiles."""
     rows = [
         (
-            each.states,
-            str(each.form),
+            in_words(each.states),
+            in_words(each.form),
             arithmetic(each.fmt),
             f"{each.within} of {each.records}",
             f"{each.low:.3f} to {each.high:.3f}",
@@ -137,10 +139,29 @@ def parameters() -> Table:
     return Table("parameters of the mission model", ("parameter", "value", "unit", "source"), rows)
 
 
+_WORDS = {"hung": str(Form.HUNG), "ud": str(Form.UD), "joseph": str(Form.JOSEPH)} | {
+    "nearest": "rounded to nearest",
+    "chop": "chopped",
+    "absolute": "absolute angles",
+    "deviation": "deviations",
+}
+
+
+def in_words(name: str) -> str:
+    """Return the words that a reader knows for a stored name of a form, a rounding or a choice of states."""
+    return _WORDS.get(name, name)
+
+
 def sensitivity(moved: Sequence[Moved]) -> Table:
     """Tabulate by how many bits each choice changes the answer."""
     rows = tuple(
-        (each.choice, each.before, each.after, f"{each.bits:+.1f}".replace("-", "−"), str(each.records))
+        (
+            each.choice,
+            in_words(each.before),
+            in_words(each.after),
+            f"{each.bits:+.1f}".replace("-", "−"),
+            str(each.records),
+        )
         for each in moved
     )
     return Table("what moves the answer", ("choice", "from", "to", "bits", "records (at least)"), rows)
@@ -155,7 +176,7 @@ def needed_precisions(found: Sequence[Share]) -> Table:
     groups: dict[tuple[str, ...], list[Share]] = {}
     for each in found:
         fmt = each.fmt
-        unit = "bits" if fmt.base == 2 else "digits"
+        unit = "bits" if fmt.base == 2 else "decimal digits"
         groups.setdefault((each.setting, each.states, each.form, fmt.rounding.value, unit), []).append(each)
     rows = []
     for (setting, states, form, rounding, unit), group in groups.items():
@@ -163,7 +184,17 @@ def needed_precisions(found: Sequence[Share]) -> Table:
         observed, lognormal, shown = ("none" if each is None else f"{each} {unit}" for each in answer)
         at = next((each for each in group if each.fmt.precision == answer.observed), None)
         passed, limits = (f"{at.within} of {at.records}", f"{at.low:.3f} to {at.high:.3f}") if at else ("–", "–")
-        rows.append((f"{setting}, {states}", f"{form}, {rounding}", observed, passed, limits, lognormal, shown))
+        rows.append(
+            (
+                f"{setting}, {in_words(states)}",
+                f"{in_words(form)}, {in_words(rounding)}",
+                observed,
+                passed,
+                limits,
+                lognormal,
+                shown,
+            )
+        )
     head = (
         "model and states", "form and rounding", "99 % of the records", "passed", "probability", "99 %, lognormal",
         "99 %, proved with 95 % confidence",
@@ -172,7 +203,7 @@ def needed_precisions(found: Sequence[Share]) -> Table:
 
 
 def bound_costs(
-    found: Sequence[tuple[FloatFormat, BoundedHistory]], terms: Terms, reference: year.Bounds, time: float
+    found: Sequence[tuple[FloatFormat, BoundedHistory]], terms: Terms, reference: year.YearBounds, time: float
 ) -> Table:
     """Tabulate the cost of each bound of a run, and bound / error of the drift rates at the last step.
 

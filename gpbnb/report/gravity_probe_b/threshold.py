@@ -1,34 +1,35 @@
 """Find how many digits a year needs, and with what probability, from many measurement records in each format.
 
-``python -m gpbnb.report.gravity_probe_b.threshold`` computes the sweep and resumes where it was interrupted. The year
-is that of :mod:`gpbnb.report.gravity_probe_b.year`: 3,153,600 steps, the simple model, measurements in whole
-milliarcseconds. Record 0 is the one of that module. The errors are differences between the rounded filter and the same
-filter in float64, at every step.
+There are two sweeps. The year of the simple model is that of :mod:`gpbnb.report.gravity_probe_b.year`: 3,153,600 steps,
+measurements in whole milliarcseconds; record 0 is the one of that module. The other runs the year of
+:mod:`gpbnb.report.gravity_probe_b.mission` in each of its settings. The errors are differences between the rounded
+filter and the same filter in float64, at every step.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.arithmetic.search import least_from_which_on
 from gpbnb.filters.forms import Form
-from gpbnb.filters.lockstep import Lockstep, error_rows, run_lockstep
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.simulation import Simulation
 from gpbnb.report.confidence import interval, quantile_limit
+from gpbnb.report.gravity_probe_b.lockstep import Lockstep, error_rows, run_lockstep
+from gpbnb.report.gravity_probe_b.mission import SETTINGS, Mission
 from gpbnb.report.gravity_probe_b.model import TRUTH, YEAR
 from gpbnb.report.gravity_probe_b.year import MODELS, model
-from gpbnb.sweeps import Column, Sweep, Table
-from gpbnb.sweeps.command import run_command
+from gpbnb.sweeps import Column, StoredTable, Sweep
 
 #: States of the filter, either drift angles and rates or their deviations from the predicted drift.
 STATES = ("absolute", "deviation")
@@ -39,66 +40,8 @@ FORMS = {"hung": Form.HUNG, "innovation": Form.INNOVATION}
 #: True minus predicted drift rates in mas/yr, from the measured differences 6606.1 - 6601.8 and 39.2 - 37.2.
 DEVIATION = (4.3, 2.0)
 
-SEED = 1984
-RECORDS = 100
+SEED, MISSION_SEED = 1984, 2004
 _HERE = Path(__file__).parent
-
-
-@dataclass(frozen=True)
-class Cell:
-    """Several formats of one base for the same records, which share measurements and reference."""
-
-    states: str
-    base: int
-    rounding: str
-    form: str
-    precisions: tuple[int, ...]
-    first: int = 0
-    count: int = RECORDS
-
-    @property
-    def key(self) -> tuple[str, ...]:
-        """Return the first columns of this cell's first row."""
-        return (*self._head(self.precisions[0]), str(self.first))
-
-    def _head(self, precision: int) -> tuple[str, ...]:
-        return self.states, str(self.base), self.rounding, self.form, str(precision)
-
-    def heads(self) -> list[tuple[str, ...]]:
-        """Return the first columns of the rows of each format."""
-        return [self._head(precision) for precision in self.precisions]
-
-
-def _cells() -> tuple[Cell, ...]:
-    absolute, deviation = STATES
-    cells = [
-        Cell(absolute, 2, "nearest", "hung", (31, 32, 33, 34)),
-        Cell(deviation, 2, "nearest", "hung", (24, 25, 26, 27)),
-        Cell(deviation, 10, "nearest", "innovation", (8,), 0, 30),
-        Cell(absolute, 10, "nearest", "innovation", (10,), 0, 30),
-        Cell(deviation, 2, "chop", "hung", (30,), 0, 30),
-        Cell(deviation, 2, "nearest", "hung", (26,), 100, 200),
-        Cell(absolute, 2, "nearest", "hung", (33,), 100, 200),
-        Cell(absolute, 2, "chop", "hung", (36,), 0, 30),
-        Cell(absolute, 10, "nearest", "innovation", (9, 11), 0, 30),
-        Cell(deviation, 10, "nearest", "innovation", (7, 9), 0, 30),
-        Cell(absolute, 2, "chop", "hung", (34, 35), 0, 30),
-        Cell(deviation, 2, "chop", "hung", (29,), 0, 30),
-        Cell(deviation, 10, "nearest", "innovation", (8,), 30, 270),
-        Cell(absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
-        Cell(deviation, 2, "nearest", "hung", (22, 23, 28, 29, 30)),
-        Cell(deviation, 2, "chop", "hung", (29, 30), 30, 70),
-        Cell(absolute, 2, "chop", "hung", (34, 35, 36), 30, 70),
-        Cell(absolute, 10, "nearest", "innovation", (9, 10, 11), 30, 70),
-        Cell(deviation, 10, "nearest", "innovation", (7, 9), 30, 70),
-        Cell(absolute, 10, "nearest", "innovation", (8,)),
-        Cell(deviation, 10, "nearest", "innovation", (10, 11)),
-    ]
-    return tuple(cells)
-
-
-#: All cells, the most valuable first.
-CELLS = _cells()
 
 
 @dataclass(frozen=True)
@@ -115,6 +58,11 @@ class SimpleYear:
     def start(self) -> tuple[float, ...]:
         """Return the truth at step 0."""
         return TRUTH if self.states == "absolute" else (*TRUTH[:2], *DEVIATION, *TRUTH[4:])
+
+    @property
+    def steps(self) -> int:
+        """Steps of a year."""
+        return YEAR
 
     def model(self, base: int) -> LinearModel:
         """Return the filter's model as stored in a base."""
@@ -139,24 +87,121 @@ def _simulation(states: str, record: int) -> Simulation:
     return Simulation(model(MODELS[0], 2), SimpleYear(states).start, SEED + record, resolution=1.0)
 
 
-def lockstep(cell: Cell, steps: int = YEAR) -> Lockstep:
+# -- the sweeps ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class YearCell:
+    """Several formats of one base for the same records of a year, which share measurements and reference.
+
+    Parameters
+    ----------
+    setting : a setting of the mission model, or an empty text for the simple model.
+    states, base, rounding, form, precisions : the filter and its formats.
+    first, count : the first record and the number of records.
+    """
+
+    setting: str
+    states: str
+    base: int
+    rounding: str
+    form: str
+    precisions: tuple[int, ...]
+    first: int = 0
+    count: int = 100
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """Return the first columns of this cell's first row."""
+        return (*self.heads()[0], str(self.first))
+
+    def heads(self) -> list[tuple[str, ...]]:
+        """Return the first columns of the rows of each format; the simple model has no column for a setting."""
+        head = *filter(None, (self.setting,)), self.states, str(self.base), self.rounding, self.form
+        return [(*head, str(precision)) for precision in self.precisions]
+
+    @property
+    def year(self) -> SimpleYear | Mission:
+        """Return the model whose measurements the filters see."""
+        if not self.setting:
+            return SimpleYear(self.states)
+        return replace(SETTINGS[self.setting], deviations=self.states == "deviation")
+
+
+def _simple_cells() -> tuple[YearCell, ...]:
+    absolute, deviation = STATES
+    cell = partial(YearCell, "")
+    return (
+        cell(absolute, 2, "nearest", "hung", (31, 32, 33, 34)),
+        cell(deviation, 2, "nearest", "hung", (24, 25, 26, 27)),
+        cell(deviation, 10, "nearest", "innovation", (8,), 0, 30),
+        cell(absolute, 10, "nearest", "innovation", (10,), 0, 30),
+        cell(deviation, 2, "chop", "hung", (30,), 0, 30),
+        cell(deviation, 2, "nearest", "hung", (26,), 100, 200),
+        cell(absolute, 2, "nearest", "hung", (33,), 100, 200),
+        cell(absolute, 2, "chop", "hung", (36,), 0, 30),
+        cell(absolute, 10, "nearest", "innovation", (9, 11), 0, 30),
+        cell(deviation, 10, "nearest", "innovation", (7, 9), 0, 30),
+        cell(absolute, 2, "chop", "hung", (34, 35), 0, 30),
+        cell(deviation, 2, "chop", "hung", (29,), 0, 30),
+        cell(deviation, 10, "nearest", "innovation", (8,), 30, 270),
+        cell(absolute, 2, "nearest", "hung", (28, 29, 30, 35, 36)),
+        cell(deviation, 2, "nearest", "hung", (22, 23, 28, 29, 30)),
+        cell(deviation, 2, "chop", "hung", (29, 30), 30, 70),
+        cell(absolute, 2, "chop", "hung", (34, 35, 36), 30, 70),
+        cell(absolute, 10, "nearest", "innovation", (9, 10, 11), 30, 70),
+        cell(deviation, 10, "nearest", "innovation", (7, 9), 30, 70),
+        cell(absolute, 10, "nearest", "innovation", (8,)),
+        cell(deviation, 10, "nearest", "innovation", (10, 11)),
+    )
+
+
+def _mission_cells() -> tuple[YearCell, ...]:
+    usual, flown = next(iter(SETTINGS)), "steps and roll as flown"
+    others = ("no occultation", "no annual aberration", "a tenth of the readout noise")
+    absolute, deviation = STATES
+    return (
+        YearCell(usual, deviation, 2, "nearest", "hung", (25, 26, 27), 0, 30),
+        YearCell(usual, absolute, 2, "nearest", "hung", (32, 33, 34), 0, 30),
+        YearCell("white noise only", deviation, 2, "nearest", "hung", (26,), 0, 10),
+        YearCell("known roll phase", deviation, 2, "nearest", "hung", (26,), 0, 10),
+        YearCell(usual, deviation, 2, "nearest", "hung", (27,), 30, 270),
+        YearCell(usual, absolute, 2, "nearest", "hung", (31,), 0, 30),
+        YearCell(usual, absolute, 2, "nearest", "hung", (32,), 30, 270),
+        *(YearCell(setting, deviation, 2, "nearest", "hung", (26,), 0, 10) for setting in others),
+        YearCell(usual, deviation, 2, "nearest", "innovation", (26,), 0, 10),
+        YearCell(usual, deviation, 2, "chop", "hung", (30,), 0, 10),
+        YearCell(usual, deviation, 10, "nearest", "innovation", (8, 9), 0, 10),
+        YearCell(usual, absolute, 10, "nearest", "innovation", (10, 11), 0, 10),
+        YearCell(flown, deviation, 2, "nearest", "hung", (26,), 0, 5),
+        YearCell(flown, deviation, 2, "nearest", "hung", (27, 28, 29), 0, 10),
+        YearCell(usual, deviation, 2, "nearest", "hung", (25, 26), 30, 70),
+        YearCell(usual, absolute, 2, "nearest", "hung", (31, 33), 30, 70),
+    )
+
+
+SIMPLE_CELLS, MISSION_CELLS = _simple_cells(), _mission_cells()
+"""All cells of each sweep, the most valuable first. If 299 records all pass, they show a probability of 99 %."""
+
+
+def lockstep(cell: YearCell, steps: int | None = None) -> Lockstep:
     """Create all filters of a cell, before their first step."""
     formats = [FloatFormat(cell.base, t, Rounding(cell.rounding)) for t in cell.precisions]
-    records = range(cell.first, cell.first + cell.count)
-    return Lockstep(repr(cell), SimpleYear(cell.states), formats, FORMS[cell.form], records, steps)
+    year, records = cell.year, range(cell.first, cell.first + cell.count)
+    return Lockstep(repr(cell), year, formats, FORMS[cell.form], records, steps or year.steps)
 
 
-def compute(cell: Cell, directory: Path | None = None, steps: int = YEAR) -> dict[str, Any]:
+def compute(cell: YearCell, directory: Path | None = None, steps: int | None = None) -> dict[str, Any]:
     """Run the years of a cell, and save progress in a directory if one is given."""
     return run_lockstep(lockstep(cell, steps), directory)
 
 
-def rows(cell: Cell, result: dict[str, Any]) -> list[tuple[str, ...]]:
+def rows(cell: YearCell, result: dict[str, Any]) -> list[tuple[str, ...]]:
     """List, for each format and record, the largest error of the year and the error at its end."""
     return error_rows(cell.heads(), cell.first, result)
 
 
-def sample(cell: Cell, rng: np.random.Generator) -> list[tuple[str, ...]]:
+def sample(cell: YearCell, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """Compute only the row of one format and record."""
     precision, record = int(rng.choice(cell.precisions)), cell.first + int(rng.integers(cell.count))
     one = replace(cell, precisions=(precision,), first=record, count=1)
@@ -172,24 +217,26 @@ COLUMNS = (
     Column("record", "integer", 0, 9999),
     *(Column(name, low=0) for name in ("drift", "rate", "drift_end", "rate_end")),
 )
-
-SWEEP: Sweep[Cell] = Sweep(
-    name="kalman/threshold",
-    file=_HERE / "threshold.csv",
-    columns=COLUMNS,
-    key=6,
-    cells=lambda: CELLS,
-    compute=compute,
-    rows=rows,
-    command="python -m gpbnb.report.gravity_probe_b.threshold",
-    seed=SEED,
-    sample=sample,
-)
+MISSION_COLUMNS = (Column("setting", "text", choices=tuple(SETTINGS)), *COLUMNS)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
-    return run_command(SWEEP, "A year for hundreds of measurement records.", Path(".cache/threshold"), arguments)
+def _sweep(name: str, columns: tuple[Column, ...], cells: tuple[YearCell, ...], seed: int) -> Sweep[YearCell]:
+    return Sweep(
+        name=f"gravity_probe_b/{name}",
+        file=_HERE / f"{name}.csv",
+        columns=columns,
+        key=len(columns) - 4,
+        cells=lambda: cells,
+        compute=compute,
+        rows=rows,
+        command=f"python -m gpbnb.report.stored recompute gravity_probe_b/{name}",
+        seed=seed,
+        sample=sample,
+    )
+
+
+SWEEP = _sweep("threshold", COLUMNS, SIMPLE_CELLS, SEED)
+MISSION_SWEEP = _sweep("mission", MISSION_COLUMNS, MISSION_CELLS, MISSION_SEED)
 
 
 # -- shares, confidence, and the precision needed ----------------------------------------------------
@@ -223,7 +270,7 @@ class Share(NamedTuple):
         return float(np.quantile(self.errors, probability))
 
 
-def shares(table: Table, tolerance: float = 1.0) -> tuple[Share, ...]:
+def shares(table: StoredTable, tolerance: float = 1.0) -> tuple[Share, ...]:
     """Return, for each format, the share of records that stay within the tolerance throughout the year.
 
     Parameters
@@ -259,9 +306,9 @@ class Needed(NamedTuple):
     not refute it.
     """
 
-    observed: int | None
-    lognormal: int | None
-    shown: int | None
+    observed: int | MaybeNone
+    lognormal: int | MaybeNone
+    shown: int | MaybeNone
 
 
 def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float = 1.0) -> Needed:
@@ -279,23 +326,11 @@ def needed(found: Sequence[Share], probability: float = 0.99, tolerance: float =
     if len(kinds) != 1:
         raise ValueError(f"got formats of {len(kinds)} kinds; needed formats of one kind")
 
-    def first(meets: Sequence[bool]) -> int | None:
-        enough = None
-        for share, met in sorted(zip(found, meets, strict=True), key=lambda pair: -pair[0].fmt.precision):
-            if not met:
-                break
-            enough = share.fmt.precision
-        return enough
-
     by_precision = sorted(found, key=lambda each: each.fmt.precision)
     refuted = [each.fmt.precision for each in by_precision if each.within < probability * each.records]
     shown = (each.fmt.precision for each in by_precision if each.low >= probability)
     return Needed(
-        first([each.within >= probability * each.records for each in found]),
-        first([each.quantile_limit <= tolerance for each in found]),
+        least_from_which_on({each.fmt.precision: each.within >= probability * each.records for each in found}),
+        least_from_which_on({each.fmt.precision: each.quantile_limit <= tolerance for each in found}),
         next((each for each in shown if each > max(refuted, default=0)), None),
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -3,21 +3,19 @@
 In one base, all formats use the same numbers. The model is stored once, in 14 bits or 4 decimal digits, and
 measurements are whole milliarcseconds. So one reference serves all formats, and errors come only from the arithmetic.
 
-The command ``python -m gpbnb.report.gravity_probe_b.year`` saves its progress and resumes where it was interrupted. Its
-results are stored next to this file, in ``year.csv`` and ``bounds.csv``, with their provenance in ``year.json``;
+The results are stored next to this file, in ``year.csv`` and ``bounds.csv``, with their provenance in ``year.json``;
 :func:`load` and :func:`bounds` read them.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import math
 import os
 import platform
-import sys
 import time
 from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
@@ -29,9 +27,9 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb import sweeps
+from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import BoundedRun
 from gpbnb.filters.contraction import Contraction
 from gpbnb.filters.emulation import History, compare_runs, emulate, relative
 from gpbnb.filters.forms import Form
@@ -48,7 +46,7 @@ STORED = {2: FloatFormat(2, 14), 10: FloatFormat(10, 4)}
 MODELS = ("roll 600 s", "roll 77.5 s", "no process noise")
 
 
-class Case(NamedTuple):
+class YearCase(NamedTuple):
     """One run of the year; a precision of 0 stands for the reference in double-double."""
 
     model: str
@@ -58,14 +56,14 @@ class Case(NamedTuple):
     form: Form
 
     @property
-    def fmt(self) -> FloatFormat | None:
+    def fmt(self) -> FloatFormat | MaybeNone:
         """The format of the run; None for double-double."""
         return FloatFormat(self.base, self.precision, self.rounding) if self.precision else None
 
     @property
-    def reference(self) -> Case:
+    def reference(self) -> YearCase:
         """The case that serves as the reference for this one."""
-        return Case(self.model, self.base, 0, Rounding.NEAREST, Form.INNOVATION)
+        return YearCase(self.model, self.base, 0, Rounding.NEAREST, Form.INNOVATION)
 
     @property
     def name(self) -> str:
@@ -74,27 +72,30 @@ class Case(NamedTuple):
         return words.replace(" ", "-").replace(".", "_")
 
 
-def _cases() -> tuple[Case, ...]:
+def _cases() -> tuple[YearCase, ...]:
     usual, flown, noiseless = MODELS
     nearest, chop = Rounding.documented()
     others = (Form.INNOVATION, Form.JOSEPH, Form.UD)
-    cases = [Case(usual, 2, t, nearest, Form.HUNG) for t in (24, 18, 32, 14, 20, 53)]
-    cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (24, 18, 32)]
-    cases += [Case(usual, 2, 24, nearest, form) for form in others]
-    cases += [Case(usual, 10, 8, nearest, Form.HUNG), Case(usual, 10, 6, nearest, Form.HUNG)]
-    cases += [Case(flown, 2, 24, nearest, Form.HUNG), Case(noiseless, 2, 24, nearest, Form.HUNG)]
-    cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (22, 28)]
-    cases += [Case(usual, 2, 18, nearest, form) for form in others]
-    cases += [Case(usual, 2, 24, nearest, Form.HUNG_SECOND_GAIN), Case(usual, 10, 8, chop, Form.HUNG)]
-    cases += [Case(usual, 10, 8, nearest, Form.UD), Case(usual, 10, 10, nearest, Form.HUNG)]
-    cases += [Case(usual, 2, 24, chop, form) for form in others]
-    cases += [Case(usual, 10, 8, nearest, form) for form in others[:2]]
-    cases += [Case(usual, 10, 4, nearest, Form.HUNG), Case(usual, 10, 16, nearest, Form.HUNG)]
-    cases += [Case(usual, 2, t, nearest, Form.HUNG) for t in (16, 26, 40)]
-    cases += [Case(usual, 2, t, chop, Form.HUNG) for t in (14, 20, 28, 53)]
-    cases += [Case(usual, 2, 53, nearest, form) for form in others]
+    cases = [YearCase(usual, 2, t, nearest, Form.HUNG) for t in (24, 18, 32, 14, 20, 53)]
+    cases += [YearCase(usual, 2, t, chop, Form.HUNG) for t in (24, 18, 32)]
+    cases += [YearCase(usual, 2, 24, nearest, form) for form in others]
+    cases += [YearCase(usual, 10, 8, nearest, Form.HUNG), YearCase(usual, 10, 6, nearest, Form.HUNG)]
+    cases += [YearCase(flown, 2, 24, nearest, Form.HUNG), YearCase(noiseless, 2, 24, nearest, Form.HUNG)]
+    cases += [YearCase(usual, 2, t, nearest, Form.HUNG) for t in (22, 28)]
+    cases += [YearCase(usual, 2, 18, nearest, form) for form in others]
+    cases += [YearCase(usual, 2, 24, nearest, Form.HUNG_SECOND_GAIN), YearCase(usual, 10, 8, chop, Form.HUNG)]
+    cases += [YearCase(usual, 10, 8, nearest, Form.UD), YearCase(usual, 10, 10, nearest, Form.HUNG)]
+    cases += [YearCase(usual, 2, 24, chop, form) for form in others]
+    cases += [YearCase(usual, 10, 8, nearest, form) for form in others[:2]]
+    cases += [YearCase(usual, 10, 4, nearest, Form.HUNG), YearCase(usual, 10, 16, nearest, Form.HUNG)]
+    cases += [YearCase(usual, 2, t, nearest, Form.HUNG) for t in (16, 26, 40)]
+    cases += [YearCase(usual, 2, t, chop, Form.HUNG) for t in (14, 20, 28, 53)]
+    cases += [YearCase(usual, 2, 53, nearest, form) for form in others]
     # Neighbours of the smallest precisions that meet a milliarcsecond a year, so that these are exact.
-    cases += [Case(usual, 10, 9, nearest, Form.HUNG), *(Case(usual, 2, t, nearest, Form.HUNG) for t in (31, 33))]
+    cases += [
+        YearCase(usual, 10, 9, nearest, Form.HUNG),
+        *(YearCase(usual, 2, t, nearest, Form.HUNG) for t in (31, 33)),
+    ]
     return tuple(cases)
 
 
@@ -102,7 +103,7 @@ def _cases() -> tuple[Case, ...]:
 CASES = _cases()
 
 #: Runs with their own contraction bound, the references of the first model, from which the other bounds follow.
-BOUNDED_CASES = frozenset(Case(MODELS[0], base, 0, Rounding.NEAREST, Form.INNOVATION) for base in STORED)
+BOUNDED_CASES = frozenset(YearCase(MODELS[0], base, 0, Rounding.NEAREST, Form.INNOVATION) for base in STORED)
 
 
 @cache
@@ -132,7 +133,7 @@ _FINGERPRINT_STEPS = 200  # steps that show whether the code's results are uncha
 class ResumableRun:
     """A run of one case, saved in a file, with its contraction bound if ``BOUNDED_CASES`` contains the case."""
 
-    def __init__(self, case: Case, directory: Path, steps: int) -> None:
+    def __init__(self, case: YearCase, directory: Path, steps: int) -> None:
         self.case, self.steps, self.seconds = case, steps, 0.0
         self.run = _run(case, steps)
         self.truth: NDArray[np.float64] = np.array(TRUTH)
@@ -143,13 +144,13 @@ class ResumableRun:
                 if str(saved["fingerprint"]) == self.fingerprint:
                     for name, array in self._arrays().items():
                         array[...] = saved[name]
-                    if isinstance(self.run, BoundedRun):
+                    if self.run.bounded:
                         self.run.bound = Contraction(*(saved[f"bound_{name}"][()] for name in Contraction._fields))
                     self.truth, self.seconds = saved["truth"], float(saved["seconds"])
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
         arrays = {name: getattr(self.run, name) for name in ("x", "P", "X", "G", "C", "notes")}
-        if isinstance(self.run, BoundedRun):
+        if self.run.bounded:
             arrays |= dict(zip(("states", "gains", "covariances"), self.run.bounds, strict=True))
         return arrays
 
@@ -176,20 +177,20 @@ class ResumableRun:
         """Save the run, either completely or not at all."""
         draft = self.file.with_suffix(f".{os.getpid()}.npz")
         arrays = self._arrays()
-        if isinstance(self.run, BoundedRun):
+        if self.run.bounded:
             arrays |= {f"bound_{name}": np.asarray(each) for name, each in self.run.bound._asdict().items()}
         arrays |= {"truth": self.truth, "seconds": np.array(self.seconds), "fingerprint": np.array(self.fingerprint)}
         np.savez(draft, allow_pickle=False, **arrays)
         os.replace(draft, self.file)
 
 
-def _run(case: Case, steps: int) -> Run:
-    kind = BoundedRun if case in BOUNDED_CASES else Run
-    return kind(model(case.model, case.base), case.fmt, case.form, checkpoint_steps(steps))
+def _run(case: YearCase, steps: int) -> Run:
+    bounded = case in BOUNDED_CASES
+    return Run(model(case.model, case.base), case.fmt, case.form, checkpoint_steps(steps), bounded=bounded)
 
 
 @cache
-def fingerprint(case: Case, steps: int) -> str:
+def fingerprint(case: YearCase, steps: int) -> str:
     """Digest the inputs of a run and its results for the first measurements, to the last digit.
 
     Saved runs are discarded when the code's results change, but not when only its text changes.
@@ -201,14 +202,14 @@ def fingerprint(case: Case, steps: int) -> str:
     for letter in ("Phi", "H", "Q", "R", "x0", "P0"):
         digest.update(" ".join(map(str, getattr(given, letter).flat)).encode())
     run.take(simulation(case.model).measurements(_FINGERPRINT_STEPS))
-    bound = run.bound if isinstance(run, BoundedRun) else ()
+    bound = run.bound if run.bounded else ()
     for each in (run.x, run.P, run.notes, *bound):
         digest.update(np.ascontiguousarray(each).tobytes())
     return digest.hexdigest()
 
 
 def run_cases(
-    cases: Sequence[Case],
+    cases: Sequence[YearCase],
     directory: Path,
     steps: int = YEAR,
     progress: bool = True,
@@ -234,7 +235,7 @@ def run_cases(
                 run.advance(each, bar)
 
 
-def _is_finished(case: Case, directory: Path, steps: int) -> bool:
+def _is_finished(case: YearCase, directory: Path, steps: int) -> bool:
     file = directory / f"{case.name}.npz"
     if not file.exists():
         return False
@@ -243,7 +244,7 @@ def _is_finished(case: Case, directory: Path, steps: int) -> bool:
         return str(saved["fingerprint"]) == fingerprint(case, steps) and (done >= steps or stopped > 0)
 
 
-def history(case: Case, directory: Path, steps: int = YEAR) -> History:
+def history(case: YearCase, directory: Path, steps: int = YEAR) -> History:
     """Return the errors of a finished run."""
     return compare_runs(
         ResumableRun(case, directory, steps).run, reference_checkpoints(case.reference, directory, steps)
@@ -251,7 +252,7 @@ def history(case: Case, directory: Path, steps: int = YEAR) -> History:
 
 
 @cache
-def reference_checkpoints(case: Case, directory: Path, steps: int) -> Checkpoints:
+def reference_checkpoints(case: YearCase, directory: Path, steps: int) -> Checkpoints:
     """Checkpoints of a finished run that serves others as their reference."""
     return ResumableRun(case, directory, steps).run.checkpoints()
 
@@ -274,7 +275,7 @@ class Year:
     least_eigenvalue : least eigenvalue of the covariance, scaled to ones on the true diagonal.
     """
 
-    case: Case
+    case: YearCase
     steps: NDArray[np.int64]
     drift: NDArray[np.float64]
     rate: NDArray[np.float64]
@@ -287,7 +288,7 @@ class Year:
     seconds: float
 
 
-def rows(case: Case, found: History) -> list[tuple[str, ...]]:
+def rows(case: YearCase, found: History) -> list[tuple[str, ...]]:
     """Return rows of ``year.csv`` with six significant digits."""
     numbers = np.column_stack(
         [found.state[:, :4], found.state_norm, found.gain_norm, found.covariance_norm, found.least_eigenvalue]
@@ -299,14 +300,14 @@ def rows(case: Case, found: History) -> list[tuple[str, ...]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bounds:
+class YearBounds:
     """The contraction bound of a run, in the same units and norms as the errors of :class:`Year`.
 
     The errors of a run without its own bound are at most its distance from the reference plus the reference's bound:
     :func:`gpbnb.filters.contraction.companion_bound`.
     """
 
-    case: Case
+    case: YearCase
     steps: NDArray[np.int64]
     drift: NDArray[np.float64]
     rate: NDArray[np.float64]
@@ -315,10 +316,10 @@ class Bounds:
     covariance: NDArray[np.float64]
 
 
-def bound_rows(case: Case, directory: Path, steps: int) -> list[tuple[str, ...]]:
+def bound_rows(case: YearCase, directory: Path, steps: int) -> list[tuple[str, ...]]:
     """Return rows of ``bounds.csv``, if the case has bounds, with six significant digits, rounded upwards."""
     run, true = ResumableRun(case, directory, steps).run, reference_checkpoints(case, directory, steps)
-    if not isinstance(run, BoundedRun):
+    if not run.bounded:
         return []
     states, gains, covariances = (each[: len(true.steps)] for each in run.bounds)
     norms = [relative(gains, true.K), relative(covariances, true.P)]
@@ -329,7 +330,7 @@ def bound_rows(case: Case, directory: Path, steps: int) -> list[tuple[str, ...]]
     ]
 
 
-def _name(case: Case) -> tuple[str, ...]:
+def _name(case: YearCase) -> tuple[str, ...]:
     return case.model, str(case.base), str(case.precision), case.rounding.value, case.form.name.lower()
 
 
@@ -355,10 +356,10 @@ COLUMNS = (
 #: Columns of ``bounds.csv``, whose values are not negative.
 BOUND_COLUMNS = (*_KEY_COLUMNS, *(Column(name, low=0) for name in _COLUMNS[:7]))
 
-_COMMAND = "python -m gpbnb.report.gravity_probe_b.year"
+_COMMAND = "python -m gpbnb.report.stored recompute gravity_probe_b/year"
 
 
-def write(cases: Iterable[Case], directory: Path, steps: int = YEAR, to: Path = _HERE) -> None:
+def write(cases: Iterable[YearCase], directory: Path, steps: int = YEAR, to: Path = _HERE) -> None:
     """Collect the finished runs in ``year.csv``, ``bounds.csv`` and ``year.json``."""
     lines: list[tuple[str, ...]] = []
     bounded: list[tuple[str, ...]] = []
@@ -400,7 +401,7 @@ def machine() -> dict[str, Any]:
     }
 
 
-def _of_reference(case: Case, directory: Path, steps: int) -> dict[str, Any]:
+def _of_reference(case: YearCase, directory: Path, steps: int) -> dict[str, Any]:
     """Return the error of the unrounded filter at the end, and the standard deviation that it computed."""
     resumable = ResumableRun(case, directory, steps)
     true = reference_checkpoints(case, directory, steps)
@@ -439,20 +440,20 @@ def load(directory: Path = _HERE) -> tuple[Year, ...]:
 
 
 @cache
-def bounds(directory: Path = _HERE) -> dict[Case, Bounds]:
+def bounds(directory: Path = _HERE) -> dict[YearCase, YearBounds]:
     """Load the contraction bounds of ``BOUNDED_CASES`` that ship with the package."""
     return {
-        case: Bounds(
+        case: YearBounds(
             case, numbers[:, 0].astype(np.int64), numbers[:, 1:3], numbers[:, 3:5], *(numbers[:, i] for i in (5, 6, 7))
         )
         for case, numbers in _read(directory / "bounds.csv", BOUND_COLUMNS).items()
     }
 
 
-def _read(file: Path, columns: tuple[Column, ...]) -> dict[Case, NDArray[np.float64]]:
-    groups: dict[Case, list[tuple[str, ...]]] = {}
+def _read(file: Path, columns: tuple[Column, ...]) -> dict[YearCase, NDArray[np.float64]]:
+    groups: dict[YearCase, list[tuple[str, ...]]] = {}
     for row in sweeps.read(file, columns, _COMMAND).rows:
-        case = Case(row[0], int(row[1]), int(row[2]), Rounding(row[3]), Form[row[4].upper()])
+        case = YearCase(row[0], int(row[1]), int(row[2]), Rounding(row[3]), Form[row[4].upper()])
         groups.setdefault(case, []).append(row[5:])
     return {case: np.array(group, dtype=np.float64) for case, group in groups.items()}
 
@@ -462,34 +463,13 @@ def provenance(directory: Path = _HERE) -> dict[str, Any]:
     return sweeps.read_record(directory / "year.json", _COMMAND)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog=_COMMAND, description="Run the filters for a year in many formats and forms.")
-    parser.add_argument("--directory", type=Path, default=Path(".cache/year"), help="folder for saved progress")
-    parser.add_argument("--steps", type=int, default=YEAR, help="number of steps; use fewer for a trial")
-    parser.add_argument("--cases", type=int, default=len(CASES), help="compute only this many cases")
-    parser.add_argument("--output", type=Path, default=Path(".cache/year"), help="folder for year.csv and year.json")
-    given = parser.parse_args(arguments)
-    try:
-        run_cases(CASES[: given.cases], given.directory, given.steps)
-    except KeyboardInterrupt:
-        print(
-            f"interrupted; run the same command again to continue from the progress saved in {given.directory}",
-            file=sys.stderr,
-        )
-        return 130
-    given.output.mkdir(parents=True, exist_ok=True)
-    write(CASES[: given.cases], given.directory, given.steps, given.output)
-    return 0
-
-
 # -- the years as a sweep ----------------------------------------------------------------------------
 
 #: Steps of a year that a sample recomputes, about eleven days.
 SAMPLE_STEPS = 100_000
 
 
-def first_steps(case: Case, directory: Path | None = None, steps: int = SAMPLE_STEPS) -> list[tuple[str, ...]]:
+def first_steps(case: YearCase, directory: Path | None = None, steps: int = SAMPLE_STEPS) -> list[tuple[str, ...]]:
     """Return the rows of a year up to some step."""
     chosen = tuple(step for step in checkpoint_steps() if step <= steps)
     z = simulation(case.model).measurements(chosen[-1])
@@ -505,7 +485,7 @@ def _true(name: str, base: int, chosen: tuple[int, ...]) -> Checkpoints:
     return reference(model(name, base), simulation(name).measurements(chosen[-1]), chosen)
 
 
-def sample_of_year(case: Case, rng: np.random.Generator) -> list[tuple[str, ...]]:
+def sample_of_year(case: YearCase, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """Return the rows of the first eleven days."""
     return first_steps(case)
 
@@ -517,20 +497,52 @@ def same_errors(stored: tuple[str, ...], computed: tuple[str, ...]) -> bool:
     )
 
 
-SWEEP: Sweep[Case] = Sweep(
-    name="kalman/year",
+@dataclass(frozen=True)
+class YearSweep(Sweep[YearCase]):
+    """The years, whose runs share references; their bounds and their provenance are files of their own."""
+
+    def recompute(
+        self,
+        folder: Path,
+        executor: Executor | None = None,
+        *,
+        count: int | None = None,
+        only: Sequence[str] = (),
+        store: bool = False,
+        steps: int = YEAR,
+    ) -> Path:
+        """Run the first cases one after another, each from its saved state, and write all files.
+
+        Parameters
+        ----------
+        steps : number of steps; fewer for a trial.
+
+        Raises
+        ------
+        ValueError : several processes or a choice of cases, which the shared references do not allow.
+        """
+        if executor is not None or only:
+            raise ValueError(
+                f"{self.name}: got processes or words; needed one process and all cases, or the first ones"
+            )
+        progress, file = folder / self.name, folder / f"{self.name}.csv"
+        if not store:
+            run_cases(CASES[:count], progress, steps)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write(CASES[:count], progress, steps, file.parent)
+        return file
+
+
+SWEEP = YearSweep(
+    name="gravity_probe_b/year",
     file=_HERE / "year.csv",
     columns=COLUMNS,
     key=6,
     cells=lambda: CASES,
     compute=first_steps,
     rows=as_computed,
-    command="python -m gpbnb.report.gravity_probe_b.year",
-    seed=1984,
+    command=_COMMAND,
+    seed=SEED,
     sample=sample_of_year,
     same=same_errors,
 )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,1 +1,1 @@
-"""Guarantees for every measurement and for all time: studies, tables and figures."""
+"""Guarantees for every measurement and for ever: studies, tables and figures."""

@@ -27,7 +27,7 @@ def recursion() -> Derivation:
                 together(loop * e, stored * p, unevaluated(known - k) * unevaluated(innovation), w),
             ),
             Step(
-                "the exact estimate, by the computed loop: $\\hat F p + \\hat K z$ less what separates them",
+                "the exact estimate, written with the computed loop: $\\hat F p + \\hat K z$ minus the difference",
                 exact_loop * p + k * z,
                 together(loop * p, known * z, -(stored * p), -(unevaluated(known - k) * unevaluated(innovation))),
             ),

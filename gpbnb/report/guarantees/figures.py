@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gpbnb.bounds.adversary import run_against
 from gpbnb.bounds.guarantee import Guarantee
-from gpbnb.report.display.style import COLOURS, REFERENCE, VALID, label, legend, loglog
+from gpbnb.report.display.style import OBSERVED, OBSERVED_OTHERS, VALID, envelope, label, legend, loglog
 
 
 def errors_of(found: Guarantee, z: Any) -> NDArray[np.float64]:
@@ -29,7 +29,7 @@ def bound_of(found: Guarantee, state: int, steps: int) -> NDArray[np.float64]:
 def draw_errors(
     ax: Axes, found: Guarantee, chosen: NDArray[np.float64], random: NDArray[np.float64], state: int, quantity: str
 ) -> None:
-    """Draw the bound, the error that an adversary achieved and that of random measurements, step by step.
+    """Draw the bound, and bands of the errors that an adversary achieved and that random measurements caused.
 
     Parameters
     ----------
@@ -38,8 +38,11 @@ def draw_errors(
     """
     steps = np.arange(1, len(chosen) + 1)
     ax.plot(steps, bound_of(found, state, len(steps)), color=VALID, label="bound for every measurement sequence")
-    ax.plot(steps, np.abs(chosen[:, state]), color=COLOURS[0], lw=1, label="measurements chosen by the adversary")
-    ax.plot(steps, np.abs(random[:, state]), color=REFERENCE, lw=0.6, label="random measurements")
+    for errors, colour, words in (
+        (chosen, OBSERVED, "measurements chosen by the adversary"),
+        (random, OBSERVED_OTHERS[1], "random measurements"),
+    ):
+        envelope(ax, steps, np.abs(errors[:, state]), color=colour, alpha=0.6, label=words)
     loglog(ax)
     ax.set_ylim(1e-3 * found.bound[state], 50 * found.bound[state])  # room for the legend
     label(ax, "step", f"rounding error of the {quantity}")

@@ -3,23 +3,20 @@
 A seed determines a model, a format, a form, limits and inputs. The guarantee of the filter is compared with runs of the
 same model; errors are differences from the exact filter of the stored model. Inputs are random, constant, or chosen by
 an adversary. A run counts until the exact filter leaves the limits.
-
-``python -m gpbnb.report.guarantees.filters`` recomputes ``filters.csv`` and resumes after an interruption.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.named import rounding_text
+from gpbnb.arithmetic.rounding import rounding_named
 from gpbnb.bounds.adversary import attack, responses, shares_of
 from gpbnb.bounds.guarantee import Guarantee, closed_loops, guarantee
 from gpbnb.filters.forms import Form
@@ -35,10 +32,9 @@ from gpbnb.report.guarantees.random_filters import (
     draw,
     innovations,
 )
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.sweeps import Column, Sweep, as_computed
 
 FILE = Path(__file__).with_name("filters.csv")
-COMMAND = "python -m gpbnb.report.guarantees.filters"
 FILTERS = 3_000
 MOST, CANDIDATES = 1_000, 8
 """Steps until a gain must have settled; measurements that the adversary tries at each step."""
@@ -57,7 +53,7 @@ REASONS = (
 )
 
 
-class Row(NamedTuple):
+class FilterRow(NamedTuple):
     """A filter in a format, what its guarantee says, and the largest error / bound for each kind of input.
 
     `steps` counts the steps of all runs in which the exact filter was within its limits, `stopped` the runs that ended
@@ -229,7 +225,7 @@ def _admissible(drawn: Drawn, found: Guarantee, course: NDArray[np.float64]) -> 
 
 def examine(
     seed: int, drawn: Drawn | None = None, bounded: Callable[..., Guarantee] = guarantee, smaller: float = 1.0
-) -> Row:
+) -> FilterRow:
     """Compute one row; its seed determines all random numbers.
 
     Parameters
@@ -264,13 +260,13 @@ def examine(
         worst[kind] = max(worst[kind], float(reached.max()))
     # No rounding may hide that a bound is exceeded.
     ratios = (f"{worst[kind]:.4g}" if worst[kind] <= 1 else f"{worst[kind]:.17g}" for kind in INPUTS)
-    return Row(*row[: -len(INPUTS)], *ratios)  # type: ignore[arg-type]
+    return FilterRow(*row[: -len(INPUTS)], *ratios)  # type: ignore[arg-type]
 
 
-def _unexamined(seed: int, drawn: Drawn) -> Row:
+def _unexamined(seed: int, drawn: Drawn) -> FilterRow:
     """Return the row of a filter whose guarantee refuses an answer."""
     fmt, model = drawn.fmt, drawn.model
-    return Row(
+    return FilterRow(
         seed=seed,
         kind=drawn.kind,
         n=model.n,
@@ -294,7 +290,7 @@ def _unexamined(seed: int, drawn: Drawn) -> Row:
 
 
 def reason_of(text: str) -> str:
-    """Return the short name of the reason why there is no bound for all time."""
+    """Return the short name of the reason why there is no bound that holds for ever."""
     known = {
         "with compiled loops": "no compiled loops",
         "range": "beyond the range",
@@ -313,7 +309,7 @@ def reason_of(text: str) -> str:
 # -- the stored survey ------------------------------------------------------------------------------------------------
 
 
-def texts(row: Row) -> tuple[str, ...]:
+def texts(row: FilterRow) -> tuple[str, ...]:
     """Return a row as it is stored."""
     return tuple(map(str, row))
 
@@ -322,30 +318,27 @@ def _computed(seed: int, directory: Path | None = None) -> list[list[str]]:
     return [list(texts(examine(seed)))]
 
 
-def _stored_rows(seed: int, result: Sequence[Any]) -> list[tuple[str, ...]]:
-    return [tuple(row) for row in result]
+def _wrong(file: Path) -> list[str]:
+    return [" ".join(texts(row)) for row in load(file) if row.wrong]
 
 
 SWEEP: Sweep[int] = Sweep(
-    name="kalman/filters",
+    name="guarantees/filters",
     file=FILE,
     columns=COLUMNS,
     key=1,
     cells=lambda: range(FILTERS),
     compute=_computed,
-    rows=_stored_rows,
-    command=COMMAND,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute guarantees/filters",
     seed=0,
+    faults=_wrong,
 )
 
 
-def load(file: Path = FILE) -> tuple[Row, ...]:
+def load(file: Path = FILE) -> tuple[FilterRow, ...]:
     """Return the stored rows."""
-    whole = {column.name for column in COLUMNS if column.kind == "integer"}
-    return tuple(
-        Row(**{name: int(value) if name in whole else value for name, value in line.items()})  # type: ignore[arg-type]
-        for line in SWEEP.load(file).records()
-    )
+    return SWEEP.load(file).tuples(FilterRow)
 
 
 class Count(NamedTuple):
@@ -367,7 +360,7 @@ class Count(NamedTuple):
         return max(self.random, self.constant, self.chosen)
 
 
-def counts(rows: Sequence[Row], name: str) -> tuple[Count, ...]:
+def counts(rows: Sequence[FilterRow], name: str) -> tuple[Count, ...]:
     """Count filters by one of the columns, in the order in which its values are listed there, or of their size."""
     values = {column.name: column.choices for column in COLUMNS}[name] or sorted({getattr(row, name) for row in rows})
     found = []
@@ -381,49 +374,26 @@ def counts(rows: Sequence[Row], name: str) -> tuple[Count, ...]:
     return tuple(each for each in found if each.filters)
 
 
-def table(rows: Sequence[Row]) -> Table:
+def table(rows: Sequence[FilterRow]) -> Table:
     """Tabulate the counts by form, base, rounding, kind of model, range and limits."""
     header = ("group", "filters", "for ever", "some steps", "no answer", "runs", *(f"{kind} inputs" for kind in INPUTS))
     body = []
     for name in ("form", "base", "rounding", "kind", "range", "limited"):
         for each in counts(rows, name):
             label = each.value.replace("_", " ")
+            if name == "form":
+                label = str(Form[each.value.upper()])
+            elif name == "rounding":
+                label = rounding_text(rounding_named(each.value))
             numbers = (each.filters, each.for_ever, each.some_steps, each.without, each.runs)
             worst = (each.random, each.constant, each.chosen)
             cells = *map(str, numbers), *(f"{ratio:.3f}" if each.runs else "–" for ratio in worst)
-            body.append((f"{name} {label}" if name in ("base", "rounding") else label, *cells))
+            body.append((f"base {label}" if name == "base" else label, *cells))
     return Table("random filters against their guarantees", header, tuple(body))
 
 
-def reasons(rows: Sequence[Row]) -> Table:
-    """Tabulate why filters have no guarantee for all time."""
+def reasons(rows: Sequence[FilterRow]) -> Table:
+    """Tabulate why filters have no guarantee for ever."""
     found = Counter((row.result, row.reason) for row in rows if row.result != "for ever")
     body = tuple((*pair, str(found[pair])) for pair in sorted(found, key=lambda pair: -found[pair]))
-    return Table("reasons why there is no guarantee for all time", ("answer", "reason", "filters"), body)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the survey; return a nonzero status if an answer is wrong or fails."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Compare random Kalman filters with their guarantees.")
-    parser.add_argument("--rows", type=int, default=FILTERS, help="number of filters to compute")
-    parser.add_argument("--processes", type=int, default=1, help="number of processes")
-    parser.add_argument(
-        "--output", type=Path, default=Path(".cache/filters"), help="folder for filters.csv and saved progress"
-    )
-    given = parser.parse_args(arguments)
-    cells = range(min(given.rows, FILTERS))
-    if given.processes > 1:
-        with ProcessPoolExecutor(given.processes, get_context("spawn")) as executor:
-            results = SWEEP.run(given.output, executor, chunk=8, cells=cells)
-    else:
-        results = SWEEP.run(given.output, cells=cells)
-    file = given.output / FILE.name
-    SWEEP.store(results, file=file)
-    bad = [row for row in load(file) if row.wrong]
-    for row in bad:
-        print(*row)
-    return int(bool(bad))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
+    return Table("reasons why there is no guarantee for ever", ("answer", "reason", "filters"), body)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.envelope import Limits
+from gpbnb.bounds.envelope import FilterLimits
 from gpbnb.bounds.guarantee import limits
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
@@ -40,7 +40,7 @@ class Drawn:
     fmt: FloatFormat
     form: Form
     limited: str
-    within: Limits
+    within: FilterLimits
     level: NDArray[np.float64]
 
     @cached_property
@@ -77,7 +77,7 @@ def draw(seed: int) -> Drawn:
     return Drawn(kind, model, fmt, form, limited, within, Z)
 
 
-def _reached(model: LinearModel, fmt: FloatFormat, Z: NDArray[np.float64]) -> Limits | None:
+def _reached(model: LinearModel, fmt: FloatFormat, Z: NDArray[np.float64]) -> FilterLimits | None:
     """Return the limits that the exact filter reaches with constant measurements, if it can be stored and computed."""
     try:
         stored = model.rounded(fmt)

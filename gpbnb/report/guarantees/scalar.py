@@ -1,4 +1,4 @@
-r"""The true worst error of scalar filters in 3 to 6 bits, over all measurement sequences and for all time.
+r"""The true worst error of scalar filters in 3 to 6 bits, over all measurement sequences and for ever.
 
 In a format with a range, the measurements within their limit and the estimates are finitely many numbers. After each
 step, every number s that the estimate can be has a largest and a least possible error, and for the exact filter
@@ -7,13 +7,10 @@ step, from every pair of an estimate and a measurement to the next estimate, giv
 exactly: this is dynamic programming. The tables hold what the emulated operations return, for every pair. The
 exact filter's gains are computed with 400 bits after the point, and the errors in float64. Once the gains have settled,
 the tables repeat. As :math:`|F| < 1`, the largest errors then converge, and the change of all later steps is bounded.
-
-``python -m gpbnb.report.guarantees.scalar`` recomputes ``scalar.csv``.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -31,10 +28,9 @@ from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.random_filters import DETERMINISTIC
-from gpbnb.sweeps import Column, Sweep
+from gpbnb.sweeps import Column, Sweep, as_computed
 
 FILE = Path(__file__).with_name("scalar.csv")
-COMMAND = "python -m gpbnb.report.guarantees.scalar"
 FILTERS = 500
 LONGEST = 400
 """Steps within which gains must settle and errors converge."""
@@ -281,30 +277,27 @@ def _computed(seed: int, directory: Path | None = None) -> list[list[str]]:
     return [[str(each) for each in examine(seed)]]
 
 
-def _rows(seed: int, result: Sequence[Any]) -> list[tuple[str, ...]]:
-    return [tuple(row) for row in result]
+def _above(file: Path) -> list[str]:
+    return [" ".join(map(str, row)) for row in load(file) if float(row.ratio) > 1]
 
 
 SWEEP: Sweep[int] = Sweep(
-    name="kalman/scalar",
+    name="guarantees/scalar",
     file=FILE,
     columns=COLUMNS,
     key=1,
     cells=lambda: range(FILTERS),
     compute=_computed,
-    rows=_rows,
-    command=COMMAND,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute guarantees/scalar",
     seed=0,
+    faults=_above,
 )
 
 
 def load(file: Path = FILE) -> tuple[ScalarRow, ...]:
     """Return the stored rows."""
-    whole = {column.name for column in COLUMNS if column.kind == "integer"}
-    return tuple(
-        ScalarRow(**{name: int(value) if name in whole else value for name, value in line.items()})  # type: ignore[arg-type]
-        for line in SWEEP.load(file).records()
-    )
+    return SWEEP.load(file).tuples(ScalarRow)
 
 
 def table(rows: Sequence[ScalarRow]) -> Table:
@@ -317,20 +310,3 @@ def table(rows: Sequence[ScalarRow]) -> Table:
         spread = np.quantile(ratios, (0, 0.25, 0.5, 0.75, 1)) if ratios else ()
         body.append((str(form), str(len(chosen)), str(len(ratios)), *(f"{ratio:.3f}" for ratio in spread)))
     return Table("worst error over bound of scalar filters", header, tuple(body))
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the table; return a nonzero status if a worst error exceeds its bound."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Compare worst errors of scalar filters with bounds.")
-    parser.add_argument("--rows", type=int, default=FILTERS, help="number of filters to compute")
-    parser.add_argument(
-        "--output", type=Path, default=Path(".cache/scalar"), help="folder for scalar.csv and saved progress"
-    )
-    given = parser.parse_args(arguments)
-    file = given.output / FILE.name
-    SWEEP.store(SWEEP.run(given.output, cells=range(min(given.rows, FILTERS))), file=file)
-    return int(any(float(row.ratio) > 1 for row in load(file)))
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

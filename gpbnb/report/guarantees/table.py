@@ -1,16 +1,12 @@
-"""Guarantees for every measurement and for all time, for filters of this package and of other projects.
-
-``python -m gpbnb.report.guarantees.table`` recomputes ``guarantees.csv``. If words are given, it computes only the
-filters whose names contain one of them.
-"""
+"""Guarantees for every measurement and for ever, for filters of this package and of other projects."""
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,15 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.arithmetic.kernels.backends import LARGEST_PRECISION
+from gpbnb.arithmetic.kernels.selection import LARGEST_PRECISION
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.arithmetic.search import smallest_precision
 from gpbnb.bounds.adversary import attack, ceiling, random_errors
 from gpbnb.bounds.guarantee import BUDGET, Guarantee, from_schedule, guarantee, limits
-from gpbnb.bounds.linear import LinearFilter, biquad, controller, state_space
+from gpbnb.bounds.linear import filter_schedule
 from gpbnb.bounds.probable import probable_error
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
+from gpbnb.filters.system import LinearFilter, biquad, controller, state_space
 from gpbnb.report.display.tables import Table
 from gpbnb.report.guarantees.published import (
     dyer_mcreynolds,
@@ -38,13 +35,12 @@ from gpbnb.report.guarantees.published import (
     nile_local_level,
     px4_landing_target,
 )
-from gpbnb.sweeps import Column, machine, read, write
-from gpbnb.wordlength.examples import altimeter, tilt, tracker
+from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.wordlength.examples import TILT_STATES, altimeter, tilt, tracker
 from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.requirement import Basis
 
 FILE = Path(__file__).with_name("guarantees.csv")
-COMMAND = "python -m gpbnb.report.guarantees.table"
 FORMAT = FloatFormat(2, 24)
 SHARE = 1e-4
 """Tolerance of each state, as a share of its limit."""
@@ -54,7 +50,7 @@ RECORD = 2_000
 
 
 @dataclass(frozen=True)
-class Case:
+class GuaranteeCase:
     """A filter and its limits.
 
     Parameters
@@ -65,6 +61,7 @@ class Case:
     steps : length of the adversary's runs. candidates : number of measurements to choose from at each step.
     aims : the states whose errors the adversary tries to make large; all states if empty.
     horizon : number of steps that the bound covers, for filters without process noise.
+    states : name and unit of each state.
     form : form of a Kalman filter. budget : budget of the guarantee in binary32, for filters that settle slowly.
     """
 
@@ -79,6 +76,7 @@ class Case:
     horizon: int | None = None
     form: Form = Form.INNOVATION
     budget: float = BUDGET
+    states: tuple[str, ...] = ()
 
 
 def _longitudinal() -> LinearFilter:
@@ -86,25 +84,72 @@ def _longitudinal() -> LinearFilter:
     return state_space(given["A"], given["B"], given["C"], given["D"], name="FixIF, longitudinal controller")
 
 
+_MOTION = ("position, m", "velocity, m/s")
+
 CASES = (
-    Case(nile_local_level, (1500,), 1200, center=(1000,)),
-    Case(elaenia_gold, (1200,), 60, center=(1150,), steps=10, horizon=10),
-    Case(tracker, (1000, 30), 8, center=(750, 0)),
-    Case(filterpy_fusion, (1000, 30), 8, center=(750, 0)),
-    Case(filterpy_velocity, (2000, 150), 150, center=(1500, 0), form=Form.JOSEPH),
-    Case(px4_landing_target, (10, 3), 1, center=(9, 0)),
-    Case(dyer_mcreynolds, (10, 10, 10), 0.02, steps=1, horizon=1),
-    Case(dynamax_tracking, (100, 100, 10, 10), 8, center=(80, 80, 0, 0)),
-    Case(lambda: altimeter("1e-12"), (50, 2, 0.5), 2, center=(37, 0, 0.4), steps=20_000, budget=2e9),
-    Case(tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000),
-    Case(lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"), measurement=1.0),
-    Case(lambda: controller("0.999", "0.01", "2", "5"), measurement=1.0),
-    Case(_longitudinal, measurement=10.0, steps=1_000, candidates=100, aims=(10,)),
+    GuaranteeCase(nile_local_level, (1500,), 1200, center=(1000,), states=("level, 10⁸ m³",)),
+    GuaranteeCase(elaenia_gold, (1200,), 60, center=(1150,), steps=10, horizon=10, states=("constant, no unit",)),
+    GuaranteeCase(tracker, (1000, 30), 8, center=(750, 0), states=_MOTION),
+    GuaranteeCase(filterpy_fusion, (1000, 30), 8, center=(750, 0), states=("position, no unit", "velocity, no unit")),
+    GuaranteeCase(
+        filterpy_velocity,
+        (2000, 150),
+        150,
+        center=(1500, 0),
+        form=Form.JOSEPH,
+        states=("position, no unit", "velocity, no unit"),
+    ),
+    GuaranteeCase(px4_landing_target, (10, 3), 1, center=(9, 0), states=_MOTION),
+    GuaranteeCase(
+        dyer_mcreynolds,
+        (10, 10, 10),
+        0.02,
+        steps=1,
+        horizon=1,
+        states=("constant 1, no unit", "constant 2, no unit", "constant 3, no unit"),
+    ),
+    GuaranteeCase(
+        dynamax_tracking,
+        (100, 100, 10, 10),
+        8,
+        center=(80, 80, 0, 0),
+        states=("position x, no unit", "position y, no unit", "velocity x, no unit", "velocity y, no unit"),
+    ),
+    GuaranteeCase(
+        lambda: altimeter("1e-12"),
+        (50, 2, 0.5),
+        2,
+        center=(37, 0, 0.4),
+        steps=20_000,
+        budget=2e9,
+        states=("height, m", "speed, m/s", "bias, m/s²"),
+    ),
+    GuaranteeCase(
+        tilt, (60, 30, 2), (8, 8), center=(45, 0, 1.5), steps=30_000, states=tuple(map(", ".join, TILT_STATES))
+    ),
+    GuaranteeCase(
+        lambda: biquad("0.01", "0.02", "0.01", "-1.6", "0.7"),
+        measurement=1.0,
+        states=("state 1, no unit", "state 2, no unit", "output, no unit"),
+    ),
+    GuaranteeCase(
+        lambda: controller("0.999", "0.01", "2", "5"),
+        measurement=1.0,
+        states=("integral, no unit", "last error, no unit", "output, no unit"),
+    ),
+    GuaranteeCase(
+        _longitudinal,
+        measurement=10.0,
+        steps=1_000,
+        candidates=100,
+        aims=(10,),
+        states=(*(f"state {i}, no unit" for i in range(1, 11)), "output, no unit"),
+    ),
 )
 """Filters with their limits."""
 
 
-class Row(NamedTuple):
+class GuaranteeRow(NamedTuple):
     """One row of the table, as text."""
 
     name: str
@@ -112,6 +157,7 @@ class Row(NamedTuple):
     m: str
     repeat: str
     period: str
+    worst: str
     bound: str
     ratio: str
     ceiling: str
@@ -124,21 +170,21 @@ class Row(NamedTuple):
     seconds: str
 
 
-_WHOLE = {"n", "m", "repeat", "period", "guarantee", "contraction", "three_sigma", "emulation"}
+_WHOLE = {"n", "m", "repeat", "period", "worst", "guarantee", "contraction", "three_sigma", "emulation"}
 COLUMNS = tuple(
     Column(name, "text")
     if name == "name"
     else Column(name, "integer" if name in _WHOLE else "number", 0, optional=True)
-    for name in Row._fields
+    for name in GuaranteeRow._fields
 )
 """Columns of the stored table."""
 
 
-def compute(case: Case) -> Row:
+def compute(case: GuaranteeCase) -> GuaranteeRow:
     """Compute the guarantee in binary32, an attack on it, and the precision that each basis requires."""
     made = case.make()
     begin = time.process_time()
-    found = _found(case, made, FORMAT)
+    found = case_guarantee(case, made, FORMAT)
     seconds = time.process_time() - begin
     sizes = np.array(case.state) if case.state else found.limits.state
     worst = int((found.bound / sizes).argmax())
@@ -158,12 +204,13 @@ def compute(case: Case) -> Row:
         noise, scatter = f"{expected:.2g}", f"{errors.std() / expected:.2f}"
     bits = {basis: _bits(case, made, basis, SHARE * sizes, known[basis]) for basis in BASES}
     schedule = found.schedule
-    return Row(
+    return GuaranteeRow(
         made.name,
         str(schedule.program.n),
         str(schedule.program.m),
         str(schedule.repeat or ""),
         str(schedule.period or ""),
+        str(worst),
         f"{found.bound[worst]:.3g}",
         f"{outcome.ratio:.2f}",
         f"{ceiling(found, outcome.z[: outcome.step], outcome.state) / found.bound[outcome.state]:.2f}",
@@ -177,19 +224,20 @@ def compute(case: Case) -> Row:
     )
 
 
-def _found(case: Case, made: LinearModel | LinearFilter, fmt: FloatFormat) -> Guarantee:
+def case_guarantee(case: GuaranteeCase, made: LinearModel | LinearFilter, fmt: FloatFormat) -> Guarantee:
+    """Compute the guarantee of a case, whose filter is `made`, in a format."""
     if isinstance(made, LinearModel):
         within = limits(made.n, made.m, state=case.state, innovation=case.innovation)
         if case.horizon is not None:
             return guarantee(made, fmt, within, case.form, most=case.horizon, horizon=case.horizon)
         budget = case.budget if fmt == FORMAT else BUDGET
         return guarantee(made, fmt, within, case.form, most=100_000, horizon=1, budget=budget)
-    schedule = made.schedule(fmt)
+    schedule = filter_schedule(made, fmt)
     return from_schedule(schedule, limits(schedule.program.n, schedule.program.m, measurement=case.measurement))
 
 
 def _bits(
-    case: Case,
+    case: GuaranteeCase,
     made: LinearModel | LinearFilter,
     basis: Basis,
     tolerance: NDArray[np.float64],
@@ -207,7 +255,7 @@ def _bits(
 
     def meets(fmt: FloatFormat) -> bool:
         try:
-            found = _found(case, made, fmt)
+            found = case_guarantee(case, made, fmt)
         except ValueError:
             return False
         if basis == "emulation":
@@ -237,7 +285,7 @@ def fixed_and_floating_bits() -> tuple[int, int]:
     case = next(case for case in CASES if case.make is _longitudinal)
 
     def meets(fmt: FloatFormat) -> bool:
-        return bool(_found(case, _longitudinal(), fmt).bound[-1] <= target)
+        return bool(case_guarantee(case, _longitudinal(), fmt).bound[-1] <= target)
 
     fmt = smallest_precision(meets, 2, Rounding.NEAREST, least=2, largest=LARGEST_PRECISION[2])
     if fmt is None:
@@ -245,27 +293,63 @@ def fixed_and_floating_bits() -> tuple[int, int]:
     return math.ceil(math.log2(sum(given["published_E"]) / target)), fmt.precision
 
 
-def load(file: Path = FILE) -> tuple[Row, ...]:
+# -- the stored table -------------------------------------------------------------------------------------------------
+
+
+def case_named(name: str) -> GuaranteeCase:
+    """Return the filter of a name with its limits."""
+    return next(case for case in CASES if case.make().name == name)
+
+
+def _computed(name: str, directory: Path | None = None) -> list[list[str]]:
+    _compile()
+    return [list(compute(case_named(name)))]
+
+
+@cache
+def _compile() -> None:
+    """Compile and load everything once, so that this time does not count as time of a guarantee."""
+    for case in (CASES[0], CASES[-2]):
+        case_guarantee(case, case.make(), FORMAT)
+
+
+def _same(stored: Sequence[str], computed: Sequence[str]) -> bool:
+    """Whether two rows agree, apart from the seconds."""
+    return stored[:-1] == computed[:-1]
+
+
+SWEEP: Sweep[str] = Sweep(
+    name="guarantees/guarantees",
+    file=FILE,
+    columns=COLUMNS,
+    key=1,
+    cells=lambda: tuple(case.make().name for case in CASES),
+    compute=_computed,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute guarantees/guarantees",
+    seed=0,
+    same=_same,
+)
+
+
+def load(file: Path = FILE) -> tuple[GuaranteeRow, ...]:
     """Return the stored rows."""
-    return tuple(Row(**line) for line in read(file, COLUMNS, COMMAND).records())
+    return tuple(GuaranteeRow(**line) for line in SWEEP.load(file).records())
 
 
 def table() -> Table:
     """Tabulate the bound of each filter and its sharpness."""
     header = (
-        "filter", "n, m", "repeats from step", "period", "bound", "achieved / bound", "ceiling / bound",
-        "probable error", "scatter / probable",
+        "filter", "state, unit", "limit", "bound", "reached / bound", "ceiling / bound", "probable error",
+        "scatter / probable",
     )  # fmt: skip
-    body = [
-        tuple(
-            cell or "–"
-            for cell in (
-                each.name, f"{each.n}, {each.m}", each.repeat, each.period, each.bound, each.ratio, each.ceiling,
-                each.probable, each.scatter,
-            )
-        )
-        for each in load()
-    ]  # fmt: skip
+    cases = {case.make().name: case for case in CASES}
+    body = []
+    for each in load():
+        case, worst = cases[each.name], int(each.worst)
+        limit = f"{case.state[worst]:g}" if case.state else f"input: {case.measurement:g}"
+        numbers = (cell or "–" for cell in (each.bound, each.ratio, each.ceiling, each.probable, each.scatter))
+        body.append((each.name, case.states[worst].removesuffix(", no unit"), limit, *numbers))
     return Table("guarantees of some filters in binary32", header, tuple(body))
 
 
@@ -280,33 +364,3 @@ def bits_table() -> Table:
         for each in load()
     ]
     return Table("bits that some filters need", header, tuple(body))
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the rows whose names contain one of the words, or all, and write them to a folder."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Compute a table of guarantees for some filters.")
-    parser.add_argument(
-        "words",
-        nargs="*",
-        help="recompute only the filters whose names contain one of these words; keep the other stored rows",
-    )
-    parser.add_argument("--output", type=Path, default=Path(".cache/guarantees"), help="folder for guarantees.csv")
-    given = parser.parse_args(arguments)
-    words, file = given.words, given.output / FILE.name
-    given.output.mkdir(parents=True, exist_ok=True)
-    rows = {row.name: row for row in load()} if words and FILE.exists() else {}
-    for case in (CASES[0], CASES[-2]):  # time for compiling and loading must not count as time of a guarantee
-        _found(case, case.make(), FORMAT)
-    for case in CASES:
-        name = case.make().name
-        if not words or any(word in name for word in words):
-            rows[name] = compute(case)
-            print(*rows[name], flush=True)
-            order = [each.make().name for each in CASES]
-            found = [tuple(rows[each]) for each in order if each in rows]
-            write(file, COLUMNS, found, {"command": COMMAND, **machine()})
-    return 0
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())

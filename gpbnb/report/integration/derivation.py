@@ -354,8 +354,8 @@ def least() -> Derivation:
                 together(2 * end, (n - 1) * inner),
                 1 + n * inner,
             ),
-            Step("the integral over a cycle that two samples of size 1 let expect", over(2 * along, 1 + phi), h),
-            Step("the variance of that integral that the samples leave", together(own, -h * along), h * walk_rate),
+            Step("expected integral over a cycle between two samples of size 1", over(2 * along, 1 + phi), h),
+            Step("variance of that integral, given the samples", together(own, -h * along), h * walk_rate),
             Step("$1-h=L\\tanh\\frac\\mu2$", 1 - h, walk_rate * th),
             Step(
                 "the least variance",
@@ -385,13 +385,17 @@ def derivatives() -> Derivation:
     kept = 1 - angle**2 / 60
     steps = [
         Step("exact for each polynomial of degree 5", sp.Integral(polynomial, (TIME, 0, 1)), together(*rule)),
-        Step("a sample's part in the cycles after and before it, at $\\theta=\\omega T$", together(old, new), kept),
+        Step(
+            "contribution of a sample to the cycles before and after it, at $\\theta=\\omega T$",
+            together(old, new),
+            kept,
+        ),
     ]
     folded = sp.expand(kept.subs(angle, 2 * sp.pi * k) ** 2)
     for m, ratio in ((3, sp.Rational(3, 10)), (4, sp.Rational(2, 15)), (5, sp.Rational(3, 25))):
         split = (term.as_independent(k) for term in sp.Add.make_args(folded))
         sums = together(*(factor * sp.Sum(power * k ** (-2 * m), (k, 1, sp.oo)) for factor, power in split))
-        steps.append(Step(f"the share of the variance after {m} lags", over(sums, sp.zeta(2 * m)), ratio))
+        steps.append(Step(f"share of the variance that remains after {m} lags", over(sums, sp.zeta(2 * m)), ratio))
     return Derivation(tuple(steps))
 
 

@@ -20,7 +20,7 @@ from gpbnb.arithmetic.kernels.tags import Double
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.integration import theory
 from gpbnb.report.integration.arguments import positive_number
-from gpbnb.report.integration.theory import Process, Rule, Step
+from gpbnb.report.integration.theory import Cycle, Process, Rule
 
 Floats = NDArray[np.float64]
 
@@ -119,7 +119,7 @@ def _advance_one(a: Any, b: Any, state: Any, normal: Any, x: Any, d: Any) -> Non
             state[path, 0] = new
 
 
-def advance(step: Step, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
+def advance(step: Cycle, state: Floats, normal: Floats) -> tuple[Floats, Floats]:
     """Compute samples and trapezoid errors, cycle by cycle, from standard normal numbers.
 
     Parameters
@@ -206,7 +206,7 @@ def rule_errors(rule: Rule, f_c: float, chunk: Chunk) -> Floats:
 
 
 @dataclass(frozen=True)
-class Simulation:
+class IntegrationErrors:
     """Errors of an integrator after `n` cycles: `errors` is (len(n), paths), in the unit of the input times seconds."""
 
     process: Process
@@ -238,7 +238,7 @@ def simulate(
     rng: np.random.Generator,
     paths: int = 1,
     rule: Rule = theory.RULES["trapezoidal"],
-) -> Simulation:
+) -> IntegrationErrors:
     """Simulate the error of an integrator, and record it after the given numbers of cycles.
 
     Parameters
@@ -264,11 +264,11 @@ def simulate(
             begin = end
         total = total + added[begin:].sum(axis=0)
     bar.close()
-    return Simulation(process, f_c, rule, wanted, np.array(kept))
+    return IntegrationErrors(process, f_c, rule, wanted, np.array(kept))
 
 
 @dataclass(frozen=True)
-class Sweep:
+class WalkSweep:
     r"""Simulated random walks at many :math:`\mu`: variance per cycle, divided by :math:`\sigma_x^2T^2`."""
 
     mu: Floats
@@ -291,7 +291,7 @@ class Sweep:
         return np.asarray((self.walk / factor - 1) / self.standard_error)
 
 
-def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> Sweep:
+def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> WalkSweep:
     """Simulate the random walk of the trapezoidal rule at many ratios of bandwidth to iteration rate.
 
     Parameters
@@ -302,7 +302,7 @@ def sweep(mu: ArrayLike, cycles: int, paths: int, rng: np.random.Generator) -> S
     values = np.atleast_1d(np.asarray(mu, dtype=np.float64))
     bar = tqdm(values.tolist(), desc="sweep", **BAR)
     runs = [simulate(theory.first_order(1.0, one), 1.0, [cycles], rng, paths) for one in bar]
-    return Sweep(values, cycles, paths, np.array([run.variance[0] for run in runs]) / cycles)
+    return WalkSweep(values, cycles, paths, np.array([run.variance[0] for run in runs]) / cycles)
 
 
 # -- the integrator in t-digit arithmetic ---------------------------------------------------------
@@ -339,7 +339,7 @@ def _integrate_rounding(fmt: Any, half: Any, x: Any, total: Any) -> None:
         store(fmt, total, path, s)
 
 
-class Accumulator:
+class Integrator:
     """Run the trapezoidal rule (2) in a format, chunk by chunk.
 
     Parameters
@@ -420,7 +420,7 @@ def emulate(
             raise ValueError(f"got {fmt}; needed at most 40 bits, or float64 is no reference; use fewer digits")
     process = theory.first_order(sigma_x, omega_bw)
     cycles = round(positive_number("duration", duration) * positive_number("f_c", f_c))
-    running = [Accumulator(fmt, 1 / f_c, paths) for fmt in formats]
+    running = [Integrator(fmt, 1 / f_c, paths) for fmt in formats]
     error, reference, half = np.zeros(paths), np.zeros(paths), np.array([0.5 / f_c])
     for chunk in chunks(process, f_c, cycles, rng, paths):
         error = error + chunk.d.sum(axis=0)

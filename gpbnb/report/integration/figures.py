@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle, FancyArrowPatch, Rectangle
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.display.style import (
     BLACK,
@@ -21,14 +22,16 @@ from gpbnb.report.display.style import (
     REFUTED,
     TEXT,
     VALID,
+    bits_colour,
     colours,
     label,
+    legend,
     loglog,
+    name_ends,
 )
 from gpbnb.report.display.style import name as write
-from gpbnb.report.display.tables import arithmetic
 from gpbnb.report.integration import theory
-from gpbnb.report.integration.experiment import Accuracy, RateSweep, Simulation, Sweep
+from gpbnb.report.integration.experiment import Accuracy, IntegrationErrors, RateSweep, WalkSweep
 
 SERIES = (OBSERVED, OBSERVED_OTHERS[1], OBSERVED_OTHERS[3], OBSERVED_OTHERS[2])
 """Colours of series whose names are written in the same colour. They are dark enough to be read as text."""
@@ -113,18 +116,20 @@ def accuracy(results: Mapping[str, Accuracy], ax: Axes) -> list[Artist]:
 
 def approximations(terms: int, ax: Axes) -> list[Artist]:
     """Draw the error of (39), and of the series with up to `terms` terms, relative to (35)."""
-    mu = np.geomspace(0.1, 20, 300)
+    mu = np.geomspace(0.01, 100, 600)
     exact, total = theory.walk_factor(mu), np.zeros_like(mu)
     artists: list[Artist] = []
     for k, (c, colour) in enumerate(zip(theory.series(terms), colours(terms, (REFUTED, *SERIES)), strict=True)):
         total = total + float(c) * mu ** (2 * k + 1)
         error = np.abs(np.sqrt(np.where(total > 0, total, np.nan) / exact) - 1)
-        artists += ax.plot(mu, error, color=colour, label=f"{k + 1} terms" if k else "(39)")
-        at = int(np.argmax(error > 1e-5)) if k else 30
-        words = f"{k + 1}" + " terms" * (k + 1 == terms) if k else "(39)"
-        artists.append(write(ax, words, (float(mu[at]), float(error[at])), colour, (6, -4) if k else (-4, 6)))
+        shown = np.where((error > 0) & (error < 10), error, np.nan)
+        artists += ax.plot(mu, shown, color=colour, ls="-" if k else "--", label=f"{k + 1} terms" if k else "(39)")
+        last = k + 1 == terms
+        at = int(np.argmax(error > (1e-5 if k else 1e-4)))
+        words = f"{k + 1}" + " terms" * last if k else "(39)"
+        artists.append(write(ax, words, (float(mu[at]), float(error[at])), colour, (6, -2) if last else (-6, 2)))
     artists.append(ax.axvline(2 * np.pi, color=REFERENCE, ls=":", label=r"$\mu=2\pi$"))
-    artists.append(write(ax, r"$2\pi$", (2 * np.pi, 2e-6), REFERENCE, (5, 0)))
+    artists.append(write(ax, r"$2\pi$", (2 * np.pi, 2e-6), REFERENCE, (8, 0)))
     loglog(ax)
     ax.set_ylim(1e-6, 10)
     label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "relative error")
@@ -148,7 +153,7 @@ def powers(ax: Axes) -> list[Artist]:
     return artists
 
 
-def random_walk(result: Sweep, ax: Axes) -> list[Artist]:
+def random_walk(result: WalkSweep, ax: Axes) -> list[Artist]:
     """Draw the simulated random walk at many μ, next to (35) and (39)."""
     line = np.geomspace(result.mu.min() / 1.5, result.mu.max() * 1.5, 300)
     artists: list[Artist] = [
@@ -166,7 +171,7 @@ def random_walk(result: Sweep, ax: Axes) -> list[Artist]:
     return artists
 
 
-def deviations(result: Sweep, ax: Axes) -> list[Artist]:
+def deviations(result: WalkSweep, ax: Axes) -> list[Artist]:
     """Draw the deviations of the observed variances from (35) and from (39), in standard errors."""
     against = result.deviations_from(result.mu / 6)
     seen = np.abs(against) < 6
@@ -186,7 +191,7 @@ def deviations(result: Sweep, ax: Axes) -> list[Artist]:
     return artists
 
 
-def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
+def build_up(runs: Sequence[IntegrationErrors], mu: float, ax: Axes) -> list[Artist]:
     """Draw the rms error against the number of cycles, for a first-order input.
 
     Parameters
@@ -197,17 +202,15 @@ def build_up(runs: Sequence[Simulation], mu: float, ax: Axes) -> list[Artist]:
     n = np.geomspace(1, max(run.n[-1] for run in runs), 200)
     unit = runs[0].process.sigma / runs[0].f_c
     walk = n * float(theory.walk_factor(mu))
-    for run, marker, colour, up in zip(runs, "os", (OBSERVED, OBSERVED_OTHERS[1]), (-12, 21), strict=True):
+    for run, marker, colour in zip(runs, "os", (OBSERVED, OBSERVED_OTHERS[1]), strict=True):
         observed = np.sqrt(run.variance) / unit
-        artists += ax.plot(run.n, observed, marker, color=colour, label=run.rule.name)
-        artists.append(write(ax, run.rule.name.split(",")[0], (run.n[0], observed[0]), colour, (8, up), ha="left"))
+        artists += ax.plot(run.n, observed, marker, color=colour, label=run.rule.name.split(",")[0])
+    legend(ax, handles=artists, loc="upper left")
     artists += ax.plot(n, np.sqrt(theory.error_variance(n, mu)), color=VALID, label="exact, trapezoidal")
-    artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=VALID, ls=":", label="rectangular")
-    artists += ax.plot(n, np.sqrt(walk), color=BLACK, ls="--", lw=1, label="random walk (35)")
+    artists += ax.plot(n, np.sqrt(theory.rectangle_error_variance(n, mu)), color=VALID, label="exact, rectangular")
+    artists += ax.plot(n, np.sqrt(walk), color=REFERENCE, ls=":", lw=1.4, label="random walk (35)")
     loglog(ax)
-    low = float(min(np.sqrt(run.variance).min() for run in runs)) / unit
-    ax.set_ylim(low / 3, 10 ** np.ceil(np.log10(np.sqrt(walk[-1])) + 0.3))
-    title = rf"$\mu = {mu:g}$; green: theory; dashed: random walk only"
+    title = rf"$\mu = {mu:g}$; green: theory; dotted: random walk only"
     label(ax, "cycles $n$", r"rms error ($\sigma_xT$)", title)
     return artists
 
@@ -217,18 +220,20 @@ def rules_first_order(rules: Sequence[str], ax: Axes) -> list[Artist]:
     mu = np.geomspace(0.03, 100, 60)
     least = [theory.walk_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
     artists: list[Artist] = []
-    for k, (rule, colour) in enumerate(zip(rules, colours(len(rules), (VALID, *SERIES)), strict=True)):
+    ends: dict[str, tuple[float, str]] = {}
+    for rule, colour in zip(rules, colours(len(rules), SERIES), strict=True):
         rate = [theory.walk_rate(theory.first_order(1.0, one), 1.0, theory.RULES[rule]) for one in mu.tolist()]
         ratio = np.sqrt(np.array(rate) / least)
         artists += ax.plot(mu, ratio, color=colour, label=rule)
-        artists.append(write(ax, rule, (mu[15 * k], 1.45), colour, (0, 0), ha="left"))
+        ends[rule] = float(ratio[-1]), colour
     best = [theory.best_possible_rate(theory.first_order(1.0, one), 1.0) for one in mu.tolist()]
     bound = np.sqrt(np.array(best) / least)
-    artists += ax.plot(mu, bound, color=BLACK, ls=":", label="scaled samples (lower bound)")
-    artists.append(write(ax, "scaled samples", (mu[45], bound[45]), BLACK, (-6, -4)))
+    artists += ax.plot(mu, bound, color=REFERENCE, ls=":", label="scaled samples (lower bound)")
+    ends["scaled samples"] = float(bound[-1]), REFERENCE
     ax.set_xscale("log")
-    ax.set_ylim(0, 1.6)
+    ax.set_ylim(0, 1.35)
     label(ax, r"$\mu=\omega_{bw}/f_c$ (rad)", "random walk relative\nto trapezoidal", "first-order input")
+    name_ends(ax, ends)
     return artists
 
 
@@ -237,76 +242,73 @@ def rules_resonant(rules: Sequence[str], zeta: float, ax: Axes) -> list[Artist]:
     rate = np.geomspace(0.3, 30, 400)
     process = theory.resonant(1.0, 2 * np.pi, zeta)
     artists: list[Artist] = []
-    for rule, colour in zip(rules, colours(len(rules), (VALID, *SERIES)), strict=True):
+    ends: dict[str, tuple[float, str]] = {}
+    for rule, colour in zip(rules, colours(len(rules), SERIES), strict=True):
         walk = [theory.walk_rate(process, f, theory.RULES[rule]) for f in rate.tolist()]
         artists += ax.plot(rate, np.sqrt(walk), color=colour, label=rule, lw=1.2)
+        ends[rule] = float(np.sqrt(walk[-1])), colour
     loglog(ax)
     label(
         ax,
         "iteration rate over natural frequency, $f_c/f_0$",
         "random walk\n" r"($\sigma_x/\sqrt{f_0}$)",
-        rf"resonant input, damping {zeta:g}; colours as above",
+        rf"resonant input, damping {zeta:g}",
     )
+    name_ends(ax, ends)
     return artists
 
 
-def _apart(ends: Sequence[float], gap: float) -> list[float]:
-    """Move heights apart until neighbours differ by `gap`; their order and the lowest one stay."""
-    moved, below = list(ends), -np.inf
-    for k in np.argsort(ends):
-        below = moved[k] = max(float(ends[k]), below + gap)
-    return moved
+def _points_of(fmt: FloatFormat) -> dict[str, Any]:
+    """Return the colour of a format, and open markers if it chops."""
+    colour = bits_colour(fmt)
+    return {"color": colour, "mfc": "none" if fmt.rounding is Rounding.CHOP else colour}
 
 
 def errors_over_rate(result: RateSweep, ax: Axes) -> list[Artist]:
     """Draw discretization and rounding errors against the iteration rate: observed (points) and theory (lines)."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
-    last = float(result.rates[-1])
     artists: list[Artist] = []
-    artists += ax.plot(result.rates, result.discretization[0], "x", color=BLACK, label="discretization")
+    artists += ax.plot(result.rates, result.discretization[0], "x", color=OBSERVED, label="discretization")
     artists += ax.plot(rates, result.theory(result.formats[0], rates)[0], color=VALID, lw=1)
-    ends = np.log10([float(result.discretization[0][-1]), *(line[-1] for line in result.rounding)])
-    heights = [10**height for height in _apart(ends.tolist(), 0.6)]
-    artists.append(write(ax, "discretization", (last, heights[0]), BLACK, (8, 0)))
-    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
-        artists += ax.plot(result.rates, result.rounding[i], marker, color=colour, label=f"rounding, {arithmetic(fmt)}")
+    ends = {"discretization": (float(result.discretization[0][-1]), OBSERVED)}
+    for i, (fmt, marker) in enumerate(zip(result.formats, "sD^v", strict=False)):
+        style = _points_of(fmt)
+        artists += ax.plot(result.rates, result.rounding[i], marker, label=f"rounding, {arithmetic(fmt)}", **style)
+        ends[arithmetic(fmt)] = float(result.rounding[i][-1]), style["color"]
         artists += ax.plot(rates, result.theory(fmt, rates)[1], color=VALID, lw=1)
-        artists.append(write(ax, arithmetic(fmt), (last, heights[1 + i]), colour, (8, 0)))
     loglog(ax)
-    ax.set_xlim(float(rates[0]) / 1.2, 7 * last)
-    ax.set_ylim(result.rounding.min() / 3, result.discretization.max() * 10)
     label(
         ax,
         "iteration rate $f_c$ (Hz)",
         "rms error\n" r"(unit of $x_1$ $\times$ s)",
         "discretization and rounding error",
     )
+    name_ends(ax, ends)
     return artists
 
 
 def totals(result: RateSweep, ax: Axes) -> list[Artist]:
     """Draw the total error against the iteration rate, and mark the best rate of each format with a star."""
     rates = np.geomspace(result.rates[0], result.rates[-1], 40)
-    last = float(result.rates[-1])
-    heights = [10**height for height in _apart([float(np.log10(line[-1])) for line in result.total], 0.3)]
     artists: list[Artist] = []
-    for i, (fmt, (marker, colour)) in enumerate(zip(result.formats, zip("sD^v", SERIES, strict=True), strict=False)):
-        artists += ax.plot(result.rates, result.total[i], marker, color=colour, label=arithmetic(fmt))
+    ends: dict[str, tuple[float, str]] = {}
+    for i, (fmt, marker) in enumerate(zip(result.formats, "sD^v", strict=False)):
+        style = _points_of(fmt)
+        artists += ax.plot(result.rates, result.total[i], marker, label=arithmetic(fmt), **style)
+        ends[arithmetic(fmt)] = float(result.total[i][-1]), style["color"]
         artists += ax.plot(rates, result.theory(fmt, rates)[2], color=VALID, lw=1)
-        artists.append(write(ax, arithmetic(fmt), (last, heights[i]), colour, (8, 0)))
         best = theory.best_rate(result.omega_bw, result.duration, fmt)
         if rates[0] <= best <= rates[-1]:
             least = theory.two_errors(1.0, result.omega_bw, best, result.duration, fmt).total
-            artists += ax.plot([best], [least * 1.6], "*", color=colour, ms=12, mfc="none")
+            artists += ax.plot([best], [least], "*", color=style["color"], ms=14, mfc="none")
     loglog(ax)
-    ax.set_xlim(float(rates[0]) / 1.2, 7 * last)
-    ax.set_ylim(result.total.min() / 2, result.total.max() * 5)
     label(
         ax,
         "iteration rate $f_c$ (Hz)",
         "total error, rms\n" r"(unit of $x_1$ $\times$ s)",
         "total error; stars mark the best rate",
     )
+    name_ends(ax, ends)
     return artists
 
 
@@ -320,7 +322,7 @@ def _best_rate(omega_bw: float, duration: float, fmt: FloatFormat) -> float:
 
 def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequence[int], ax: Axes) -> list[Artist]:
     """Draw the best iteration rate against the number of bits, for several durations in s."""
-    ends: list[float] = []
+    ends: dict[str, tuple[float, str]] = {}
     artists: list[Artist] = []
     for (duration, seconds), colour in zip(durations.items(), colours(len(durations), SERIES), strict=True):
         for rounding, style in ((Rounding.NEAREST, "-"), (Rounding.CHOP, ":")):
@@ -328,19 +330,16 @@ def best_rates(omega_bw: float, durations: Mapping[str, float], precisions: Sequ
             named: dict[str, Any] = {"label": duration} if style == "-" else {}
             artists += ax.plot(precisions, rate, style, color=colour, **named)
             if style == "-":
-                ends.append(float(np.log10(rate[-1])))
-    for duration, height, colour in zip(durations, _apart(ends, 1.2), colours(len(durations), SERIES), strict=True):
-        artists.append(write(ax, duration, (precisions[-1], 10**height), colour, (6, 0)))
+                ends[duration] = rate[-1], colour
     ax.set_yscale("log")
-    ax.set_ylim(100, 10 ** (max(_apart(ends, 1.2)) + 1))
-    ax.set_xlim(precisions[0] - 1, precisions[-1] + 0.22 * (precisions[-1] - precisions[0]))
     label(ax, "wordlength $t$ (bits)", "best rate $f_c$ (Hz)", "solid: rounded; dotted: chopped")
+    name_ends(ax, ends)
     return artists
 
 
 def needed_bits(omega_bw: float, durations: Mapping[str, float], rates: Sequence[float], ax: Axes) -> list[Artist]:
     """Draw the bits at which the rounding error is a tenth of the discretization error, for durations in s."""
-    ends: list[float] = []
+    ends: dict[str, tuple[float, str]] = {}
     artists: list[Artist] = []
     for (duration, seconds), colour in zip(durations.items(), colours(len(durations), SERIES), strict=True):
         for rounding, style in ((Rounding.NEAREST, "-"), (Rounding.CHOP, ":")):
@@ -348,11 +347,9 @@ def needed_bits(omega_bw: float, durations: Mapping[str, float], rates: Sequence
             named: dict[str, Any] = {"label": duration} if style == "-" else {}
             artists += ax.plot(rates, bits, style, drawstyle="steps-mid", color=colour, **named)
             if style == "-":
-                ends.append(float(bits[-1]))
-    for duration, height, colour in zip(durations, _apart(ends, 7), colours(len(durations), SERIES), strict=True):
-        artists.append(write(ax, duration, (rates[-1], height), colour, (6, 0)))
+                ends[duration] = float(bits[-1]), colour
     ax.set_xscale("log")
-    ax.set_xlim(rates[0] / 1.2, 4 * rates[-1])
     ax.set_ylim(5, 60)
     label(ax, "iteration rate $f_c$ (Hz)", "bits needed", "solid: rounded; dotted: chopped")
+    name_ends(ax, ends)
     return artists

@@ -168,7 +168,7 @@ def resonant(sigma_x: float, omega_0: float, zeta: float) -> Process:
     return Process(f"resonant, ζ = {zeta:g}", sigma_x, (pole,), (weight,), drift)
 
 
-class Step(NamedTuple):
+class Cycle(NamedTuple):
     r"""One cycle of a process and of the error of the trapezoidal rule: :math:`(z_n, d_n) = A z_{n-1} + Bw`.
 
     w holds m + 1 independent standard normal numbers. A is (m + 1, m), and B is (m + 1, m + 1) and lower triangular.
@@ -180,7 +180,7 @@ class Step(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def exact_step(process: Process, f_c: float) -> Step:
+def exact_step(process: Process, f_c: float) -> Cycle:
     r"""Discretize a process together with the error of the trapezoidal rule, exact at the sampling times.
 
     First-order inputs have a closed form. With :math:`h = L\tanh(\mu/2)`,
@@ -195,12 +195,12 @@ def exact_step(process: Process, f_c: float) -> Step:
         half = float(walk_factor(mu) * np.tanh(mu / 2)) / 2 * period
         phi, root = float(one.phi11), math.sqrt(float(one.q11)) * sigma
         a = np.array([[phi], [half * (1 + phi)]])
-        return Step(a, np.array([[root, 0.0], [half * root, sigma * period * math.sqrt(float(one.bridge))]]))
-    return Step(*_moments(process, period))
+        return Cycle(a, np.array([[root, 0.0], [half * root, sigma * period * math.sqrt(float(one.bridge))]]))
+    return Cycle(*_moments(process, period))
 
 
 def _moments(process: Process, period: float) -> tuple[Floats, Floats]:
-    r"""A and B of :class:`Step` for any drift F, from the covariances of z and of its integral y over a cycle.
+    r"""A and B of :class:`Cycle` for any drift F, from the covariances of z and of its integral y over a cycle.
 
     With T as the unit of time, :math:`\Phi = e^F` and :math:`\sigma_x = 1`, the steady state gives
     :math:`E(zz^T) = I`, :math:`E(zy) = F^{-1}(\Phi - I)\,e_1`, :math:`E(y^2) = 2e_1^TF^{-2}(\Phi - I - F)\,e_1`;
@@ -394,7 +394,7 @@ def _past(process: Process, period: float, h: int) -> Floats:
     return covariance
 
 
-def _moves(step: Step, weights: Sequence[float], m: int, h: int, period: float) -> tuple[Floats, Floats]:
+def _moves(step: Cycle, weights: Sequence[float], m: int, h: int, period: float) -> tuple[Floats, Floats]:
     """Return one cycle of the state of :func:`rule_variance`: the transition matrix, and the factor of the noise."""
     size = m + h + 1
     move, drive = np.zeros((size, size)), np.zeros((size, m + 1))

@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import digits, rounding_text
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.display.tables import Table, digits
+from gpbnb.report.display.tables import Table
 from gpbnb.report.integration import derivation, theory
 from gpbnb.report.integration.theory import Process
 
@@ -83,13 +84,13 @@ def design(omega_bw: float, duration: float, precisions: Sequence[int], base: in
             try:
                 rate = theory.best_rate(omega_bw, duration, fmt)
             except ValueError:
-                body.append((digits(fmt), rounding.value, "none", "", "", ""))
+                body.append((digits(fmt), rounding_text(rounding), "none", "", "", ""))
                 continue
             errors = theory.two_errors(1.0, omega_bw, rate, duration, fmt)
             body.append(
                 (
                     digits(fmt),
-                    rounding.value,
+                    rounding_text(rounding),
                     f"{rate:,.3g}",
                     f"{theory.independent_best_rate(omega_bw, duration, fmt):,.3g}",
                     f"{errors.discretization:.2g}",

@@ -21,10 +21,10 @@ from gpbnb.report.integration.derivatives import (
 )
 from gpbnb.report.integration.inputs import (
     RULES,
+    Cycle,
     Lags,
     Process,
     Rule,
-    Step,
     best_possible_rate,
     exact_step,
     first_order,
@@ -68,6 +68,7 @@ from gpbnb.report.integration.walk import (
 
 __all__ = [
     "RULES",
+    "Cycle",
     "DerivativeRule",
     "Discretization",
     "Errors",
@@ -75,7 +76,6 @@ __all__ = [
     "Process",
     "Rule",
     "SavageRecursion",
-    "Step",
     "approximation_ratio",
     "best_possible_rate",
     "best_rate",

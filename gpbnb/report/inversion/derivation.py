@@ -39,7 +39,7 @@ def first_approach() -> Derivation:
         (
             Step("(35), from $r = A\\hat h - u$ and $u = Ah$", inverse * unevaluated(residual), H_HAT - H),
             Step(
-                "(38): the same for all columns, $\\hat h_j$ those of $A^{-1}+E$",
+                "(38): the same for all columns; the $\\hat h_j$ are the columns of $A^{-1}+E$",
                 inverse * unevaluated(A * ERROR),
                 ERROR,
             ),
@@ -139,7 +139,7 @@ def one_step() -> Derivation:
                 new + 3 * EPSILON * new - 2 * EPSILON * old,
             ),
             Step(
-                "the same with an error for each rounding",
+                "the same with a separate error for each rounding",
                 entry_error(),
                 together(new * unevaluated(e1 + e2 + e3), minus(old * unevaluated(e1 + e2))),
             ),
@@ -312,7 +312,7 @@ def transfer_cost() -> Derivation:
             ),
             Step("the largest weight of (87), where $j = 2 + m$", N + 1, (N - J + 3).subs(J, 2 + m), m),
             Step(
-                "so $|\\tilde A|$ is taken at most so many times",
+                "so including $L$ increases the bound by at most this factor",
                 together(1, over(N + 1, sp.Integer(2))),
                 over(N + 3, sp.Integer(2)),
             ),
@@ -340,7 +340,7 @@ def inverse_norms() -> Derivation:
 # -- back substitution, (69)-(90) -----------------------------------------------------------------
 
 
-class Row(NamedTuple):
+class BackRow(NamedTuple):
     """One row of back substitution: the computed a_kk x̂_k, its coefficients, and all errors."""
 
     value: sp.Expr
@@ -349,7 +349,7 @@ class Row(NamedTuple):
     errors: tuple[sp.Symbol, ...]
 
 
-def back_row(terms: int) -> Row:
+def back_row(terms: int) -> BackRow:
     r"""Return the computed a_kk x̂_k of a row with `terms` = n - k entries right of the diagonal, from left to right.
 
     Each term requires a multiplication and a subtraction; the division comes last. The other x̂ were computed before.
@@ -361,7 +361,7 @@ def back_row(terms: int) -> Row:
     for i in range(terms):
         value = (value - a[i] * x[i] * (1 + eps[2 * i])) * (1 + eps[2 * i + 1])
     products = tuple(p * q for p, q in zip(a, x, strict=True))
-    return Row(value * (1 + eps[-1]), right, products, eps)
+    return BackRow(value * (1 + eps[-1]), right, products, eps)
 
 
 def back_row_weights(terms: int) -> tuple[int, tuple[int, ...]]:
@@ -387,7 +387,7 @@ def back_substitution_weights() -> Derivation:
                 (N - J + 3).subs(N, N + 1),
             ),
             Step(
-                "(89) of 1982 prints $2n-j$: too much by this, nothing for $n=3$ alone",
+                "(89) of 1982 prints $2n-j$, which is too large by this difference; it is zero only for $n=3$",
                 together(2 * N - J, minus(N - J + 3)),
                 N - 3,
             ),

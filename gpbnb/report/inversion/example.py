@@ -21,7 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import inverse_in_order
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import rounding_text
 from gpbnb.arithmetic.rational import exact, inverse_of
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.report.inversion import procedure
@@ -83,7 +85,7 @@ class Wordlength:
         return fix
 
     def __str__(self) -> str:
-        return f"{self.kind}, {self.rounding.value}"
+        return f"{self.kind}, {rounding_text(self.rounding)}"
 
 
 KINDS = ("t = places", "t = places + 1", "fixed point")
@@ -94,19 +96,8 @@ WORDLENGTHS = tuple(Wordlength(kind, rounding) for kind, rounding in product(KIN
 
 def eliminate(a: Matrix, fl: Rounder) -> Matrix:
     """Invert by elimination and back substitution in the order of section 11; pivoting would change nothing here."""
-    n = len(a)
-    rows = [[*row, *(Fraction(int(i == j)) for j in range(n))] for i, row in enumerate(a.tolist())]
-    for k in range(n):
-        for i in range(k + 1, n):
-            m = -fl(rows[i][k] / rows[k][k])
-            rows[i] = [fl(p + fl(m * q)) if j > k else p for j, (p, q) in enumerate(zip(rows[i], rows[k], strict=True))]
-    for k in reversed(range(n)):
-        for c in range(n, 2 * n):
-            x = rows[k][c]
-            for i in range(k + 1, n):
-                x = fl(x - fl(rows[k][i] * rows[i][c]))
-            rows[k][c] = fl(x / rows[k][k])
-    return np.array([row[n:] for row in rows], dtype=object)
+    identity = exact(np.eye(len(a), dtype=int))
+    return np.asarray(inverse_in_order(a, identity, np.vectorize(fl, otypes=[object])).matrix)
 
 
 def gauss_jordan(a: Matrix, fl: Rounder) -> Matrix:
@@ -148,7 +139,7 @@ def each_rounded(a: Matrix, fl: Rounder) -> Matrix:
 
 
 @dataclass(frozen=True)
-class Column:
+class PrintedColumn:
     """One reading of a column of Table 1 and its three numbers.
 
     Parameters
@@ -219,7 +210,7 @@ def matrix() -> Matrix:
 
 
 @cache
-def bound_readings() -> tuple[Column, ...]:
+def bound_readings() -> tuple[PrintedColumn, ...]:
     """Compute every reading of the column "By proposed method".
 
     The readings combine two wordlengths, rounded or chopped; quantities computed in that wordlength or with a unit
@@ -241,12 +232,12 @@ def bound_readings() -> tuple[Column, ...]:
                 detail = f"{str(reading).removesuffix(f', {reading.norm}')}, {source}"
                 for relative in (False, True):
                     values = tuple(float(o.relative_bound if relative else o.bound) for o in outcomes)
-                    result.append(Column("bound", wordlength, detail, reading.norm, relative, values))
+                    result.append(PrintedColumn("bound", wordlength, detail, reading.norm, relative, values))
     return tuple(result)
 
 
 @cache
-def error_readings() -> tuple[Column, ...]:
+def error_readings() -> tuple[PrintedColumn, ...]:
     """Compute every reading of the column "Actual value".
 
     The readings combine three wordlengths, rounded or chopped; three ways to invert; the error against the inverse of
@@ -268,13 +259,13 @@ def error_readings() -> tuple[Column, ...]:
                     for x, t in zip(computed, true, strict=True)
                 )
                 detail = f"{method}, against the matrix as {reference}"
-                result.append(Column("error", wordlength, detail, name, relative, values))
+                result.append(PrintedColumn("error", wordlength, detail, name, relative, values))
     return tuple(result)
 
 
 def pairs(
     norm: str = "column sum", relative: bool = False, source: str = "its own digits"
-) -> list[tuple[Column, Column]]:
+) -> list[tuple[PrintedColumn, PrintedColumn]]:
     """Pair each reading of the bound with the error of elimination in the same wordlength."""
     errors = {
         (one.wordlength, one.norm, one.relative): one
@@ -289,7 +280,7 @@ def pairs(
 
 
 @dataclass(frozen=True)
-class Search:
+class Agreements:
     """Result of a search among readings: agreements in all digits, and the number expected by chance.
 
     Parameters
@@ -298,7 +289,7 @@ class Search:
     columns : readings in which all three numbers agree.
     expected : number of agreements expected by chance, if digits have their usual distribution and every power of
         ten is right, which overestimates it.
-    closest : the reading with the smallest :attr:`Column.distance`.
+    closest : the reading with the smallest :attr:`PrintedColumn.distance`.
     """
 
     column: str
@@ -307,13 +298,13 @@ class Search:
     agreements: int
     columns: int
     expected: float
-    closest: Column
+    closest: PrintedColumn
 
 
-def search(column: str) -> Search:
+def search(column: str) -> Agreements:
     """Compare every reading of a column, "bound" or "error", with the print."""
     found = bound_readings() if column == "bound" else error_readings()
-    return Search(
+    return Agreements(
         column,
         len(found),
         len(found) * len(PLACES),
@@ -325,7 +316,7 @@ def search(column: str) -> Search:
 
 
 @dataclass(frozen=True)
-class Claim:
+class SectionClaim:
     """A sentence of section 11.4 and the number of readings for which it holds."""
 
     name: str
@@ -334,7 +325,7 @@ class Claim:
     exception: str
 
 
-def claims() -> tuple[Claim, ...]:
+def claims() -> tuple[SectionClaim, ...]:
     """Test each sentence about Table 1 in every reading.
 
     Whether a bound is conservative is tested against the error of elimination with the same wordlength and norm, both
@@ -345,11 +336,11 @@ def claims() -> tuple[Claim, ...]:
         if one.detail == "elimination, against the matrix as given":
             errors[one.wordlength, one.norm, one.relative] = one.values
 
-    def conservative(one: Column) -> bool:
+    def conservative(one: PrintedColumn) -> bool:
         actual = errors[one.wordlength, one.norm, one.relative]
         return all(v >= e for v, e in zip(one.values, actual, strict=True))
 
-    tests: dict[str, Callable[[Column], bool]] = {
+    tests: dict[str, Callable[[PrintedColumn], bool]] = {
         "the bound decreases with the wordlength": lambda one: one.decreasing,
         "all bounds have the same digits": lambda one: one.same_digits,
         "the bounds are above the errors": conservative,
@@ -358,5 +349,5 @@ def claims() -> tuple[Claim, ...]:
     for name, test in tests.items():
         failing = [one for one in read if not test(one)]
         exception = f"{failing[0].wordlength}: {failing[0].detail}, {failing[0].norm}" if failing else ""
-        result.append(Claim(name, len(read), len(read) - len(failing), exception))
+        result.append(SectionClaim(name, len(read), len(read) - len(failing), exception))
     return tuple(result)

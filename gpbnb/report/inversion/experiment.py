@@ -25,7 +25,7 @@ from gpbnb.arithmetic.rational import column_sum_norm, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.bounds import inverse as bounds
 from gpbnb.report.inversion import procedure, theory
-from gpbnb.sweeps import Column, read
+from gpbnb.sweeps import Column, Sweep
 
 # -- one inverse beside its bounds ----------------------------------------------------------------
 
@@ -51,7 +51,7 @@ MAY_BE_ABSENT = BETTER[1:]
 
 
 @dataclass(frozen=True)
-class Trial(BoundedError):
+class InverseTrial(BoundedError):
     r"""One computed inverse: its matrix, its error and the bounds on that error, in the norm (22).
 
     `bounds` omits bounds that do not exist for this inverse. `condition` is :math:`\|A\|\|A^{-1}\|`.
@@ -76,7 +76,7 @@ class Trial(BoundedError):
         return self.condition * float(self.matrix.format.unit_roundoff) <= REGULAR
 
 
-def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None, family: str = "") -> Trial:
+def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None, family: str = "") -> InverseTrial:
     """Invert a matrix and evaluate bounds on the error of its inverse.
 
     Parameters
@@ -100,7 +100,7 @@ def trial(a: FloatArray, pivot: bool = True, names: Iterable[str] | None = None,
                 raise
     error = bounds.true_error(computing.x, inverse)
     condition = float(column_sum_norm(rationals(a))) * float(column_sum_norm(inverse))
-    return Trial(family, a, computing.x, pivot, condition, error, evaluated)
+    return InverseTrial(family, a, computing.x, pivot, condition, error, evaluated)
 
 
 class _Computing:
@@ -218,7 +218,7 @@ FIXED = ("Hilbert", "Frank", "Kahan")
 
 
 @dataclass(frozen=True)
-class Cell:
+class InverseCell:
     """An independent part of a sweep, with its own seed.
 
     `sizes` are the numbers of rows, each drawn `repeats` times, or once if every draw gives the same matrix.
@@ -231,7 +231,7 @@ class Cell:
     repeats: int
     seed: tuple[int, ...]
 
-    def trials(self, names: Iterable[str] | None = None) -> Iterator[Trial | None]:
+    def trials(self, names: Iterable[str] | None = None) -> Iterator[InverseTrial | None]:
         """Yield the trials one after the other; None if the matrix is singular in the format."""
         rng = np.random.default_rng(self.seed)
         for n in self.sizes:
@@ -248,12 +248,14 @@ class Cell:
         return len(self.sizes) * (1 if self.family in FIXED else self.repeats)
 
 
-def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[Trial]:
+def against_size(fmt: FloatFormat, sizes: Sequence[int], repeats: int, rng: np.random.Generator) -> list[InverseTrial]:
     """Invert random matrices of growing size with pivoting, and evaluate :data:`BETTER`."""
     return [trial(fmt.array(_uniform(n, rng)), True, BETTER, "random") for n in sizes for _ in range(repeats)]
 
 
-def against_condition(fmt: FloatFormat, n: int, digits: Sequence[float], rng: np.random.Generator) -> list[Trial]:
+def against_condition(
+    fmt: FloatFormat, n: int, digits: Iterable[float], rng: np.random.Generator
+) -> list[InverseTrial]:
     """Invert matrices of one size that approach a singular one, by :func:`conditioned`, and evaluate :data:`BETTER`.
 
     Matrices that are singular in the format are omitted.
@@ -281,21 +283,21 @@ RANDOM_FORMATS = (
 RANDOM_SIZES = {n: 3000 if n <= 6 else 1010 if n <= 10 else 100 for n in range(2, 21)}
 
 
-def variant_cells() -> list[Cell]:
+def variant_cells() -> list[InverseCell]:
     """Return the cells of the sweep over all families of matrices, n = 2 ... 20, with and without pivoting."""
     cases = product(FAMILIES, VARIANT_FORMATS, (False, True))
     sizes = tuple(range(2, 21))
-    return [Cell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
+    return [InverseCell(family, fmt, pivot, sizes, 10, (SEED, 0, i)) for i, (family, fmt, pivot) in enumerate(cases)]
 
 
-def random_cells() -> list[Cell]:
+def random_cells() -> list[InverseCell]:
     """Return the cells of the sweep over a hundred thousand random matrices, with pivoting."""
     cases = product(RANDOM_FORMATS, RANDOM_SIZES.items())
-    return [Cell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
+    return [InverseCell("random", fmt, True, (n,), many, (SEED, 1, i)) for i, (fmt, (n, many)) in enumerate(cases)]
 
 
 #: Cells and bounds of each sweep whose results are kept in the package.
-SWEEPS: dict[str, tuple[Callable[[], list[Cell]], tuple[str, ...]]] = {
+SWEEPS: dict[str, tuple[Callable[[], list[InverseCell]], tuple[str, ...]]] = {
     "variants": (variant_cells, ALL_BOUNDS),
     "random": (random_cells, BETTER[2:]),
 }
@@ -318,7 +320,7 @@ TIGHT = 1.1
 REGULAR = 0.01
 
 
-class Sample:
+class InverseSample:
     """Statistics of trials: how often each bound was absent or violated, and its ratios to the error.
 
     `failed` counts matrices that are singular in the format. `exact` counts inverses without error, which have no
@@ -333,7 +335,7 @@ class Sample:
         self.ratios: dict[str, list[float]] = {name: [] for name in names}
         self.ratios_regular: dict[str, list[float]] = {name: [] for name in names}
 
-    def add(self, one: Trial | None) -> None:
+    def add(self, one: InverseTrial | None) -> None:
         """Count a trial; None for a matrix that is singular in the format."""
         if one is None:
             self.failed += 1
@@ -351,7 +353,7 @@ class Sample:
                 if regular:
                     self.ratios_regular[name].append(one.overestimation(name))
 
-    def merge(self, other: Sample) -> None:
+    def merge(self, other: InverseSample) -> None:
         """Count the trials of another sample."""
         for name in ("trials", "failed", "exact", "regular"):
             setattr(self, name, getattr(self, name) + getattr(other, name))
@@ -382,31 +384,31 @@ class Sample:
         return result
 
 
-def cell_sample(cell: Cell, names: Sequence[str]) -> Sample:
+def cell_sample(cell: InverseCell, names: Sequence[str]) -> InverseSample:
     """Compute a cell."""
-    sample = Sample(names)
+    sample = InverseSample(names)
     for one in cell.trials(names):
         sample.add(one)
     return sample
 
 
-def cell_rows(cell: Cell, sample: Sample) -> list[dict[str, str]]:
+def cell_rows(cell: InverseCell, sample: InverseSample) -> list[dict[str, str]]:
     """Return the rows of one cell of a sweep, as stored."""
     return sample.rows(*_where(cell).values())
 
 
-def _where(cell: Cell) -> dict[str, str]:
+def _where(cell: InverseCell) -> dict[str, str]:
     """Return the key of the rows of a cell."""
     sizes = f"{cell.sizes[0]}-{cell.sizes[-1]}" if len(cell.sizes) > 1 else str(cell.sizes[0])
     texts = (cell.family, format_name(cell.fmt), "yes" if cell.pivot else "no", sizes)
     return dict(zip(_FIELDS, texts, strict=False))
 
 
-def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> list[dict[str, str]]:
+def sum_rows(samples: Iterable[tuple[InverseCell, InverseSample]], names: Sequence[str]) -> list[dict[str, str]]:
     """Return rows for each family, if there are several, and for all families together."""
-    rows, whole, families = [], Sample(names), dict[str, Sample]()
+    rows, whole, families = [], InverseSample(names), dict[str, InverseSample]()
     for cell, sample in samples:
-        families.setdefault(cell.family, Sample(names)).merge(sample)
+        families.setdefault(cell.family, InverseSample(names)).merge(sample)
         whole.merge(sample)
     if len(families) > 1:
         for family, sample in families.items():
@@ -414,13 +416,13 @@ def sum_rows(samples: Iterable[tuple[Cell, Sample]], names: Sequence[str]) -> li
     return rows + whole.rows("all", "all", "all", "all")
 
 
-def sweep_rows(cells: Iterable[Cell], names: Sequence[str]) -> list[dict[str, str]]:
+def sweep_rows(cells: Iterable[InverseCell], names: Sequence[str]) -> list[dict[str, str]]:
     """Compute cells and return the rows of each cell, each family, and all families together."""
     samples = [(cell, cell_sample(cell, names)) for cell in cells]
     return [row for each in samples for row in cell_rows(*each)] + sum_rows(samples, names)
 
 
-def worst(bound: str, sweep: str = "variants") -> Trial:
+def worst(bound: str, sweep: str = "variants") -> InverseTrial:
     """Recompute the regular matrix of a stored sweep whose error is largest relative to a bound.
 
     Parameters
@@ -459,7 +461,7 @@ class Frozen:
 
 @cache
 def frozen(sweep: str) -> Frozen:
-    """Read the stored result of a sweep, "variants" or "random"; ``python -m gpbnb.report.inversion`` recomputes it.
+    """Read the stored result of a sweep, "variants" or "random".
 
     Raises
     ------
@@ -467,5 +469,49 @@ def frozen(sweep: str) -> Frozen:
     """
     if sweep not in SWEEPS:
         raise ValueError(f"got sweep {sweep!r}; needed one of {', '.join(SWEEPS)}")
-    table = read(Path(__file__).with_name(f"{sweep}.csv"), COLUMNS, f"python -m gpbnb.report.inversion {sweep}")
+    table = stored_sweep(sweep).load()
     return Frozen(table.provenance, tuple(table.records()))
+
+
+# -- the stored sweeps ----------------------------------------------------------------------------
+
+
+def _computed(cell: InverseCell, directory: Path | None = None, *, names: Sequence[str]) -> dict[str, Any]:
+    """Compute a cell and return the attributes of its sample."""
+    return vars(cell_sample(cell, names))
+
+
+def _restored(result: dict[str, Any], names: Sequence[str]) -> InverseSample:
+    """Return the sample with these attributes."""
+    sample = InverseSample(names)
+    vars(sample).update(result)
+    return sample
+
+
+def _rows(cell: InverseCell, result: dict[str, Any], *, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the rows of a cell, one for each bound."""
+    return [tuple(row.values()) for row in cell_rows(cell, _restored(result, names))]
+
+
+def _sums(results: Sequence[tuple[InverseCell, dict[str, Any]]], *, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return the rows of all cells together and of each family."""
+    samples = [(cell, _restored(result, names)) for cell, result in results]
+    return [tuple(row.values()) for row in sum_rows(samples, names)]
+
+
+def stored_sweep(name: str) -> Sweep[InverseCell]:
+    """Return one of the sweeps of :data:`SWEEPS`."""
+    cells, names = SWEEPS[name]
+    return Sweep(
+        name=f"inversion/{name}",
+        file=Path(__file__).with_name(f"{name}.csv"),
+        columns=COLUMNS,
+        key=5,
+        cells=cells,
+        compute=partial(_computed, names=names),
+        rows=partial(_rows, names=names),
+        command=f"python -m gpbnb.report.stored recompute inversion/{name}",
+        seed=SEED,
+        summary=partial(_sums, names=names),
+        packages=("numpy", "numba", "python-flint"),
+    )

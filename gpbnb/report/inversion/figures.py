@@ -12,8 +12,8 @@ from matplotlib.patches import FancyArrowPatch
 from matplotlib.ticker import MaxNLocator
 
 from gpbnb.report.display.style import BLACK, OBSERVED, REFERENCE, REFUTED, TEXT, VALID, label, legend, name, name_ends
-from gpbnb.report.inversion.example import PLACES, PRINTED, Column
-from gpbnb.report.inversion.experiment import Frozen, Trial
+from gpbnb.report.inversion.example import PLACES, PRINTED, PrintedColumn
+from gpbnb.report.inversion.experiment import Frozen, InverseTrial
 from gpbnb.report.inversion.tables import in_math
 
 
@@ -32,18 +32,27 @@ CHART: Mapping[str, Box] = {
     "triangularize": Box(0.25, 0.83, "Triangularize $A$ into $A_T$", ("transform", "errors of A_T")),
     "transform": Box(0.25, 0.64, "Transform each $u_j$ into $b_j$:\n$A_T x_j = b_j$", ("substitute", "errors of b")),
     "substitute": Box(
-        0.25, 0.43, "Back substitution:\n$\\hat A^{-1} = [x_1 \\;\\ldots\\; x_n]$", ("errors of x", "inverse")
+        0.25,
+        0.43,
+        "Back substitution:\n$\\hat A^{-1} = [x_1 \\;\\ldots\\; x_n]$",
+        ("errors of x", "error of inverse"),
     ),
     "errors of A_T": Box(0.76, 0.83, "$\\tilde A$, error in $A_T$, (59)", ("errors of b",)),
     "errors of b": Box(0.76, 0.64, "$\\tilde b_j$, error in $b_j$, (60)", ("errors of x",)),
-    "errors of x": Box(0.76, 0.44, "$\\Delta A$ and $\\Delta b_j$, (89), (90)", ("sum of errors",)),
-    "sum of errors": Box(
-        0.76, 0.27, "$\\delta A = \\tilde A + \\Delta A$\n$\\delta b_j = \\tilde b_j + \\Delta b_j$", ("inverse",)
+    "errors of x": Box(0.76, 0.44, "$\\Delta A$ and $\\Delta b_j$, (89), (90)", ("sum of the errors",)),
+    "sum of the errors": Box(
+        0.76,
+        0.27,
+        "$\\delta A = \\tilde A + \\Delta A$\n$\\delta b_j = \\tilde b_j + \\Delta b_j$",
+        ("error of inverse",),
     ),
-    "inverse": Box(
-        0.42, 0.1, "$\\delta(A^{-1}) = \\hat A^{-1}\\;[\\,\\delta b_j - \\delta A\\,x_j\\,]$, (95)", ("norm",)
+    "error of inverse": Box(
+        0.42,
+        0.1,
+        "$\\delta(A^{-1}) = \\hat A^{-1}\\;[\\,\\delta b_j - \\delta A\\,x_j\\,]$, (95)",
+        ("bound on error",),
     ),
-    "norm": Box(0.42, -0.06, "Bound $\\|\\delta(A^{-1})\\|$", ()),
+    "bound on error": Box(0.42, -0.06, "Bound $\\|\\delta(A^{-1})\\|$", ()),
 }
 
 
@@ -54,7 +63,7 @@ def flow_chart(ax: Axes) -> list[Artist]:
     ax.set_ylim(-0.12, 1.04)
     drawn = {}
     for key, box in CHART.items():
-        errors = "errors" in key
+        errors = "error" in key
         style = {
             "boxstyle": "round,pad=0.4",
             "facecolor": "#FBEADF" if errors else "#DCEBF5",
@@ -79,7 +88,7 @@ def flow_chart(ax: Axes) -> list[Artist]:
     return [*drawn.values(), *arrows]
 
 
-def table1(bounds: Sequence[Column], errors: Sequence[Column], ax: Axes) -> list[Artist]:
+def table1(bounds: Sequence[PrintedColumn], errors: Sequence[PrintedColumn], ax: Axes) -> list[Artist]:
     """Draw Table 1: every reading of both columns (dashes) and the printed numbers (open markers)."""
     artists: list[Artist] = []
     for columns, printed, colour, shift in ((bounds, "bound", REFUTED, -0.16), (errors, "error", OBSERVED, 0.16)):
@@ -96,14 +105,14 @@ def table1(bounds: Sequence[Column], errors: Sequence[Column], ax: Axes) -> list
             f"all readings\nof the {printed}",
             (shift, top),
             colour,
-            (11 * side, 14 if shift < 0 else -1),
+            (11 * side, 14 if shift < 0 else 26),
             va="center",
         )
         name(ax, f"{printed} as\nprinted", (shift, values[0]), BLACK, (11 * side, 0))
     ax.set_yscale("log")
     ax.set_xticks(range(len(PLACES)), [str(p) for p in PLACES])
     ax.set_xlim(-1.0, len(PLACES) - 0.5)
-    label(ax, "places after the decimal point", "error norm (no unit)")
+    label(ax, "places after the decimal point", "error norm")
     return artists
 
 
@@ -134,11 +143,23 @@ def violations(result: Frozen, bounds: Sequence[str], ax: Axes) -> list[Artist]:
     return artists
 
 
-def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: str = "size") -> list[Artist]:
+#: The marker of each bound, the same in every panel.
+BOUND_MARKERS = {
+    "Wilkinson": "o",
+    "Higham": "s",
+    "strict": "D",
+    "ball": "^",
+    "preconditioned ball": "P",
+    "a posteriori": "v",
+}
+
+
+def ratios(trials: Sequence[InverseTrial], bounds: Sequence[str], ax: Axes, against: str = "size") -> list[Artist]:
     """Draw bound / error: medians against the size of the matrix, or every trial against the condition number."""
     artists: list[Artist] = []
     ends = {}
-    for bound, marker in zip(bounds, "osD^Pv", strict=False):
+    for bound, other in zip(bounds, "osD^Pv", strict=False):
+        marker = BOUND_MARKERS.get(bound, other)
         having = [one for one in trials if bound in one.bounds and one.error]
         if against == "condition":
             having.sort(key=lambda one: one.condition)
@@ -162,8 +183,8 @@ def ratios(trials: Sequence[Trial], bounds: Sequence[str], ax: Axes, against: st
         name(ax, r"$1/\beta$", (limit, ax.get_ylim()[1]), REFERENCE, (-3, -2))
     else:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    rows = "condition number (no unit)" if against == "condition" else "rows $n$ (no unit)"
-    label(ax, rows, "bound / error (no unit)")
+    rows = "condition number" if against == "condition" else "rows $n$"
+    label(ax, rows, "bound / error" if against == "condition" else "bound / error, median")
     if ends:
         name_ends(ax, {**ends, "error": (1.0, OBSERVED)})
     else:

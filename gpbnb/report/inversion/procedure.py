@@ -235,7 +235,7 @@ def error_norm(error: Any, norm: str = "column sum") -> Any:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ProcedureResult:
     """Intermediate results and bound of the procedure.
 
     `norm_of_inverse` is the norm of the computed inverse, by which (97) divides.
@@ -254,7 +254,7 @@ class Outcome:
         return self.bound / self.norm_of_inverse
 
 
-def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) -> Outcome:
+def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) -> ProcedureResult:
     """Evaluate the error boxes in one reading.
 
     Parameters
@@ -267,7 +267,7 @@ def evaluate(reduction: Reduction, beta: Any, reading: Reading | None = None) ->
     return next(evaluate_all(reduction, beta, (reading or Reading(),)))
 
 
-def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) -> Iterator[Outcome]:
+def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) -> Iterator[ProcedureResult]:
     """Evaluate several readings, with their common parts computed once."""
     solution = _plain(reduction.solution)
     second = {signed: back_substitution_errors(reduction, beta, signed) for signed in (True, False)}
@@ -284,10 +284,10 @@ def evaluate_all(reduction: Reduction, beta: Any, several: Iterable[Reading]) ->
             bound = norm(inverse_error(front, e, reading.signed))
         else:
             bound = norm(front) * norm(e)
-        yield Outcome(reading, reduction, beta, errors[reading.signed], bound, norm(solution))
+        yield ProcedureResult(reading, reduction, beta, errors[reading.signed], bound, norm(solution))
 
 
-def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> Outcome:
+def run(a: FloatArray, pivot: bool = False, reading: Reading | None = None) -> ProcedureResult:
     """Run the whole chart, from the given matrix to the error bound of its inverse; the bound is exact.
 
     Parameters

@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 
-from gpbnb.report.display.tables import Table, arithmetic, scientific, short
+from gpbnb.arithmetic.named import arithmetic
+from gpbnb.report.display.tables import Table, scientific, short
 from gpbnb.report.inversion.costs import Price
-from gpbnb.report.inversion.example import PLACES, PRINTED, Claim, Column, Search
+from gpbnb.report.inversion.example import PLACES, PRINTED, Agreements, PrintedColumn, SectionClaim
 from gpbnb.report.inversion.existence import Possible
-from gpbnb.report.inversion.experiment import Frozen, Trial
+from gpbnb.report.inversion.experiment import Frozen, InverseTrial
 
 
-def table1(found: Sequence[Search]) -> Table:
+def table1(found: Sequence[Agreements]) -> Table:
     """Show the six numbers of Table 1 as printed, and beside each the number of the reading that comes closest."""
     names = {"bound": "By proposed method", "error": "Actual value"}
     header = ["places after decimal point"]
@@ -24,7 +25,7 @@ def table1(found: Sequence[Search]) -> Table:
     return Table("Table 1 as printed and as computed", tuple(header), tuple(body))
 
 
-def searches(found: Sequence[Search]) -> Table:
+def searches(found: Sequence[Agreements]) -> Table:
     """Count the numbers of all readings that agree with the printed ones, and show the closest reading."""
     header = (
         "column",
@@ -48,7 +49,7 @@ def searches(found: Sequence[Search]) -> Table:
     return Table(f"{len(body)} searches", header, tuple(body))
 
 
-def claims(found: Sequence[Claim]) -> Table:
+def claims(found: Sequence[SectionClaim]) -> Table:
     """Count the readings in which each sentence about Table 1 holds."""
     body = [(one.name, f"{one.holds} of {one.readings}", in_math(one.exception) or "none") for one in found]
     return Table(f"{len(body)} claims", ("claim", "holds in", "first exception"), tuple(body))
@@ -69,7 +70,9 @@ def possibilities(found: Sequence[Possible]) -> Table:
         "kind of error",
         *(f"{p} places: {v}" for p, v in zip(PLACES, PRINTED["error"], strict=True)),
     )
-    return Table(f"{len(found)} searches", header, tuple((*key, *line) for key, line in lines.items()))
+    return Table(
+        "settings that could give the printed errors", header, tuple((*key, *line) for key, line in lines.items())
+    )
 
 
 def violations(result: Frozen, bounds: Sequence[str]) -> Table:
@@ -104,7 +107,7 @@ def prices(found: Sequence[Price], sizes: Sequence[int]) -> Table:
     return Table(f"Sharpness and cost of {len(body)} bounds", header, tuple(body))
 
 
-def worst(trials: Mapping[str, Trial]) -> Table:
+def worst(trials: Mapping[str, InverseTrial]) -> Table:
     """Show, for each bound, the inverse whose error exceeds it the most."""
     body = [
         (
@@ -120,7 +123,7 @@ def worst(trials: Mapping[str, Trial]) -> Table:
     return Table(f"{len(body)} inversions", header, tuple(body))
 
 
-def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
+def worked(trials: Mapping[str, InverseTrial], bounds: Sequence[str]) -> Table:
     """Show single inverses: the matrix, its computed inverse, the error and each bound."""
     body = [
         (
@@ -136,7 +139,7 @@ def worked(trials: Mapping[str, Trial], bounds: Sequence[str]) -> Table:
     return Table(f"{len(body)} worked examples", header, tuple(body))
 
 
-def _reading(one: Column) -> str:
+def _reading(one: PrintedColumn) -> str:
     return f"{one.wordlength}; {in_math(one.detail)}; {one.norm}, {'relative' if one.relative else 'absolute'}"
 
 

@@ -233,13 +233,13 @@ def scalar_conditions() -> Derivation:
                 sp.Integer(allowed),
             ),
             Step(
-                "and not beyond: possible minus allowed, times $1-\\kappa$",
+                "beyond it they differ: possible minus allowed, times $1-\\kappa$",
                 unevaluated(together(may(kappa), -allowed)) * unevaluated(1 - kappa),
                 6 * kappa - 1,
             ),
             Step(
-                "(108), first form: 4 roundings of $P_pH$, above and, times $\\kappa$, below the line; 1 of $H(P_pH)$; "
-                "1 each of sum, quotient and product",
+                "(108), first form: 4 roundings of $P_pH$ in the numerator and, times $\\kappa$, in the denominator; "
+                "1 of $H(P_pH)$; 1 each of sum, quotient and product",
                 sp.Integer(9),
                 together(4 * (1 - kappa), kappa, 3),
                 2 + 3 * kappa,

@@ -1,28 +1,20 @@
-"""Run many filters, models x formats x forms x seeds, on any executor: ``python -m gpbnb.report.kalman.ensembles``.
+"""Run many filters: models x formats x forms x seeds.
 
-A few numbers define each trial, so it can run anywhere with the same result. The results are stored next to this file
-in ``ensembles.csv``, and their provenance in ``ensembles.json``.
+A few numbers define each trial, so it can run anywhere with the same result.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
-import sys
-import time
 from collections.abc import Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from functools import cache
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
-from tqdm import tqdm  # type: ignore[import-untyped]
 
-from gpbnb import sweeps
 from gpbnb.arithmetic.bounds import column_sum
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rounding import Rounding
@@ -30,7 +22,7 @@ from gpbnb.bounds.bounded_run import BoundedHistory, emulate_with_bound
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.report.kalman import report_bounds
-from gpbnb.sweeps import Column
+from gpbnb.sweeps import Column, Sweep, as_computed
 
 #: The kinds of random models; see :func:`random_model`.
 KINDS = ("stable", "oscillating", "drifting", "one sign", "far scales")
@@ -45,10 +37,8 @@ FORMATS = tuple(
 #: Number of repetitions of each combination, 34 x 5 x 12 x 5 = 10,200 trials.
 REPEATS = 34
 
-_HERE = Path(__file__).parent
-
-#: The stored sweep.
-FILE = _HERE / "ensembles.csv"
+STEPS = 32
+"""Steps of a trial."""
 
 
 class Task(NamedTuple):
@@ -62,7 +52,7 @@ class Task(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TrialOutcome:
     """Largest error over bound of a trial, over all steps and entries.
 
     Parameters
@@ -136,7 +126,7 @@ def _short(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([float(f"{value:.6g}") for value in values.flat]).reshape(values.shape)
 
 
-def trial(task: Task) -> Outcome:
+def trial(task: Task) -> TrialOutcome:
     """Draw the model and the measurements of a task, run the filter, and compare it with its bounds."""
     rng = np.random.default_rng([task.seed, KINDS.index(task.kind)])
     model, size = random_model(rng, task.kind)
@@ -152,7 +142,7 @@ def trial(task: Task) -> Outcome:
     lost = history.indefinite is not None or history.stopped is not None
     share = float(finite.sum() / task.steps)
     last = float(ratios[-1, 0]) if len(ratios) == task.steps else 0.0
-    return Outcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
+    return TrialOutcome(task, state, gain, covariance, last, share, *printed_ratios(found, task), lost)
 
 
 def printed_ratios(found: BoundedHistory, task: Task) -> tuple[float, float, float]:
@@ -196,7 +186,7 @@ def _largest(ratios: NDArray[np.float64]) -> float:
 # -- sweeps -------------------------------------------------------------------------------------------
 
 
-def tasks(repeats: int, steps: int = 32, first_seed: int = 0) -> tuple[Task, ...]:
+def tasks(repeats: int, steps: int = STEPS, first_seed: int = 0) -> tuple[Task, ...]:
     """List every kind, format and form, `repeats` times."""
     return tuple(
         Task(kind, fmt, form, seed, steps)
@@ -205,71 +195,6 @@ def tasks(repeats: int, steps: int = 32, first_seed: int = 0) -> tuple[Task, ...
         for fmt in FORMATS
         for form in Form
     )
-
-
-def sweep(
-    todo: Sequence[Task], executor: Executor | None = None, batch: int = 25, attempts: int = 10, progress: bool = False
-) -> tuple[Outcome, ...]:
-    """Run all trials on an executor; the results are in the order of the tasks and do not depend on the executor.
-
-    Parameters
-    ----------
-    executor : any executor, such as Dask's ``Client.get_executor()``; by default processes of this machine, or this
-        process for a single batch.
-    batch : number of trials sent at once.
-    attempts : number of times that a batch is sent again if its worker dies.
-
-    Raises
-    ------
-    RuntimeError : workers died more than `attempts` times while running a batch.
-    """
-    if batch < 1 or attempts < 1:
-        raise ValueError(f"got batch = {batch}, attempts = {attempts}; needed both at least 1")
-    batches = [tuple(todo[start : start + batch]) for start in range(0, len(todo), batch)]
-    with tqdm(total=len(todo), desc="trials", unit="trial", disable=not progress) as bar:
-        if executor is None and len(batches) <= 1:
-            return tuple(outcome for each in batches for outcome in _some(each))
-        if executor is None:
-            # A forked process may inherit locks held by threads of this one.
-            with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-                return _gather(batches, pool, attempts, bar)
-        return _gather(batches, executor, attempts, bar)
-
-
-def _gather(batches: Sequence[tuple[Task, ...]], executor: Executor, attempts: int, bar: Any) -> tuple[Outcome, ...]:
-    results: dict[int, tuple[Outcome, ...]] = {}
-    tries = dict.fromkeys(range(len(batches)), 1)
-    pending = {executor.submit(_some, each): number for number, each in enumerate(batches)}
-    while pending:
-        finished = wait(pending, return_when=FIRST_COMPLETED).done
-        for future in finished:
-            number = pending.pop(future)
-            try:
-                results[number] = future.result()
-                bar.update(len(batches[number]))
-            except Exception as error:
-                if not _is_of_the_worker(error):
-                    raise
-                if tries[number] >= attempts:
-                    raise RuntimeError(
-                        f"got {attempts} workers that died under one batch of {len(batches[number])} "
-                        "trials; needed workers that survive; give them more memory, or send smaller "
-                        "batches"
-                    ) from error
-                tries[number] += 1
-                pending[executor.submit(_some, batches[number])] = number
-    return tuple(outcome for number in range(len(batches)) for outcome in results[number])
-
-
-def _is_of_the_worker(error: BaseException) -> bool:
-    """Whether a batch failed because of its worker; Dask's own exceptions are recognized without importing Dask."""
-    if isinstance(error, BrokenExecutor):
-        return False  # the executor accepts no more work
-    return isinstance(error, CancelledError) or type(error).__module__.partition(".")[0] in ("distributed", "dask")
-
-
-def _some(batch: Sequence[Task]) -> tuple[Outcome, ...]:
-    return tuple(trial(task) for task in batch)
 
 
 # -- what was found -----------------------------------------------------------------------------------
@@ -302,7 +227,7 @@ class Summary(NamedTuple):
     indefinite: int
 
 
-def _alone(outcome: Outcome) -> Summary:
+def _alone(outcome: TrialOutcome) -> Summary:
     task, ratios = outcome.task, (outcome.state, outcome.gain, outcome.covariance)
     compared = outcome.last > 0
     return Summary(
@@ -349,12 +274,12 @@ _COUNTED = (
 )  # fmt: skip
 
 
-def summaries(outcomes: Sequence[Outcome]) -> tuple[Summary, ...]:
+def summaries(outcomes: Sequence[TrialOutcome]) -> tuple[Summary, ...]:
     """Return one summary for each kind and form, in order of appearance."""
     return merged([_alone(outcome) for outcome in outcomes])
 
 
-def lines(seed: int, outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+def lines(seed: int, outcomes: Sequence[TrialOutcome]) -> list[tuple[str, ...]]:
     """Return the rows of ``ensembles.csv`` for the trials of one seed, with six significant digits."""
     return [
         (str(seed), *(f"{each:.6g}" if isinstance(each, float) else str(each) for each in summary))
@@ -363,7 +288,6 @@ def lines(seed: int, outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
 
 
 HEADER = ("seed", *Summary._fields)
-COMMAND = "python -m gpbnb.report.kalman.ensembles"
 
 
 def _column(name: str, kind: type) -> Column:
@@ -376,41 +300,27 @@ def _column(name: str, kind: type) -> Column:
 COLUMNS = (Column("seed", "integer", 0), *(_column(*each) for each in get_type_hints(Summary).items()))
 
 
+def trials_of_seed(seed: int, directory: Path | None = None) -> list[tuple[str, ...]]:
+    """Return the rows for one seed of the random filters."""
+    return lines(seed, [trial(task) for task in tasks(1, first_seed=seed)])
+
+
+SWEEP: Sweep[int] = Sweep(
+    name="kalman/ensembles",
+    file=Path(__file__).with_name("ensembles.csv"),
+    columns=COLUMNS,
+    key=3,
+    cells=lambda: range(REPEATS),
+    compute=trials_of_seed,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute kalman/ensembles",
+    seed=0,
+)
+
+
 @cache
-def load(directory: Path = _HERE) -> tuple[Summary, ...]:
+def load(file: Path = SWEEP.file) -> tuple[Summary, ...]:
     """Load the sweep that ships with the package, for all seeds together."""
-    body = sweeps.read(directory / "ensembles.csv", COLUMNS, COMMAND).rows
     types = get_type_hints(Summary).values()
-    return merged([Summary(*(kind(cell) for kind, cell in zip(types, line[1:], strict=True))) for line in body])
-
-
-def provenance(directory: Path = _HERE) -> dict[str, Any]:
-    """Return the provenance of the sweep."""
-    return sweeps.read_record(directory / "ensembles.json", COMMAND)
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog=COMMAND, description="Survey thousands of random filters.")
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="number of trials for each kind, format and form")
-    parser.add_argument("--output", type=Path, default=Path(".cache/ensembles"), help="folder for the two files")
-    given = parser.parse_args(arguments)
-    todo, start = tasks(given.repeats), time.perf_counter()
-    outcomes = sweep(todo, progress=True)
-    given.output.mkdir(parents=True, exist_ok=True)
-    rows = [line for seed in range(given.repeats) for line in lines(seed, outcomes)]
-    sweeps.write(given.output / "ensembles.csv", COLUMNS, rows, {"command": COMMAND, **sweeps.machine()})
-    made = {
-        "command": COMMAND,
-        "trials": len(todo),
-        "steps": todo[0].steps,
-        "formats": [str(fmt) for fmt in FORMATS],
-        "seconds": round(time.perf_counter() - start),
-        **sweeps.machine(),
-    }
-    sweeps.write_record(given.output / "ensembles.json", made)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+    rows = SWEEP.load(file).rows
+    return merged([Summary(*(kind(cell) for kind, cell in zip(types, row[1:], strict=True))) for row in rows])

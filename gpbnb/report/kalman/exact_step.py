@@ -6,7 +6,9 @@ from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.rational import exact, inverse_of
+from gpbnb.arithmetic.algebra import EXACT, product_in_order
+from gpbnb.arithmetic.rational import exact
+from gpbnb.filters.kalman_step import gain, predicted, reduction
 
 
 class ExactStep(NamedTuple):
@@ -41,11 +43,8 @@ def exact_step(Phi: Any, H: Any, Q: Any, R: Any, x: Any, P: Any, z: Any) -> Exac
     numpy.linalg.LinAlgError : :math:`HP_pH^T + R` is singular.
     """
     Phi, H, Q, R, x, P, z = map(exact, (Phi, H, Q, R, x, P, z))
-    predicted = Phi @ P @ Phi.T + Q
-    S = H @ predicted @ H.T + R
-    gain = predicted @ H.T @ inverse_of(S)
-    transition = Phi - gain @ (H @ Phi)
-    innovation = z - H @ (Phi @ x)
-    return ExactStep(
-        Phi @ x + gain @ innovation, predicted - gain @ (H @ predicted), predicted, gain, S, innovation, transition
-    )
+    V = predicted(EXACT, Phi, P, Q)
+    K, S, _ = gain(EXACT, H, R, V)
+    W, ahead = reduction(EXACT, K, H), Phi @ x
+    innovation = z - H @ ahead
+    return ExactStep(ahead + K @ innovation, product_in_order(W, V), V, K, S, innovation, product_in_order(W, Phi))

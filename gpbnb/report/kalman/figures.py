@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -18,6 +18,7 @@ from gpbnb.report.display.style import (
     OBSERVED,
     OBSERVED_OTHERS,
     REFUTED,
+    TEXT,
     VALID,
     label,
     legend,
@@ -36,7 +37,7 @@ def bound_by_digits(ax: Axes, faults: Mapping[str, bool], **style: Any) -> list[
     return ax.plot(DIGITS, heights, color=REFUTED, **style)
 
 
-def bound_by_steps(steps: Sequence[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
+def bound_by_steps(steps: Iterable[int], fmt: FloatFormat, faults: Mapping[str, bool]) -> list[float]:
     """Return bound (125) in one format after some steps, in mas, for the lines of a figure."""
     return [report_bounds.gravity_probe_b_bound(fmt.unit_roundoff, int(k), **faults) for k in steps]
 
@@ -53,7 +54,9 @@ def contraction(found: BoundedHistory, state: int, ax: Axes, name: str) -> list[
         ("observed", error[middle], OBSERVED, {"xytext": (8, -6), "ha": "left", "va": "top"}),
     ]
     for text, y, colour, where in places:
-        artists.append(ax.annotate(text, (steps[middle], y), color=colour, textcoords="offset points", **where))
+        artists.append(
+            ax.annotate(text, (steps[middle], y), color=colour, textcoords="offset points", fontsize=TEXT, **where)
+        )
     loglog(ax)
     label(ax, "step $k$", f"error of {name}")
     return artists

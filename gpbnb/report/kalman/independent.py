@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from gpbnb import sweeps
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.filters.forms import Form
 from gpbnb.filters.run import Run
@@ -50,8 +49,7 @@ def stored_shares(bound: str, form: Form) -> ModelShare:
     """
     if bound not in ("105", "108", "125"):
         raise ValueError(f"got bound {bound!r}; needed 105, 108 or 125")
-    table = sweeps.read(ensembles.FILE, ensembles.COLUMNS, ensembles.COMMAND)
-    rows = table.records(form=form.name.lower())
+    rows = ensembles.SWEEP.load().records(form=form.name.lower())
     each = np.array([int(row[f"violations_{bound}"]) / int(row["trials"]) for row in rows])
     half = float(scipy.stats.t.ppf(0.975, len(each) - 1) * each.std(ddof=1) / math.sqrt(len(each)))
     mean = float(each.mean())

@@ -12,13 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gpbnb.arithmetic.algebra import Algebra, rounded_algebra
 from gpbnb.arithmetic.array import FloatArray
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact, max_norm
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel, kalman_step
 from gpbnb.report.kalman import exact_step, report_bounds
 
 
-class Case(NamedTuple):
+class FilterCase(NamedTuple):
     """A filter and its first measurement, exact, as arguments of :func:`gpbnb.report.kalman.exact_step.exact_step`."""
 
     Phi: NDArray[Any]
@@ -38,7 +41,7 @@ class Ratios(NamedTuple):
     state: float
 
 
-def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
+def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> FilterCase:
     """Return a filter with one state and one measurement, with Q = 0 and every other number 1 except R, z and maybe H.
 
     Parameters
@@ -48,62 +51,44 @@ def scalar(fmt: FloatFormat, r: Any = None, h: Any = 1, z: Any = 0) -> Case:
     """
     one = exact([[1]])
     small = Fraction(1, fmt.base ** (fmt.precision + 1)) if r is None else r
-    return Case(one, exact([[h]]), one * 0, exact([[small]]), exact([1]), one, exact([z]))
+    return FilterCase(one, exact([[h]]), one * 0, exact([[small]]), exact([1]), one, exact([z]))
 
 
-def correlated() -> Case:
+def correlated() -> FilterCase:
     """Return the smallest filter, with two states, that violates (108) with the first form of (99) in four digits.
 
     The first entry of the gain is (1.001 · 1.001 - 1.002)/S, which four-digit arithmetic rounds to zero.
     """
     one = np.eye(2, dtype=int)
     P = [["1.001", "-1.002"], ["-1.002", "2"]]
-    return Case(exact(one), exact([["1.001", "1"]]), exact(one * 0), exact([[1]]), exact([0, 0]), exact(P), exact([1]))
+    return FilterCase(
+        exact(one), exact([["1.001", "1"]]), exact(one * 0), exact([[1]]), exact([0, 0]), exact(P), exact([1])
+    )
 
 
-def rounded_step(fmt: FloatFormat, case: Case, second: bool = False) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+def rounded_step(
+    fmt: FloatFormat, case: FilterCase, second: bool = False
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Take one step with each operation rounded, in the order of the report: (100), (99), (101), (109)-(111).
 
     Parameters
     ----------
     fmt : format that rounds each result; the numbers of `case` are not rounded.
-    case : filter with one measurement.
+    case : filter and measurement.
     second : whether the estimate uses the second form of (99), with the new covariance.
 
     Returns
     -------
     x (n,), K (n, 1), P (n, n), as Fractions.
-
-    Raises
-    ------
-    ValueError : more than one measurement.
     """
     Phi, H, Q, R, x, P, z = case
-    if len(H) != 1:
-        raise ValueError(f"got {len(H)} measurements; needed one; process several one after another")
-    fl = np.vectorize(fmt.round, otypes=[object])
-
-    def product(A: NDArray[Any], B: NDArray[Any]) -> NDArray[Any]:
-        total = fl(np.multiply.outer(A[:, 0], B[0]))
-        for k in range(1, len(B)):
-            total = fl(total + fl(np.multiply.outer(A[:, k], B[k])))
-        return np.asarray(total)
-
-    predicted = fl(product(product(Phi, P), Phi.T) + Q)
-    PH = product(predicted, H.T)
-    S = fl(product(H, PH) + R)
-    K = product(PH, fl(1 / S))
-    identity = exact(np.eye(len(x), dtype=int))
-    W = fl(identity - product(K, H))
-    P = product(W, predicted)
-    if second:
-        K = product(product(P, H.T), fl(1 / R))
-        W = fl(identity - product(K, H))
-    x = fl(product(product(W, Phi), x[:, None]) + product(K, z[:, None]))
+    algebra = rounded_algebra(exact, np.vectorize(fmt.round, otypes=[object]))
+    form = Form.HUNG_SECOND_GAIN if second else Form.HUNG
+    x, K, P = kalman_step(algebra, form, StepModel(Phi, H, Q, R), x[:, None], P, z[:, None])
     return x[:, 0], K, P
 
 
-def ratios(fmt: FloatFormat, case: Case, second: bool = False, steps: int = 1) -> Ratios:
+def ratios(fmt: FloatFormat, case: FilterCase, second: bool = False, steps: int = 1) -> Ratios:
     r"""Compare the errors of the last of `steps` rounded steps with (105), (108) and (125).
 
     Parameters
@@ -175,12 +160,17 @@ def random_steps(fmt: FloatFormat, steps: int, rng: np.random.Generator) -> Rand
 
 def scalar_step(one: FloatArray, *numbers: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return x, K and P after one step of filters with one state, in the order of :func:`rounded_step`."""
-    Phi, H, x, z, P, Q, R = numbers
-    predicted = Phi * P * Phi + Q
-    PH = predicted * H
-    K = PH * (one / (H * PH + R))
-    W = one - K * H
-    return W * Phi * x + K * z, K, W * predicted
+    Phi, H, x, z, P, Q, R = (_one_by_one(each) for each in numbers)
+    algebra = Algebra(lambda n: _one_by_one(one))
+    found = kalman_step(algebra, Form.HUNG, StepModel(Phi, H, Q, R), x, P, z)
+    return found.x[0, 0], found.K[0, 0], found.P[0, 0]
+
+
+def _one_by_one(numbers: FloatArray) -> NDArray[Any]:
+    """Return a matrix (1, 1) whose entry is an array with a number for each filter."""
+    matrix = np.empty((1, 1), dtype=object)
+    matrix[0, 0] = numbers
+    return matrix
 
 
 def largest_violating_noise(fmt: FloatFormat, second: bool = False) -> dict[str, Fraction]:

@@ -1,4 +1,4 @@
-"""Tables of the chapter on the Kalman bound."""
+"""Tables of the chapter on why (125) fails."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from fractions import Fraction
 
 from gpbnb.arithmetic.formats import FloatFormat, prints_as
-from gpbnb.report.display.tables import Table, arithmetic, scientific, short
+from gpbnb.arithmetic.named import arithmetic
+from gpbnb.report.display.tables import Table, scientific, short
 from gpbnb.report.kalman import report_bounds, smallest
 from gpbnb.report.kalman.ensembles import Summary
 from gpbnb.report.kalman.independent import FirstStep, ModelShare
@@ -30,7 +31,7 @@ def example(k: int, n: int, m: int) -> Table:
                     scientific(coefficient * DOUBLE.unit_roundoff, 2),
                 )
             )
-    header = ("(125)", "term", "coefficient", "$\\beta$ = 1 / coefficient", "digits", "error in IEEE double")
+    header = ("(125)", "term", "coefficient", "$\\beta$ = 1 / coefficient", "decimal digits", "error in IEEE double")
     return Table(f"the closing example, {len(report_bounds.CORRECTIONS)} ways", header, tuple(body))
 
 
@@ -61,7 +62,11 @@ def misprints(k: int, n: int, m: int) -> Table:
         beta = Fraction(printed[f"{name} beta"])
         follows = prints_as(1 / given, printed[f"{name} beta"])
         values.append(
-            (f"{name} beta", scientific(Fraction(1, coefficient), 4), _yes(follows, "one over the printed coefficient"))
+            (
+                f"{name} beta",
+                scientific(Fraction(1, coefficient), 4),
+                _yes(follows, "1 divided by the printed coefficient"),
+            )
         )
         exact_digits = 1 - math.log10(2 * float(beta))
         needed = report_bounds.precision_for_coefficient(1 / beta)
@@ -73,13 +78,14 @@ def misprints(k: int, n: int, m: int) -> Table:
             )
         )
     body = tuple((name, f"${_typeset(printed[name])}$", value, why) for name, value, why in values)
-    return Table("the printed numbers of the closing example", ("number", "printed", "formula", "explanation"), body)
+    header = ("number", "printed", "formula", "explanation")
+    return Table("the printed numbers of the closing example", header, body, quoted=("printed", "formula"))
 
 
 _SECOND = "second coefficient"
 
 
-def tolerances(k: int, n: int, m: int, tolerance: Fraction, size: Fraction) -> Table:
+def tolerances(k: int, n: int, m: int, tolerance: Fraction | int, size: Fraction | int) -> Table:
     """Tabulate digits that each coefficient requires for an error of `size`, as in the example, and `tolerance`.
 
     Parameters
@@ -151,18 +157,19 @@ def trials(found: Sequence[Summary]) -> Table:
         for bound in ("105", "108", "125"):
             violated = sum(getattr(each, f"violations_{bound}") for each in group)
             largest = max(getattr(each, f"worst_{bound}") for each in group)
-            cells.append(f"{100 * violated / count:.1f} %, {short(largest)}")
+            cells += [f"{100 * violated / count:.1f} %", short(largest)]
         largest = max(max(each.state, each.gain, each.covariance) for each in group)
         violated = sum(each.contraction_violations for each in group)
         compared = sum(each.compared for each in group)
         logarithm = sum(each.compared * math.log(each.typical) for each in group if each.compared)
         typical = short(math.exp(-logarithm / compared)) if compared else ""
-        body.append((name, str(count), *cells, f"{violated}, {largest:.3f}", typical))
+        body.append((name, str(count), *cells, str(violated), f"{largest:.3f}", typical))
     header = (
         "models",
         "runs",
-        *(f"({bound}): violations, largest error / bound" for bound in (105, 108, 125)),
-        "contraction bound: violations, largest error / bound",
+        *(f"({bound}) {what}" for bound in (105, 108, 125) for what in ("violated", "largest error / bound")),
+        "contraction bound violated",
+        "contraction bound, largest error / bound",
         "contraction bound / error, typical",
     )
     return Table(f"{sum(each.trials for each in found)} random filters", header, tuple(body))

@@ -14,6 +14,7 @@ from gpbnb.report.ledger.html import CHAPTERS, Html
 from gpbnb.report.ledger.legibility import load_legibility
 from gpbnb.report.ledger.page import (
     PAGES,
+    claim_outcomes,
     claim_table,
     count_table,
     error_table,
@@ -26,6 +27,7 @@ from gpbnb.report.ledger.page import (
 )
 from gpbnb.report.ledger.render import table
 from gpbnb.report.ledger.roots import by_root, load_roots
+from gpbnb.report.ledger.squares import root_tree, squares
 from gpbnb.report.ledger.statements import Statement, load_statements, quote, select
 
 __all__ = [
@@ -36,6 +38,7 @@ __all__ = [
     "Row",
     "Statement",
     "by_root",
+    "claim_outcomes",
     "claim_table",
     "count_table",
     "counts",
@@ -49,9 +52,11 @@ __all__ = [
     "printed_table",
     "quote",
     "root_table",
+    "root_tree",
     "rows",
     "select",
     "select_topic",
+    "squares",
     "table",
     "topics",
 ]

@@ -101,10 +101,11 @@ def _file(module: Path) -> Path | None:
     folder = _folder()
     if folder is None:
         return None
-    files = with_data(imported(module))
+    sources = imported(module)
+    files = with_data(sources)
     if changed_since_import(files):
         return None
-    key = (digest(files), *environment())
+    key = (digest(files), *environment(sources))
     return folder / f"{module.stem}.{hashlib.sha256(repr(key).encode()).hexdigest()[:24]}.json"
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.caching import PACKAGE
 from gpbnb.report.ledger import cache
 from gpbnb.report.ledger.checks import TOPICS
@@ -23,7 +24,7 @@ class Row:
     """An entry and the finding of its check; no finding if there is no check or the check raised `error`."""
 
     statement: Statement
-    finding: Finding | None
+    finding: Finding | MaybeNone
     error: Exception | None = None
 
     @property
@@ -121,17 +122,26 @@ def examine_once(
     for module, inside in by_module.items():
         if module is not None:
             found |= _known(inside, cache.known(module))
+    # One count of all checks to run, although each module's checks run by themselves.
+    shown = iter(progress([each for inside in by_module.values() for each in inside if each not in found]))
+
+    def counted(some: Sequence[Statement]) -> Iterable[Statement]:
+        for each in some:
+            next(shown, None)
+            yield each
+
     for module, inside in by_module.items():
         missing = [each for each in inside if each not in found]
         if module is None:
-            found |= {row.statement: row for row in examine(missing, topics, progress)}
+            found |= {row.statement: row for row in examine(missing, topics, counted)}
         elif missing:
             with cache.shared(module) as findings:
                 found |= _known(missing, findings)  # another process may have run some checks in the meantime
-                for row in examine([each for each in missing if each not in found], topics, progress):
+                for row in examine([each for each in missing if each not in found], topics, counted):
                     found[row.statement] = row
                     if row.finding is not None:
                         findings.put(row.statement, row.finding)
+    next(shown, None)  # so that it ends
     return tuple(found[statement] for statement in chosen)
 
 

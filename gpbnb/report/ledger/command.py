@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
+import time
 import traceback
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from gpbnb.caching import replace_file
 from gpbnb.report.ledger.checking import FAILED, MISSING, Row, counts, examine, examine_once, owners
 from gpbnb.report.ledger.checks import TOPICS
 from gpbnb.report.ledger.render import FORMATS, describe
 from gpbnb.report.ledger.statements import Statement, load_statements, select
+from gpbnb.report.ledger_options import ledger_parser
 
 COMPLETE, INCOMPLETE, BROKEN = 0, 1, 3  # argparse uses 2 for wrong arguments
-_EPILOG = (
-    "exit status: 0, every selected entry has a finding; 1, some entries have no check; 2, the "
-    "arguments are invalid, or the ledger or the output file cannot be used; 3, a check raised an "
-    "exception (the other rows are still written)"
-)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -29,21 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     ------
     SystemExit : with status 2 for bad arguments, 0 after ``--help``.
     """
-    parser = argparse.ArgumentParser(
-        prog="python -m gpbnb.ledger",
-        description="Check every statement of the three documents and write the findings.",
-        epilog=_EPILOG,
-    )
-    parser.add_argument("--format", choices=FORMATS, default="csv", help="default: csv")
-    parser.add_argument("--document", help="hung1984, hung1982 or savage2016; default: all")
-    parser.add_argument("--chapter", help="chapter number as in the document, such as II; default: all")
-    parser.add_argument(
-        "--section", nargs="+", metavar="S", help="one or more section numbers; 9 includes 9.1 and 9.2; default: all"
-    )
-    parser.add_argument(
-        "--output", type=Path, metavar="FILE", help="file to write, replacing any existing file; default: stdout"
-    )
-    parser.add_argument("--fresh", action="store_true", help="run every check again instead of using stored findings")
+    parser = ledger_parser()
     arguments = parser.parse_args(argv)
     try:
         inventory = load_statements()
@@ -57,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     content = FORMATS[arguments.format](rows).encode()
     try:
         if arguments.output is not None:
-            _replace(arguments.output, content)
+            replace_file(arguments.output, content)
         else:
             sys.stdout.buffer.write(content)
             sys.stdout.buffer.flush()
@@ -72,13 +55,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     return BROKEN if FAILED in outcomes else INCOMPLETE if MISSING in outcomes else COMPLETE
 
 
-def _progress(entries: Sequence[Statement]) -> Iterable[Statement]:
-    if not sys.stderr.isatty():
-        return entries
-    from tqdm import tqdm  # type: ignore[import-untyped]
+_PAUSE = 5.0  # seconds between two lines about progress
 
-    bar: Iterable[Statement] = tqdm(entries, desc="checks", unit="entry", leave=False, file=sys.stderr)
-    return bar
+
+def _progress(entries: Sequence[Statement]) -> Iterable[Statement]:
+    """Show how many checks have run: as a bar on a terminal, elsewhere as a line every few seconds."""
+    if sys.stderr.isatty():
+        from tqdm import tqdm  # type: ignore[import-untyped]
+
+        yield from tqdm(entries, desc="checks", unit="entry", leave=False, file=sys.stderr)
+        return
+    began = last = time.monotonic()
+    for done, entry in enumerate(entries):
+        if (now := time.monotonic()) - last >= _PAUSE:
+            last = now
+            line = f"checks: {done} of {len(entries)} after {now - began:.0f} s; now {entry.id}"
+            print(line, file=sys.stderr, flush=True)
+        yield entry
 
 
 def _report(rows: Sequence[Row]) -> None:
@@ -99,13 +92,3 @@ def _check_output(path: Path | None) -> None:
         raise ValueError(f"got --output {path}; needed a regular file; name one, or omit --output for stdout")
     if not path.parent.is_dir():
         raise ValueError(f"got --output {path}; needed an existing directory {path.parent}; create it first")
-
-
-def _replace(path: Path, content: bytes) -> None:
-    path = path.resolve()
-    draft = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        draft.write_bytes(content)
-        draft.replace(path)
-    finally:
-        draft.unlink(missing_ok=True)

@@ -9,7 +9,7 @@ from functools import cache
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
-from gpbnb.report.ledger.statements import Statement, check_text, load_statements
+from gpbnb.report.ledger.statements import Statement, check_text, load_statements, statement
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,17 @@ class Correction:
 def load_corrections() -> dict[str, Correction]:
     """Read the corrections of the package: statement id → correction."""
     return read_corrections(files(__package__) / "corrections.csv", {each.id: each for each in load_statements()})
+
+
+def intended(key: str) -> Statement:
+    """Return a statement as it should read: corrected, where text can correct it.
+
+    Raises
+    ------
+    KeyError : there is no statement with this id.
+    """
+    printed = statement(key)
+    return (load_corrections()[key].applied(printed) or printed) if key in load_corrections() else printed
 
 
 def read_corrections(source: Traversable, statements: Mapping[str, Statement]) -> dict[str, Correction]:

@@ -17,7 +17,7 @@ class Verdict(Enum):
     MISPRINT : a slip on which nothing later depends.
     WRONG : an error on which a later result or a conclusion depends.
     INCONSISTENT : contradicts another place in the documents.
-    NOT_REPRODUCED : a number that none of the readings that we tried reproduces, and no derivation shows to be wrong.
+    NOT_REPRODUCED : a number that no interpretation we tried yields, although no derivation proves it wrong.
     OCR : the scan is wrong, not the author.
     UNVERIFIABLE : the underlying data or picture is not in the documents; the note names what is missing.
     GIVEN : a definition, given data or a heading, which cannot be checked.

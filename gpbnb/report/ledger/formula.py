@@ -11,8 +11,9 @@ In a relation a name is a symbol; ``x_hat_k`` is typeset as :math:`\hat x_k`; ``
 ``A.inv`` are a transpose and an inverse; ``Sum(term, (j, 2, n))``, ``Prod``, ``Int``, ``norm``, ``abs``, ``sqrt``,
 ``diff`` are typeset as mathematics; any other call is a function. ``...`` stands for the dots of a
 printed sequence or sum: for the members between its neighbours, in which each number that differs changes by one from
-member to member. Dots in a matrix or in a product can be typeset but not evaluated. The name ``dots`` stands for the
-terms that a printed series omits; a check gives it a value, such as ``sp.O(mu**4)``.
+member to member. A matrix with dots is a :class:`~gpbnb.report.ledger.dotted.DottedMatrix`, which equals every matrix
+that has the printed cells in their places. Dots in a product can be typeset but not evaluated. The name ``dots`` stands
+for the terms that a printed series omits; a check gives it a value, such as ``sp.O(mu**4)``.
 
 ``a ≈ b`` is a comparison like ``==``; the check decides how close is close enough.
 ``cases((a, v < 0), (b, v >= 0))`` is a value by cases. ``Max(term, (j, 1, n))`` prints the maximum over j, and
@@ -35,6 +36,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from gpbnb.report.ledger.dotted import DottedMatrix
 from gpbnb.report.ledger.typesetting import number_latex, typeset
 
 OPERATORS: dict[type[ast.cmpop], tuple[str, Callable[[Any, Any], Any]]] = {
@@ -326,12 +328,18 @@ class _Evaluation:
             case ast.List(elts=rows) | ast.Tuple(elts=rows):
                 if any(isinstance(row, ast.List) for row in rows):
                     found = [
-                        [self(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row) for row in rows
+                        [self._cell(cell) for cell in row.elts] if isinstance(row, ast.List) else self(row)
+                        for row in rows
                     ]
+                    if any(cell is ... for row in found if isinstance(row, list) for cell in row):
+                        return _apply(node, DottedMatrix, found)
                 else:
                     found = self._sequence(rows)
                 return self.names["matrix"](found) if "matrix" in self.names and isinstance(node, ast.List) else found
         raise ValueError(f"got {ast.unparse(node)}; needed an expression that can be evaluated")
+
+    def _cell(self, node: ast.expr) -> Any:
+        return ... if _is_dots(node) else self(node)
 
     def _sequence(self, nodes: list[ast.expr]) -> list[Any]:
         """Evaluate the members of a sequence; dots stand for the members between their neighbours."""
@@ -421,14 +429,6 @@ class _Evaluation:
         if len(values) != 1:
             raise Undefined(f"got {len(values)} cases that hold; needed exactly one")
         return values[0]
-
-
-def has_dotted_matrix(part: Part) -> bool:
-    """Whether a relation displays a matrix with dots between rows or columns, or a product with dots."""
-    if not isinstance(part, Relation) or "..." not in part.text:
-        return False
-    rows = (row for node in ast.walk(part.tree) if isinstance(node, ast.List) for row in node.elts)
-    return "*...*" in part.text or any(isinstance(row, ast.List) for row in rows)
 
 
 def _is_dots(node: ast.expr) -> bool:

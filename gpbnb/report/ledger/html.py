@@ -6,12 +6,14 @@ import re
 from dataclasses import dataclass
 from html import escape
 
-from gpbnb.report.display.tables import POWER, one_line
+from gpbnb.report.display.tables import POWER, minus_signs, one_line
 
 CHAPTERS = {
     "rounding": "Rounding bounds",
     "inversion": "Matrix inversion",
-    "kalman": "Kalman bound",
+    "kalman": "Why (125) fails",
+    "contraction": "A bound that holds",
+    "year": "One year of Gravity Probe B",
     "rolling": "Roll and deroll",
     "integration": "Digital integration error",
     "budget": "Error budget",
@@ -63,7 +65,7 @@ def badge(outcome: str) -> str:
 
 def typeset(text: str) -> str:
     r"""Turn prose with math between dollar signs into HTML; a chapter's title between stars becomes a link."""
-    parts = one_line(text).split("$")
+    parts = minus_signs(one_line(text)).split("$")
     prose = [POWER.sub(_power, escape(part, quote=False)) for part in parts[::2]]
     parts[::2] = [EMPHASIS.sub(_emphasis, part) for part in prose]
     parts[1::2] = [

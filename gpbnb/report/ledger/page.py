@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import NamedTuple
 
 from gpbnb.report.display.tables import Table
 from gpbnb.report.ledger.checking import Row, counts, in_reading_order
@@ -57,31 +58,84 @@ PAGES = (
         "ledger-1982-2",
         "Ledger: report of 1982, rounding and inversion in general",
         "hung1982",
-        r"III\.([1-9]|9\..*|10)",
+        r"III\.([1-9]|9\..*|10|11)",
     ),
-    LedgerPage("ledger-1982-3", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11.*"),
+    LedgerPage("ledger-1982-3", "Ledger: report of 1982, inversion by elimination", "hung1982", r"III\.11\..*"),
     LedgerPage("ledger-1982-4", "Ledger: report of 1982, Kalman filter", "hung1982", r"III\.1[23]"),
     LedgerPage("ledger-1982-5", "Ledger: report of 1982, measurement geometry", "hung1982", r"IV"),
     LedgerPage("ledger-2016", "Ledger: note of 2016, digital integration", "savage2016", r".*"),
 )
 """The pages of the complete ledger; each statement is on exactly one of them."""
 
+
+class Claim(NamedTuple):
+    """A principal claim in words, and what follows from its verdict for someone who relies on it."""
+
+    text: str
+    consequence: str
+
+
 CLAIMS = {
-    "hung1984.II.eq8": "Unit roundoff of rounding",
-    "hung1984.II.eq18": "Rounding error of a sum",
-    "hung1984.II.eq26": "Rounding error of an inner product",
-    "hung1984.II.eq31": "Rounding error of a product of matrices",
-    "hung1984.II.s10.practicality-of-44": "The residual bound of an inverse is impractical",
-    "hung1984.II.eq91": "Errors of elimination and back substitution add up",
-    "hung1984.II.s11-4.table-1-proposed-3-places": "Table 1: bounds of an inverse",
-    "hung1984.II.eq105": "Rounding error of one covariance update",
-    "hung1984.II.eq125": "Rounding error of the Kalman filter after k steps",
-    "hung1984.II.s12.example-9-digits": "Digits needed for a year of Gravity Probe B: 9",
-    "hung1984.II.s12.example-17-digits": "Digits needed for a year of Gravity Probe B: 17",
-    "hung1982.IV.eq8": "Deroll of the first drift",
-    "hung1982.IV.eq9": "Deroll of the second drift",
-    "savage2016.main.eq35": "Random walk of a trapezoidal integrator",
-    "savage2016.main.eq39": "Random walk for fast sampling",
+    "hung1984.II.eq8": Claim(
+        "Rounding changes a number by at most half a unit of its last digit",
+        "You can rely on this unit roundoff for every rounded operation.",
+    ),
+    "hung1984.II.eq18": Claim(
+        "The rounding error of a sum is bounded by its terms, each times the number of additions it passes through",
+        "You can rely on it to first order. With few digits and many terms, use a strict bound.",
+    ),
+    "hung1984.II.eq26": Claim(
+        "The rounding error of an inner product is bounded by its products, counted in the same way",
+        "You can rely on it to first order. With few digits, use a strict bound.",
+    ),
+    "hung1984.II.eq31": Claim(
+        "The rounding error of a product of matrices is a few unit roundoffs of the product",
+        "Where the terms of an entry cancel, all its digits may be wrong although the formula promises most of them.",
+    ),
+    "hung1984.II.s10.practicality-of-44": Claim(
+        "The bound on an inverse by its residual is impractical",
+        "The report abandons the sharpest of the bounds that we tried. It costs one product with twice the digits.",
+    ),
+    "hung1984.II.eq91": Claim(
+        "The errors of elimination and back substitution may be added",
+        "The bound that follows can be exceeded, so a matrix that passes may have a worse inverse than allowed.",
+    ),
+    "hung1984.II.s11-4.table-1-proposed-3-places": Claim(
+        "Table 1 bounds the inverses of some matrices",
+        "You cannot test your own program with this table.",
+    ),
+    "hung1984.II.eq105": Claim(
+        "One update changes the covariance by a relative rounding error of at most a few unit roundoffs",
+        "A covariance may have lost every digit while the bound promises nearly all of them.",
+    ),
+    "hung1984.II.eq125": Claim(
+        "After k steps, the estimate of a Kalman filter is off by at most the bound (125)",
+        "You cannot choose a wordlength with it: one step may violate it, and after a year it is far too large.",
+    ),
+    "hung1984.II.s12.example-9-digits": Claim(
+        "A year of Gravity Probe B needs 9 digits, by the first term of (125)",
+        "With nine digits the filter misses the report's own criterion, which allows an error as large as the drift.",
+    ),
+    "hung1984.II.s12.example-17-digits": Claim(
+        "A year of Gravity Probe B needs 17 digits, by the second term of (125)",
+        "The number rules out IEEE double precision, which is ample.",
+    ),
+    "hung1982.IV.eq8": Claim(
+        "This equation derolls the first drift",
+        "Programmed as printed, it measures a drift of zero. Changing two signs corrects it.",
+    ),
+    "hung1982.IV.eq9": Claim(
+        "This equation derolls the second drift",
+        "Programmed as printed, it measures a drift of zero. Changing two signs corrects it.",
+    ),
+    "savage2016.main.eq35": Claim(
+        "A trapezoidal integrator of a noisy signal has this random walk",
+        "You can choose a sampling rate with it.",
+    ),
+    "savage2016.main.eq39": Claim(
+        "For fast sampling, the random walk has this simpler form",
+        "You can rely on it if the sampling rate is far above the bandwidth. The abstract omits this condition.",
+    ),
 }
 """The principal claims of the documents, by statement id."""
 
@@ -236,23 +290,26 @@ def root_table(rows: Iterable[Row]) -> Html:
     )
 
 
+def claim_outcomes(rows: Iterable[Row]) -> dict[str, str]:
+    """Return the outcome of each principal claim, such as "refuted", by statement id."""
+    by_id = {row.statement.id: row for row in rows}
+    found = {key: by_id[key] for key in CLAIMS}
+    return {key: _REPLICATION[row.finding.verdict] if row.finding else row.outcome for key, row in found.items()}
+
+
 def claim_table(rows: Iterable[Row]) -> Html:
-    """Tabulate the principal claims of the documents: replicated, corrected, refuted or not reproducible."""
+    """Tabulate the principal claims of the documents in words, their outcomes, and what follows from these."""
     by_id = {row.statement.id: row for row in rows}
     owner = topics()
     lines = []
-    for key, claim in CLAIMS.items():
-        row = by_id[key]
-        outcome = _REPLICATION[row.finding.verdict] if row.finding else row.outcome
-        text = typeset(row.statement.printed)
+    for key, outcome in claim_outcomes(by_id.values()).items():
+        row, claim = by_id[key], CLAIMS[key]
+        printed = f"<details><summary>As printed</summary><p>{typeset(row.statement.printed)}</p></details>"
         lines.append(
-            f'<tr><th scope="row">{escape(claim)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
-            f"<td><p>{text}</p><p>{chapter_link(owner[key])}</p></td></tr>"
+            f'<tr><th scope="row">{escape(claim.text)}<br>{_link(row)}</th><td>{badge(outcome)}</td>'
+            f"<td><p>{escape(claim.consequence)} {chapter_link(owner[key])}</p>{printed}</td></tr>"
         )
-    return Html(
-        f"{len(lines)} claims",
-        _wrapped(("Claim", "Outcome", "Printed statement, and the chapter that examines it"), lines),
-    )
+    return Html(f"{len(lines)} claims", _wrapped(("Claim", "Outcome", "What follows"), lines, "ledger-claims"))
 
 
 def _link(row: Row) -> str:

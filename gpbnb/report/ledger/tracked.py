@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -62,11 +61,3 @@ def tracked(x: Any, sizes: Any = None) -> Matrix:
 def largest(x: Matrix) -> Matrix:
     """Return the largest error of each entry over β."""
     return np.vectorize(lambda each: sum(map(abs, each.slopes.values()), Fraction(0)), otypes=[object])(x)
-
-
-def product(fl: Callable[[Any], Any], A: Matrix, B: Matrix) -> Matrix:
-    """Multiply two matrices with each operation rounded, and add from left to right."""
-    total = fl(np.multiply.outer(A[:, 0], B[0]))
-    for k in range(1, len(B)):
-        total = fl(total + fl(np.multiply.outer(A[:, k], B[k])))
-    return np.asarray(total)

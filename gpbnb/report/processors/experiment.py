@@ -18,7 +18,7 @@ from gpbnb.arithmetic.rounding import Order, Rounding
 from gpbnb.filters.forms import Form
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.named import checked_name
-from gpbnb.filters.run import Run, reference_states
+from gpbnb.filters.run import Run, Sums, reference_states
 
 Format = FloatFormat | FixedFormat
 
@@ -84,7 +84,7 @@ def variants(precision: int) -> tuple[Processor, ...]:
     )
 
 
-class Outcome(NamedTuple):
+class ProcessorResult(NamedTuple):
     """Result of a filter on a processor: the largest error of each state, or why the filter fails."""
 
     processor: Processor
@@ -98,7 +98,7 @@ def outcome(
     processor: Processor,
     form: Form | str = Form.INNOVATION,
     true: NDArray[np.float64] | None = None,
-) -> Outcome:
+) -> ProcessorResult:
     """Run a filter on a processor and compare it with the given filter in double-double.
 
     Errors of storing the model and the measurements are included.
@@ -109,20 +109,20 @@ def outcome(
     true : the result of :func:`~gpbnb.filters.run.reference_states`, if known.
     """
     nothing = np.full(model.n, math.inf)
-    fused, sums, compensated, order = processor.fused, processor.sums, processor.compensated, processor.order
+    sums = Sums(processor.fused, processor.sums, processor.order)
     try:
-        run = Run(model, processor.fmt, form, (), fused, sums, compensated, order)  # type: ignore[arg-type]
+        run = Run(model, processor.fmt, form, (), sums, processor.compensated)  # type: ignore[arg-type]
         states = run.states(processor.fmt.array(z))
     except OverflowError as error:
-        return Outcome(processor, nothing, f"overflow in the model or the measurements: {error}")
+        return ProcessorResult(processor, nothing, f"overflow in the model or the measurements: {error}")
     except ValueError as error:
-        return Outcome(processor, nothing, str(error))
+        return ProcessorResult(processor, nothing, str(error))
     if run.stopped is not None:
-        return Outcome(processor, nothing, run.reason)
+        return ProcessorResult(processor, nothing, run.reason)
     if run.indefinite is not None:
-        return Outcome(processor, nothing, f"a computed variance was not positive at step {run.indefinite}")
+        return ProcessorResult(processor, nothing, f"a computed variance was not positive at step {run.indefinite}")
     errors = (states - (reference_states(model, z) if true is None else true)).sum(axis=2)
-    return Outcome(processor, np.abs(errors).max(axis=0), "")
+    return ProcessorResult(processor, np.abs(errors).max(axis=0), "")
 
 
 def typical_errors(

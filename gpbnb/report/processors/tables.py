@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from gpbnb.arithmetic.fixed import FixedFormat
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import rounding_text
+from gpbnb.bounds.words import largest_rounding
 from gpbnb.report.display.tables import Table, short
-from gpbnb.report.processors.experiment import Outcome, Processor, Sum
-from gpbnb.wordlength.fixed_point import ScaledFilter, bound_per_unit, emulated, integer_bits, largest_rounding
+from gpbnb.report.processors.experiment import Processor, ProcessorResult, Sum
+from gpbnb.wordlength.fixed_point import ScaledFilter, bound_per_unit, emulated, integer_bits
 
 
-def outcomes(found: Mapping[str, Sequence[Outcome]], state: int = 0) -> Table:
+def outcomes(found: Mapping[str, Sequence[ProcessorResult]], state: int = 0) -> Table:
     """Tabulate the largest error of one state on each processor, or why the filter fails there.
 
     Parameters
@@ -30,7 +32,7 @@ def outcomes(found: Mapping[str, Sequence[Outcome]], state: int = 0) -> Table:
     return Table(f"{len(body)} processors", ("processor", *found), body)
 
 
-def _error(found: Outcome, state: int) -> str:
+def _error(found: ProcessorResult, state: int) -> str:
     return f"refused: {found.refused}" if found.refused else short(float(found.error[state]))
 
 
@@ -91,10 +93,10 @@ def formats(found: Mapping[str, FloatFormat]) -> Table:
         largest = _power(Decimal(high.numerator) / Decimal(high.denominator)) if high else "any"
         least = _power(Decimal(fmt.base) ** low) if high else "any"
         body.append(
-            (name.replace("_", " "), str(fmt.base), str(fmt.precision), str(fmt.rounding.value), least, largest)
+            (name.replace("_", " "), str(fmt.base), str(fmt.precision), rounding_text(fmt.rounding), least, largest)
         )
     header = ("format", "base", "digits", "rounding", "least normal", "largest")
-    return Table(f"{len(body)} formats", header, tuple(body))
+    return Table("number formats of processors", header, tuple(body))
 
 
 def _power(x: Decimal) -> str:

@@ -133,11 +133,15 @@ def varying_phase() -> Derivation:
     return Derivation(
         (
             Step("a constant error of 1", sp.Integral(w, (TIME, 0, 1)), sp.S.One),
-            Step("a ramp from -1 to 1, whose mean is zero", sp.Integral(w * (2 * TIME - 1), (TIME, 0, 1)), sp.S.One),
+            Step("a ramp from −1 to 1, whose mean is zero", sp.Integral(w * (2 * TIME - 1), (TIME, 0, 1)), sp.S.One),
             Step("an error of 1 in the first half alone", first, -sp.Rational(1, 4)),
             Step("in the second half alone", second, sp.Rational(5, 4)),
-            Step("-1, then 1: the signs of the weight, so the most", together(second, -first), sp.Rational(3, 2)),
-            Step("independent errors count with the square", sp.Integral(w**2, (TIME, 0, 1)), sp.Rational(24, 5)),
+            Step(
+                "−1, then 1: these are the signs of the weight, so no error costs more",
+                together(second, -first),
+                sp.Rational(3, 2),
+            ),
+            Step("independent errors: the square of the weight", sp.Integral(w**2, (TIME, 0, 1)), sp.Rational(24, 5)),
             Step("$n$ cycles of a cosine", sp.Integral(w * sp.cos(turn), (TIME, 0, 1)), 6 / (sp.pi * n) ** 2),
             Step("$n$ cycles of a sine", sp.Integral(w * sp.sin(turn), (TIME, 0, 1)), -3 / (sp.pi * n)),
         )
@@ -230,7 +234,7 @@ def roll_rate() -> Derivation:
                 k**2 * q * sp.Integral(sp.expand(free.doit() ** 2), (u, 0, 1)),
                 sp.Rational(383, 1260) * k**2 * q,
             ),
-            Step("the same with resets, but for $P/2$", after_reset, 1 + 3 * u**2 - 4 * u**3),
+            Step("the same with resets, apart from a factor $P/2$", after_reset, 1 + 3 * u**2 - 4 * u**3),
             Step(
                 "with resets",
                 k**2 * q * p**2 / 4 * sp.Integral(sp.expand(after_reset.doit() ** 2), (u, 0, 1)),

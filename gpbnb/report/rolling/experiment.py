@@ -14,6 +14,7 @@ import scipy
 from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
+from gpbnb.arithmetic.conversion import MaybeNone
 from gpbnb.arithmetic.kernels.compiling import compiled
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
@@ -35,7 +36,7 @@ from gpbnb.report.rolling.spectra import (
     welch,
 )
 from gpbnb.report.rolling.theory import INTERVAL, LEVEL, PERIOD, PERIOD_FLOWN
-from gpbnb.sweeps import Column, read
+from gpbnb.sweeps import Column, Sweep, as_computed
 
 __all__ = [
     "HANN",
@@ -103,7 +104,7 @@ def clean_drift_error(
 class DriftStudy:
     """Errors of fitted drift rates of x and y in mas a year, (periods, gyros, 2); a period of None means no roll."""
 
-    periods: tuple[float | None, ...]
+    periods: tuple[float | MaybeNone, ...]
     level: float
     samples: int
     interval: float
@@ -182,7 +183,7 @@ def drift_rates(
 
 
 SURVEY = Path(__file__).with_name("drift_rates.csv")
-"""Errors of the drift rates of `SURVEY_GYROS` gyros, a year each; ``python -m gpbnb.report.rolling`` recomputes it."""
+"""Errors of the drift rates of `SURVEY_GYROS` gyros, a year each."""
 
 SURVEY_PERIODS = (None, 6000.0, 600.0, 200.0, 77.5)
 SURVEY_GYROS = 128
@@ -206,8 +207,7 @@ SURVEY_COLUMNS = (
 
 def survey() -> DriftStudy:
     """Read the stored survey."""
-    rows = read(SURVEY, SURVEY_COLUMNS, "python -m gpbnb.report.rolling").rows
-    table = np.array([row[1:] for row in rows], dtype=np.float64)
+    table = np.array([row[1:] for row in SWEEP.load().rows], dtype=np.float64)
     errors = table.reshape(len(table), len(SURVEY_PERIODS), 2).transpose(1, 0, 2)
     return DriftStudy(SURVEY_PERIODS, LEVEL, YEAR_SAMPLES, INTERVAL, errors)
 
@@ -216,6 +216,30 @@ def survey_rows(study: DriftStudy) -> list[tuple[str, ...]]:
     """Return a study as rows of the stored file, one for each gyro, with six digits."""
     table = study.errors.transpose(1, 0, 2).reshape(study.errors.shape[1], -1)
     return [(str(gyro), *(f"{value:.5e}" for value in row)) for gyro, row in enumerate(table)]
+
+
+def survey_of(gyros: int, directory: Path | None = None) -> list[tuple[str, ...]]:
+    """Simulate a year for each of several gyros; the noise of each does not depend on their number."""
+    return survey_rows(drift_rates(SURVEY_PERIODS, gyros, survey_rng(), progress=directory is not None))
+
+
+def first_gyros(gyros: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
+    """Return the rows of the first one to three gyros."""
+    return survey_of(int(rng.integers(1, 4)))
+
+
+SWEEP: Sweep[int] = Sweep(
+    name="rolling/drift_rates",
+    file=SURVEY,
+    columns=SURVEY_COLUMNS,
+    key=1,
+    cells=lambda: (SURVEY_GYROS,),
+    compute=survey_of,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute rolling/drift_rates",
+    seed=1984,
+    sample=first_gyros,
+)
 
 
 # -- filters -------------------------------------------------------------------------------------

@@ -13,19 +13,20 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.container import ErrorbarContainer
 
+from gpbnb.arithmetic.named import digits
 from gpbnb.report.display.style import (
     OBSERVED,
     OBSERVED_OTHERS,
     REFERENCE,
     REFUTED,
     VALID,
-    colours,
+    bits_colour,
     label,
+    legend,
     loglog,
     name,
     name_ends,
 )
-from gpbnb.report.display.tables import digits
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import theory
 from gpbnb.report.rolling.experiment import DriftStudy, FilterStudy, LowPass, Rotation, Slope, Spectra, Spectrum
@@ -44,7 +45,7 @@ def density(spectrum: Spectrum, level: float, slope: Slope, ax: Axes) -> list[Dr
             2 * spectrum.error * spectrum.density,
             fmt="o",
             color=OBSERVED,
-            label=f"measured, slope {slope.value:.3f} ± {slope.error:.3f}",
+            label="measured",
         )
     ]
     artists += ax.plot(
@@ -54,7 +55,7 @@ def density(spectrum: Spectrum, level: float, slope: Slope, ax: Axes) -> list[Dr
     label(ax, "frequency (Hz)", DENSITY)
     f = spectrum.frequency
     middle = len(f) // 2
-    theoretical = f"$A/f$; measured slope {slope.value:.3f} ± {slope.error:.3f}"
+    theoretical = f"$A/f$; measured slope {slope.value:.3f} ± {slope.error:.3f}".replace("-", "−")
     name(ax, theoretical, (float(f[middle]), level / float(f[middle])), VALID, (-40, 24), ha="left")
     return artists
 
@@ -67,7 +68,7 @@ def residual(spectrum: Spectrum, level: float, interval: float, ax: Axes) -> lis
     ]
     artists.append(ax.axhline(1, color=VALID, label="expected for the samples"))
     ax.set_xscale("log")
-    label(ax, "frequency (Hz)", "measured / expected\n(no unit)")
+    label(ax, "frequency (Hz)", "measured / expected")
     return artists
 
 
@@ -83,7 +84,6 @@ def before_rolling(result: Spectra, ax: Axes) -> list[Drawn]:
     printed = theory.printed_ramp_density(result.drift, f[low])
     artists += ax.plot(f[low], printed, color=REFUTED, ls="--", label="drift as printed")
     loglog(ax)
-    ax.set_ylim(float(ramp[-1]) / 3, None)
     label(ax, "frequency (Hz)", DENSITY, "(a) without rolling")
     at = len(f) // 2
     noise = theory.flicker_density(result.level, f, result.interval)
@@ -104,7 +104,6 @@ def after_rolling(result: Spectra, ax: Axes) -> list[Drawn]:
     for side in (-1, 1):
         line = theory.ramp_density(result.drift, result.duration, distance) / 4
         artists += ax.plot(1 / result.period + side * distance, line, color=VALID)
-    ax.set_ylim(*_range(result))
     loglog(ax)
     label(ax, "frequency (Hz)", DENSITY, "(b) rolled")
     at = len(wide) // 3
@@ -148,7 +147,7 @@ def at_base(result: Spectra, ax: Axes) -> list[Drawn]:
     ax.set_yscale("log")
     label(ax, "$f$ (cycles a year)", DENSITY, "(b) derolled")
     name(ax, "drift, derolled", (float(x[0]), float(result.base_signal[0])), SIGNAL, (12, 2))
-    name(ax, "noise, derolled", (float(x[-1]), float(np.mean(result.base_noise))), OBSERVED, (-2, 12))
+    name(ax, "noise, derolled", (float(x[-1]), float(np.min(result.base_noise))), OBSERVED, (-2, -6))
     return artists
 
 
@@ -180,15 +179,15 @@ def drift_errors(study: DriftStudy, ax: Axes) -> list[Drawn]:
             artists.append(ax.axhline(found[i], color=OBSERVED, ls=":", label="simulated, not rolled"))
             level = theory.drift_error_unrolled(study.level, duration, at_rest=True)
             artists.append(ax.axhline(level, color=VALID, label=r"$\sqrt{8A}/T$"))
-    artists.append(ax.axhline(theory.DRIFTS[1], color=REFERENCE, lw=0.8, label="frame dragging"))
+    artists.append(ax.axhline(theory.DRIFTS[1], color=REFERENCE, lw=1.2, ls=":", label="frame dragging"))
     loglog(ax)
     label(ax, "roll period (s)", "standard error of drift (mas a year)")
     name(ax, r"theory, $\sqrt{6S(f_r)/T^3}$", (float(x[60]), float(line[60])), VALID, (6, -4))
     first = float(periods.min())
-    name(ax, "simulated", (first, float(found[rolled][0])), OBSERVED, (0, 10), ha="left")
+    name(ax, "simulated", (first, float(found[rolled][periods.argmin()])), OBSERVED, (0, 22), ha="left")
     name(ax, "frame dragging itself, 40 mas a year", (first, theory.DRIFTS[1]), REFERENCE, (0, -3), ha="left")
     if None in study.periods:
-        name(ax, r"not rolled: simulated, and $\sqrt{8A}/T$", (first, level), VALID, (0, 3), ha="left")
+        name(ax, r"not rolled: simulated (dotted), and $\sqrt{8A}/T$", (first, level), VALID, (0, 3), ha="left")
     return artists
 
 
@@ -215,19 +214,18 @@ def bandwidths(study: FilterStudy, density: float, ax: Axes) -> list[Drawn]:
     artists += ax.plot(b, slope / (4 * b), color=REFERENCE, lw=0.8, label="lag")
     artists += ax.plot(b, np.sqrt(density * b), color=REFERENCE, lw=0.8, label="noise in band")
     best = theory.best_bandwidth(study.drift, density)
-    artists.append(ax.axvline(best, color=REFERENCE, lw=0.8, ls=":", label="optimum"))
+    artists.append(ax.axvline(best, color=REFERENCE, ls=":", label="optimum"))
     loglog(ax)
     ax.set_ylim(bottom=0.3 * float(np.sqrt(study.error.min())))
     label(ax, "noise bandwidth $B$ (Hz)", "rms error (mas)")
-    low, high = ax.get_ylim()
+    high = ax.get_ylim()[1]
     name(ax, "best $B$", (best, high), REFERENCE, (5, -2))
-    name(ax, "lag", (float(b[125]), slope / (4 * float(b[125]))), REFERENCE, (5, 2))
-    name(ax, "noise in band", (float(b[70]), float(np.sqrt(density * b[70]))), REFERENCE, (-5, 2))
+    name(ax, "lag", (best, slope / (4 * best)), REFERENCE, (-7, -3))
+    name(ax, "noise in band", (best, float(np.sqrt(density * best))), REFERENCE, (10, -12))
     name(
         ax, "theory", (float(b[30]), float(np.sqrt(theory.filtered_error(study.drift, density, b[30])))), VALID, (8, 0)
     )
-    name(ax, "● single pole", (float(b[0]), low), OBSERVED, (2, 26), ha="left")
-    name(ax, "□ moving average", (float(b[0]), low), SIGNAL, (2, 8), ha="left")
+    legend(ax, handles=artists[:2], loc="upper right")
     return artists
 
 
@@ -257,7 +255,8 @@ def rotations(results: Sequence[Rotation], drift: float, ax: Axes, title: str = 
     """Draw the error of a derolled drift over the year in mas: points for each format, the bound as a line."""
     artists: list[Drawn] = []
     ends = {}
-    for colour, result in zip(colours(len(results)), results, strict=True):
+    for result in results:
+        colour = bits_colour(result.fmt)
         t = result.step * result.interval
         scale = drift * t / YEAR
         shown = result.size > 0
@@ -267,7 +266,7 @@ def rotations(results: Sequence[Rotation], drift: float, ax: Axes, title: str = 
         within = result.bound < 2
         artists += ax.plot(t[within] / 86400, (scale * result.bound)[within], color=VALID, lw=0.9)
         ends[digits(result.fmt)] = float((scale * result.size)[shown][-1]), colour
-    artists.append(ax.axhline(1, color=REFERENCE, lw=0.8, ls=":"))
+    artists.append(ax.axhline(1, color=REFERENCE, ls=":"))
     loglog(ax)
     label(ax, "time (days)", "error (mas)", title)
     name_ends(ax, {**ends, "1 mas": (1.0, REFERENCE)})
@@ -284,7 +283,7 @@ def phase_costs(angle: np.ndarray, found: np.ndarray, drift: tuple[float, float]
         artists += ax.plot(np.degrees(angle), np.abs(found[:, i]), "o", color=colour, label=text)
         artists += ax.plot(np.degrees(line), np.abs(cost[:, i]), color=VALID, label="theory" if i else None)
         ends[text] = float(abs(cost[-1, i])), colour
-    artists.append(ax.axhline(1, color=REFERENCE, lw=0.8, ls=":", label="1 mas a year"))
+    artists.append(ax.axhline(1, color=REFERENCE, ls=":", label="1 mas a year"))
     loglog(ax)
     label(ax, "phase error (degrees)", "error of drift (mas a year)")
     name_ends(ax, {**ends, "1 mas a year": (1.0, REFERENCE)})
@@ -294,8 +293,3 @@ def phase_costs(angle: np.ndarray, found: np.ndarray, drift: tuple[float, float]
 def _points(spectrum: Spectrum, text: str, colour: str, ax: Axes) -> list[Drawn]:
     marker = "s" if colour == SIGNAL else "o"
     return list(ax.plot(spectrum.frequency, spectrum.density, marker, ms=3.5, color=colour, label=text))
-
-
-def _range(result: Spectra) -> tuple[float, float]:
-    low = float(theory.flicker_density(result.level, 0.5 / result.interval)) / 10
-    return low, 30 * float(theory.flicker_density(result.level, 1 / result.duration))

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from gpbnb.arithmetic.formats import FloatFormat
-from gpbnb.report.display.tables import Table, arithmetic
+from gpbnb.arithmetic.named import arithmetic
+from gpbnb.report.display.tables import Table, with_uncertainty
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import experiment, phase, theory
 
@@ -34,7 +35,9 @@ def registers(period: float, formats: Sequence[FloatFormat]) -> Table:
 def _cells(error: float) -> tuple[str, ...]:
     across = theory.off_tuned_drift(theory.DRIFTS[0], error)
     size = f"{across:,.0f}" if across >= 100 else f"{across:.3g}"
-    return f"{error:.3e}", f"{error * YEAR:.3e}", f"{theory.off_tuned_loss(error):.3e}", size
+    # Beyond a quarter turn nothing is left: what is measured has the opposite sign.
+    lost = "all" if error * YEAR >= math.pi / 2 else f"{theory.off_tuned_loss(error):.3e}"
+    return f"{error:.3e}", f"{error * YEAR:.3e}", lost, size
 
 
 def _small(value: float) -> str:
@@ -85,7 +88,7 @@ def drift_errors(study: experiment.DriftStudy) -> Table:
         body.append(
             (
                 "none" if period is None else f"{period:g} s",
-                f"{found[i]:.3g} ± {found[i] * study.uncertainty():.1g}",
+                with_uncertainty(found[i], found[i] * study.uncertainty()),
                 f"{closed:.3g}",
                 f"{(found[i] / closed - 1) / study.uncertainty():+.1f}",
                 f"{plain / closed:.3g}",

@@ -116,7 +116,7 @@ def ties() -> Derivation:
     return Derivation(
         (
             Step(
-                "error $(n-1)\\beta$ over (18), while $s = 1-(n-3)\\beta \\ge 0$; above one from $n = 5$ on",
+                "error $(n-1)\\beta$ over bound (18), while $s = 1-(n-3)\\beta \\ge 0$; it exceeds one from $n = 5$ on",
                 over((N - 1) * BETA, BETA * ((N - 1) * total + tail)),
                 tie_sum_ratio(),
             ),

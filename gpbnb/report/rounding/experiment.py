@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.array import FloatArray, NumberFormat
 from gpbnb.arithmetic.bounded import BoundedError
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, integers
@@ -33,7 +33,7 @@ class Trial(BoundedError):
     `bounds` omits a bound that does not exist because γ_n needs nβ < 1.
     """
 
-    fmt: FloatFormat
+    fmt: NumberFormat
     inputs: tuple[Any, ...]
     computed: Any
     true: Any

@@ -8,10 +8,21 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from gpbnb.arithmetic.named import digits
 from gpbnb.arithmetic.rational import column_sum_norm
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.display.style import OBSERVED, REFUTED, VALID, label, line_styles, loglog, name, name_ends
-from gpbnb.report.display.tables import digits
+from gpbnb.report.display.style import (
+    OBSERVED,
+    REFERENCE,
+    REFUTED,
+    VALID,
+    bits_colour,
+    label,
+    line_styles,
+    loglog,
+    name,
+    name_ends,
+)
 from gpbnb.report.rounding import theory
 from gpbnb.report.rounding.experiment import Growth, Sawtooth, Trial
 
@@ -22,12 +33,11 @@ def sawtooth(result: Sawtooth, ax: Axes) -> list[Artist]:
     artists: list[Artist] = [*ax.plot(result.x, result.error, ".", ms=1.5, color=OBSERVED, label="error")]
     nearest = fmt.rounding is Rounding.NEAREST
     artists.append(ax.axhline(beta, color=VALID, label="bound"))
-    if nearest:
-        artists.append(ax.axhline(beta / (1 + beta), color=VALID, ls=":", label="largest error"))
+    artists.append(ax.axhline(beta / (1 + beta), color=REFERENCE, ls=":", label="largest error"))
     ax.set_xscale("log")
-    ax.set_ylim(0, 1.3 * beta)
+    ax.set_ylim(0, 0.13)
     title = rf"{fmt.rounding.value}, {digits(fmt)}: bound $\beta$, {'(8)' if nearest else '(13)'}"
-    label(ax, "number $x$ (no unit)", "relative error\n(no unit)", title)
+    label(ax, "number $x$", "relative error", title)
     middle = float(np.sqrt(result.x.min() * result.x.max()))
     name(ax, r"bound $\beta$", (middle, beta), VALID, (0, 2))
     return artists
@@ -39,13 +49,14 @@ def worst_ratios(
     """Draw the largest error over a first-order bound against the number of operands, one curve for each format."""
     artists: list[Artist] = []
     ends = {bound_name: (1.0, REFUTED)}
-    for (marker, colour), curve in zip(line_styles(len(curves)), curves, strict=True):
+    for (marker, _), curve in zip(line_styles(len(curves)), curves, strict=True):
+        colour = bits_colour(curve[0].fmt)
         n = [len(trial.inputs[0]) for trial in curve]
         ratio = [trial.ratio(bound) for trial in curve]
         ends[digits(curve[0].fmt)] = ratio[-1], colour
         artists += ax.plot(n, ratio, marker=marker, color=colour, lw=0.8, label=digits(curve[0].fmt))
     artists.append(ax.axhline(1, color=REFUTED, ls="--", label=bound_name))
-    label(ax, f"{operands} $n$ (no unit)", f"worst error / {bound_name} (no unit)")
+    label(ax, f"{operands} $n$", f"worst error / {bound_name}")
     name_ends(ax, ends)
     return artists
 
@@ -58,15 +69,18 @@ def growth(results: Sequence[Growth], ax: Axes) -> list[Artist]:
         size, n = np.abs(result.errors), np.array(result.lengths)
         text = f"{result.kind},\n{result.fmt.rounding.value}"
         ends[text] = float(size[-1].max()), colour
-        artists += ax.plot(n, np.median(size, axis=1), marker, color=colour, label=text.replace("\n", " "))
-        artists += ax.plot(n, size.max(axis=1), color=colour, lw=0.8)
+        median, largest = np.median(size, axis=1), size.max(axis=1)
+        seen, some = median > 0, largest > 0
+        face = "none" if result.fmt.rounding is Rounding.CHOP else colour
+        artists += ax.plot(n[seen], median[seen], marker, color=colour, mfc=face, label=text.replace("\n", " "))
+        artists += ax.plot(n[some], largest[some], color=colour, lw=0.8)
     fmt, n = results[0].fmt, np.array(results[0].lengths)
     beta = fmt.unit_roundoff
     law = [theory.probabilistic_sum_factor(int(k), beta) / float(beta) for k in n]
     artists += ax.plot(n, n - 1, color=VALID, label="bound $n-1$")
     artists += ax.plot(n, law, color=REFUTED, ls="--", label=r"$\sqrt{n}$ law")
     loglog(ax)
-    label(ax, "terms $n$ (no unit)", r"error of the sum / $\beta\sum|x_j|$ (no unit)")
+    label(ax, "terms $n$", r"error of the sum / $\beta\sum|x_j|$")
     middle = len(n) // 2
     name(ax, "bound $n-1$", (float(n[middle]), float(n[middle] - 1)), VALID, (-6, 6))
     name(ax, r"$\sqrt{n}$ law", (float(n[1]), law[1]), REFUTED, (-4, 6))
@@ -88,7 +102,7 @@ def cancellation(trials: Sequence[Trial], ax: Axes) -> list[Artist]:
     artists += ax.plot(lost[order], scaled["(31)"][order], color=REFUTED, ls="--", label="(31)")
     artists += ax.plot(lost[order], scaled["(32)"][order], color=VALID, label="(32)")
     loglog(ax)
-    label(ax, r"cancellation $\|M_1\|\,\|M_2\| \,/\, \|M_1 M_2\|$ (no unit)", r"error / $\|M_1\|\,\|M_2\|$ (no unit)")
+    label(ax, r"cancellation $\|M_1\|\,\|M_2\| \,/\, \|M_1 M_2\|$", r"error / $\|M_1\|\,\|M_2\|$")
     ends = {"bound (32)": ("(32)", VALID), "(31) as\nprinted": ("(31)", REFUTED)}
     named = {text: (float(scaled[bound][order[-1]]), colour) for text, (bound, colour) in ends.items()}
     name_ends(ax, {**named, "error": (float(np.median(error[seen])), OBSERVED)})
@@ -111,6 +125,6 @@ def pessimism(
     ax.axhline(1, color=VALID)
     ax.set_yscale("log")
     ax.set_ylim(top=6)
-    label(ax, f"{operands} $n$ (no unit)", "error / bound\n(no unit)")
+    label(ax, f"{operands} $n$", "error / bound")
     name(ax, bound_name, (len(groups) / 2 + 0.5, 1), VALID, (0, 2))
     return [artist for group in boxes.values() for artist in group]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gpbnb.arithmetic.array import FloatArray
+from gpbnb.arithmetic.named import digits
 from gpbnb.arithmetic.rational import exact
-from gpbnb.report.display.tables import Table, digits
+from gpbnb.report.display.tables import Table
 from gpbnb.report.rounding.experiment import Trial, bound_statistics
 
 

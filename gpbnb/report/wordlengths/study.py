@@ -14,20 +14,25 @@ from numpy.typing import NDArray
 from tqdm import tqdm  # type: ignore[import-untyped]
 
 from gpbnb.arithmetic import search
+from gpbnb.arithmetic.algebra import Algebra
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import column_sum_norm, exact, rationals, true_inverse
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.bounds.bounded_run import BoundedRun
 from gpbnb.bounds.inverse import check_relative, smallest_precision
+from gpbnb.filters.blocks import BlockFormats
 from gpbnb.filters.contraction import companion_bound
 from gpbnb.filters.emulation import compare_runs
 from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel, kalman_step
 from gpbnb.filters.model import LinearModel
 from gpbnb.filters.run import Run, log_spaced, reference, reference_states
 from gpbnb.report.gravity_probe_b.year import Year
 from gpbnb.report.kalman import report_bounds
 from gpbnb.wordlength.precision import required_precision
 from gpbnb.wordlength.requirement import Requirement
+
+Curve = Sequence[tuple[int, float]]
+"""Steps, and a number at each."""
 
 
 def printed_precision(
@@ -116,6 +121,27 @@ class UpdateStagnation(NamedTuple):
     error: float
 
 
+def variances(
+    model: LinearModel,
+    fmt: FloatFormat | BlockFormats,
+    state: int,
+    steps: int,
+    form: Form | str = Form.INNOVATION,
+) -> tuple[Curve, int | None]:
+    """Run the covariance of a filter, and follow the variance of a state.
+
+    Returns
+    -------
+    curve : step and computed variance of the state, at a hundred steps.
+    indefinite : the first step at which a computed variance was not positive, if any.
+    """
+    every = max(steps // 100, 1)
+    run = Run(model, fmt, form, range(every, steps + 1, every))
+    run.take(np.zeros((steps, model.m)))
+    found = run.checkpoints()
+    return [(k, float(P[state, state])) for k, P in zip(found.steps, found.P, strict=True)], run.indefinite
+
+
 def update_stagnation(
     model: LinearModel,
     z: NDArray[Any],
@@ -188,11 +214,11 @@ def companion_run(
     """
     stored, measured, checkpoint_steps = model.rounded(fmt), fmt.array(z), log_spaced(len(z), 16)
     run = Run(model, fmt, form, checkpoint_steps)
-    companion = BoundedRun(stored, None, Form.INNOVATION, checkpoint_steps)
+    companion = Run(stored, None, Form.INNOVATION, checkpoint_steps, bounded=True)
     run.take(measured)
     companion.take(measured.to_fractions())
     history = compare_runs(run, companion.checkpoints())
-    bound = companion_bound(history.state, companion.bounds[0][: len(history.steps)])
+    bound = companion_bound(history.state, companion.bounds.state[: len(history.steps)])
     return np.abs(history.state).max(axis=0), bound.max(axis=0)
 
 
@@ -243,41 +269,12 @@ def innovation_form(given: Mapping[str, NDArray[Any]], z: NDArray[Any], progress
     x : (steps, n), the estimate after each step.
     """
     x, P, estimates = given["x0"][:, np.newaxis], given["P0"], np.empty((len(z), len(given["x0"])), z.dtype)
-    identity = np.eye(len(P), dtype=P.dtype)
+    algebra = Algebra(lambda n: np.eye(n, dtype=P.dtype))
     for k, measured in enumerate(tqdm(z, desc="native", unit="step", disable=not progress)):
-        Phi, H, Q, R = (given[letter][k % len(given[letter])] for letter in ("Phi", "H", "Q", "R"))
-        predicted = _times(_times(Phi, P), Phi.T) + Q
-        PHt = _times(predicted, H.T)
-        K = _times(PHt, _inverse(_times(H, PHt) + R))
-        P = _times(identity - _times(K, H), predicted)
-        x = _times(Phi, x)
-        x = x + _times(K, measured[:, np.newaxis] - _times(H, x))
+        model = StepModel(*(given[letter][k % len(given[letter])] for letter in ("Phi", "H", "Q", "R")))
+        x, _, P = kalman_step(algebra, Form.INNOVATION, model, x, P, measured[:, np.newaxis])
         estimates[k] = x[:, 0]
     return estimates
-
-
-def _times(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    """Multiply matrices, each entry summed from left to right; NumPy sums in another order."""
-    result = a[:, :1] * b[:1]
-    for k in range(1, a.shape[1]):
-        result = result + a[:, k : k + 1] * b[k : k + 1]
-    return result
-
-
-def _inverse(a: NDArray[Any]) -> NDArray[Any]:
-    """Invert a matrix by elimination without pivoting."""
-    upper, m = a.copy(), len(a)
-    result = np.eye(m, dtype=a.dtype)
-    for k in range(m):
-        for i in range(k + 1, m):
-            factor = upper[i, k] / upper[k, k]
-            upper[i, k + 1 :] = upper[i, k + 1 :] - factor * upper[k, k + 1 :]
-            result[i] = result[i] - factor * result[k]
-    for k in range(m - 1, -1, -1):
-        for i in range(k + 1, m):
-            result[k] = result[k] - upper[k, i] * result[i]
-        result[k] = result[k] / upper[k, k]
-    return result
 
 
 class InversePrecision(NamedTuple):

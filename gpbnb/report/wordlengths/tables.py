@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import arithmetic, digits
 from gpbnb.arithmetic.rounding import Rounding
-from gpbnb.report.display.tables import Table, arithmetic, digits, short
+from gpbnb.report.display.tables import Table, short
 from gpbnb.report.integration.theory import best_rate, needed_precision, stall_rate
 from gpbnb.report.wordlengths.study import InversePrecision, UpdateStagnation
 from gpbnb.wordlength.examples import NORMAL_RANGE

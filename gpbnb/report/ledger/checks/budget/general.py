@@ -160,11 +160,6 @@ def rss_basis(printed: Statement) -> Finding:
     return given(f"the total that Figure II-2 assumes, {printed.number('total').literal} milliarcsecond")
 
 
-@CHECKS.add("hung1982.I.history", "hung1982.I.apparatus")
-def history(printed: Statement) -> Finding:
-    return unverifiable("", "the report names no source, and nothing in the analysis depends on this claim")
-
-
 @CHECKS.add("hung1982.I.previous-contract")
 def previous_contract(printed: Statement) -> Finding:
     listed = quote("hung1982.II.references")
@@ -197,13 +192,6 @@ def chapters(printed: Statement) -> Finding:
         [printed.says("classifications"), printed.says("error analysis")] == found,
         f"they are chapters {' and '.join(found)}",
         Verdict.INCONSISTENT,
-    )
-
-
-@CHECKS.add("hung1982.I.references", "hung1982.II.references")
-def references(printed: Statement) -> Finding:
-    return unverifiable(
-        "", ("the cited works are not among the documents; the scan has lost all references except the first of ch. II")
     )
 
 

@@ -20,11 +20,6 @@ from gpbnb.report.measurement import ARCSEC, MAS, STATES, apply, deroll, measure
 # -- hung1982, ch. II: figures and classes --------------------------------------------------------
 
 
-@CHECKS.add("hung1982.II.figure-ii-1", "hung1982.II.nine-groups")
-def block_diagram(printed: Statement) -> Finding:
-    return unverifiable("", "the scan has lost the picture, and the text does not name the nine groups")
-
-
 @CHECKS.add("hung1982.II.classification-by-statistics")
 def by_statistics(printed: Statement) -> Finding:
     def classes(known: bool, constant: bool) -> list[Kind]:

@@ -6,7 +6,7 @@ from datetime import date, timedelta
 
 from gpbnb.report.ledger.checks.budget.general import span
 from gpbnb.report.ledger.checks.budget.registry import CHECKS
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given, unverifiable
+from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.report.ledger.statements import Statement, load_statements, statement
 
 
@@ -20,11 +20,6 @@ def title(printed: Statement) -> Finding:
         Verdict.INCONSISTENT,
         otherwise_note="the experiment is called GP-B",
     )
-
-
-@CHECKS.add("hung1984.title.numbers", "hung1984.title.parties", "hung1984.title.disclaimer")
-def title_page() -> Finding:
-    return given("names the report, its author and publisher, or describes the copy")
 
 
 @CHECKS.add("hung1984.title.contract")
@@ -60,27 +55,6 @@ def tasks(printed: Statement) -> Finding:
         Verdict.INCONSISTENT,
         otherwise_note="the other chapter has the results of the other task",
     )
-
-
-@CHECKS.add(
-    "hung1982.I.previous-results",
-    "hung1982.I.unprecedented",
-    "hung1982.I.superconductive",
-    "hung1982.I.responsibility",
-    "hung1982.II.model-of-previous-contract",
-)
-def outside() -> Finding:
-    return unverifiable("", "the works and data on which this claim rests are not among the documents")
-
-
-@CHECKS.add(
-    "hung1982.I.aim-of-contract",
-    "hung1982.I.every-source",
-    "hung1982.II.purpose-of-classification",
-    "hung1982.II.random-types",
-)
-def plans() -> Finding:
-    return given("states a plan, or defines a class of errors")
 
 
 @CHECKS.add("hung1982.II.two-ways")

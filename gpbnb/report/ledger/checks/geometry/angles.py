@@ -114,7 +114,9 @@ def compensated() -> float:
 @CHECKS.add("hung1982.IV.use-of-model")
 def use_of_model() -> Finding:
     size = 20 * ARCSEC
-    cases = {name: theory.Case().with_angle(name, size) for name in ("alpha1", "beta1", "beta3", "gamma1", "gamma3")}
+    cases = {
+        name: theory.Misalignments().with_angle(name, size) for name in ("alpha1", "beta1", "beta3", "gamma1", "gamma3")
+    }
     cases["gamma1, alpha2"] = cases["gamma1"].with_angle("alpha2", size)
     holds, shown = True, []
     for name, case in cases.items():

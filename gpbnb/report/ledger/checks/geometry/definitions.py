@@ -11,7 +11,7 @@ import sympy as sp
 from gpbnb.report.ledger.agreement import vanishes
 from gpbnb.report.ledger.checks.geometry.equations import PHASE, letters
 from gpbnb.report.ledger.checks.geometry.registry import CHECKS, MINUTE
-from gpbnb.report.ledger.finding import Finding, compare, given
+from gpbnb.report.ledger.finding import Finding, compare
 from gpbnb.report.ledger.statements import Statement, statement
 from gpbnb.report.measurement import ARCSEC, deroll, roll, rotation, spin_in_readout, star_in_telescope
 
@@ -23,28 +23,6 @@ NONE = np.zeros(3)
 
 
 # -- the frames -----------------------------------------------------------------------------------
-
-
-@CHECKS.add("hung1982.IV.common-origin")
-def common_origin() -> Finding:
-    return given("places all origins at one point; (1) and (2) contain only directions, so the place has no effect")
-
-
-@CHECKS.add(
-    "hung1982.IV.intermediate-angles",
-    "hung1982.IV.roll-frame",
-    "hung1982.IV.telescope-frame",
-    "hung1982.IV.readout-frame",
-    "hung1982.IV.gyro-frame",
-    "hung1982.IV.gyro-angles",
-)
-def frames_defined() -> Finding:
-    return given("defines a frame, or the three angles between two frames")
-
-
-@CHECKS.add("hung1982.IV.unknown-angles")
-def unknown_angles() -> Finding:
-    return given("says which angles of (1) and (2) are unknown, and which are wanted")
 
 
 def directions_of_x(phase: float) -> dict[str, np.ndarray]:

@@ -12,7 +12,7 @@ from gpbnb.report.geometry import derivation
 from gpbnb.report.geometry.derivation import SEQUENCES
 from gpbnb.report.ledger.agreement import hold, vanishes
 from gpbnb.report.ledger.checks.geometry.registry import CHECKS
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.statements import Statement, statement
 
 H = sp.Symbol("h")
@@ -135,12 +135,12 @@ def estimates(printed: Statement) -> Finding:
         hold(printed.links(readings())),
         f"the right side is $[-{name}_3\\cos2\\omega t+{name}_2\\sin2\\omega t;\\ "
         f"{name}_3\\sin2\\omega t+{name}_2\\cos2\\omega t]$, with mean 0 over a roll; correcting it "
-        f"takes at least {len(changes[0])} changes of sign, before {' or '.join(sorted(signs))}",
+        f"takes at least {len(changes[0])} changes of sign; these signs stand before {' or '.join(sorted(signs))}",
         Verdict.MISPRINT if later_uses_are_right() else Verdict.WRONG,
         otherwise_note="as the scan shows it, the equation rolls the readings once more instead of derolling them; "
-        f"right is the inverse of (3), $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$, as in (5) to (7). Nothing "
-        "later uses the printed signs, as (10) to (12) hold for any estimates; but anyone who programs them measures "
-        "no drift",
+        f"the correct matrix is the inverse of (3), $[-\\hat{name}_3;\\hat{name}_2]=[[C,-S],[S,C]][y;z]$, as in (5) to "
+        "(7). Nothing later uses the printed signs, as (10) to (12) hold for any estimates; but anyone who programs "
+        "them measures no drift",
     )
 
 
@@ -155,14 +155,6 @@ def later_uses_are_right() -> bool:
 def signs_to_change() -> tuple[tuple[int, ...], ...]:
     """Return the smallest sets of signs of (8) whose change turns it into a deroll."""
     return derivation.fewest_signs()
-
-
-@CHECKS.add("hung1982.IV.eq10", "hung1982.IV.eq11")
-def errors_of_estimates(printed: Statement) -> Finding:
-    return given(
-        "this defines the error of an estimate; only fragments remain in the scan, and the text is "
-        "restored from the other equation"
-    )
 
 
 @CHECKS.add("hung1982.IV.eq12")

@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from gpbnb.report.geometry import derivation, theory
-from gpbnb.report.ledger.checks.geometry.registry import CHAPTER, CHECKS, MINUTE
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, unverifiable
+from gpbnb.report.ledger.checks.geometry.registry import CHECKS, MINUTE
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.measurement import (
     ARCSEC,
@@ -21,14 +21,6 @@ from gpbnb.report.measurement import (
     star_in_telescope,
     theta_of,
 )
-
-
-@CHECKS.add("hung1982.IV.figure-iv-1", "hung1982.IV.figure-iv-2")
-def pictures() -> Finding:
-    return unverifiable(
-        "the figure was redrawn from the definitions of the frames", f"the scan has lost the picture; see the {CHAPTER}"
-    )
-
 
 _COUNTS = {"four": 4, "five": 5, "six": 6, "seven": 7}
 

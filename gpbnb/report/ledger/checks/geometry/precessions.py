@@ -9,17 +9,9 @@ import sympy as sp
 
 from gpbnb.report.geometry import derivation, theory
 from gpbnb.report.ledger.checks.geometry.registry import CHAPTER, CHECKS
-from gpbnb.report.ledger.finding import Finding, answer, compare, given, unverifiable
+from gpbnb.report.ledger.finding import Finding, answer, compare
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.measurement import ARCSEC, deroll
-
-
-@CHECKS.add("hung1982.I.figure-i-1")
-def picture() -> Finding:
-    return unverifiable(
-        "the figure was redrawn for a star in the plane of a polar orbit",
-        f"the scan has lost the picture; see the {CHAPTER}",
-    )
 
 
 @CHECKS.add("hung1982.I.geodetic-motional-geometry")
@@ -153,8 +145,3 @@ def spin_spin(printed: Statement) -> Finding:
         f"{still[1] / ARCSEC:.3f} arcseconds a year, instead of {turning[0] / ARCSEC:.2f} and "
         f"{turning[1] / ARCSEC:.3f}: only the motional effect depends on the Earth's rotation",
     )
-
-
-@CHECKS.add("hung1982.I.purpose")
-def purpose() -> Finding:
-    return given("states the purpose of the experiment")

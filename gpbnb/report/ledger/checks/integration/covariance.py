@@ -25,7 +25,7 @@ from gpbnb.report.ledger.checks.integration.cases import (
     steady,
 )
 from gpbnb.report.ledger.checks.integration.registry import CHECKS, MAIN, eq
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.statements import Statement, statement
 
 CLOSE = 1e-10
@@ -100,11 +100,6 @@ def error_variance(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(MAIN + "sanalysis.symbols-12")
-def means() -> Finding:
-    return given("names the symbols of (11) and (12); all means are zero")
-
-
 @CHECKS.add(*eq("14"))
 def rate(printed: Statement) -> Finding:
     indices = ("11", "22", "32", "33", "31", "21")
@@ -127,16 +122,6 @@ def rate(printed: Statement) -> Finding:
 def changes_of_covariances(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(arbitrary(case))) for case in cases())
     return compare(agrees, "each change is that of the covariance over the cycle, as (15) defines it")
-
-
-@CHECKS.add(*eq("15", "26"))
-def differences(printed: Statement) -> Finding:
-    return given("defines the change over a cycle")
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-14")
-def rate_of_a_cycle() -> Finding:
-    return given("names $\\dot P_{ee_n}$: a difference divided by $T$, not a derivative")
 
 
 # -- products and their expected values, (16)-(18) ------------------------------------------------
@@ -219,18 +204,6 @@ def covariance_equation(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(*eq("20"))
-def covariance_names(printed: Statement) -> Finding:
-    return given("names the entries of $P$ and $N_p$")
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-20")
-def density() -> Finding:
-    return given(
-        "names the symbols of (20); the density is two-sided and per hertz; a one-sided density would be twice as large"
-    )
-
-
 @CHECKS.add(*eq("21"))
 def covariance_components(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(_from_any(case))) for case in cases())
@@ -281,11 +254,6 @@ def steady_start(printed: Statement) -> Finding:
         if abs(late[0] / late[1] - 1) < 1e-9
         else "",
     )
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-22-23")
-def steady_input() -> Finding:
-    return given("names the symbols of (22) and (23)")
 
 
 # -- at the cycles, (24)-(28) ---------------------------------------------------------------------

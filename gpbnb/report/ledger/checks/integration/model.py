@@ -12,30 +12,12 @@ from gpbnb.report.integration import derivation, theory
 from gpbnb.report.integration.derivation import OMEGA, TAU, TIME, P, T
 from gpbnb.report.ledger.agreement import hold, vanishes
 from gpbnb.report.ledger.checks.integration.cases import Case, cases, constants, states
-from gpbnb.report.ledger.checks.integration.registry import CHAPTER, CHECKS, MAIN, eq
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given, unverifiable
+from gpbnb.report.ledger.checks.integration.registry import CHECKS, MAIN, eq
+from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
 from gpbnb.report.ledger.formula import Words
 from gpbnb.report.ledger.statements import Statement
 
 # -- title, abstract, figure ----------------------------------------------------------------------
-
-
-@CHECKS.add(MAIN + "stitle.date", MAIN + "stitle.author")
-def title_page() -> Finding:
-    return given("title, author, date and report number of the document")
-
-
-@CHECKS.add(MAIN + "sreference.reference")
-def reference() -> Finding:
-    return unverifiable("", "the cited book is not among the documents; we derive (3), (5) and (19), which cite it")
-
-
-@CHECKS.add(MAIN + "sfig-1.fig-1")
-def figure() -> Finding:
-    return unverifiable(
-        "the figure was redrawn from (1), (2) and (11)",
-        f"the scan has lost the picture and keeps only its caption; see the {CHAPTER}",
-    )
 
 
 _POWERS = {
@@ -128,11 +110,6 @@ def aim(printed: Statement) -> Finding:
 # -- the model, (1)-(4) ---------------------------------------------------------------------------
 
 
-@CHECKS.add(*eq("1"))
-def model(printed: Statement) -> Finding:
-    return given("states the model: the input and its true integral")
-
-
 @CHECKS.add(MAIN + "sanalysis.band-limited")
 def band_limited() -> Finding:
     omega = 3.0
@@ -141,7 +118,7 @@ def band_limited() -> Finding:
     # Shares of the variance below ω tan θ; the density over θ is uniform.
     density = process.psd(omega * np.tan(angle)) * omega / np.cos(angle) ** 2 / 2000
     inside = float(np.sum(density[:500]) / np.sum(density))
-    return given(f"names $x_1$, of whose variance {inside:.0%} lies below $\\omega_{{bw}}$ and the rest above")
+    return given(f"names $x_1$; {inside:.0%} of its variance lies below $\\omega_{{bw}}$, and the rest above")
 
 
 @CHECKS.add(MAIN + "sanalysis.bandwidth")
@@ -149,11 +126,6 @@ def bandwidth() -> Finding:
     process = theory.first_order(2.0, 3.0)
     low, edge = (float(process.psd(s)) for s in (0.0, 3.0))
     return given(f"names $\\omega_{{bw}}$, in rad/s; the spectral density there is {edge / low:.2f} of that at zero")
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-1-2")
-def integrals() -> Finding:
-    return given("names the symbols of (1) and (2)")
 
 
 @CHECKS.add(*eq("2"))
@@ -201,11 +173,6 @@ def matrices(printed: Statement) -> Finding:
             "remaining term is $\\underline n_p$"
         ),
     )
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-3")
-def vector_names() -> Finding:
-    return given("names the symbols of (3)")
 
 
 # -- the transition, (5)-(9) ----------------------------------------------------------------------
@@ -321,11 +288,6 @@ def transition(printed: Statement) -> Finding:
     return compare(agrees, f"$\\exp(AT)={sp.latex(derivation.transition_matrix())}$")
 
 
-@CHECKS.add(*eq("8"))
-def components_named(printed: Statement) -> Finding:
-    return given("names the entries of $\\Phi_n$ and $\\underline q_n$")
-
-
 @CHECKS.add(MAIN + "sanalysis.easily-shown")
 def easily_shown(printed: Statement) -> Finding:
     ours = derivation.transition_matrix()
@@ -339,11 +301,6 @@ def easily_shown(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(MAIN + "sanalysis.symbols-6")
-def transitions() -> Finding:
-    return given("names the symbols of (6)")
-
-
 # -- states from cycle to cycle, (10), (11) -------------------------------------------------------
 
 
@@ -351,11 +308,6 @@ def transitions() -> Finding:
 def components(printed: Statement) -> Finding:
     agrees = all(hold(printed.links(states(case))) for case in cases())
     return compare(agrees, "the equations are the rows of (5), and (2)")
-
-
-@CHECKS.add(*eq("11"))
-def error(printed: Statement) -> Finding:
-    return given("defines the error: the digital integral minus the true integral")
 
 
 @CHECKS.add(MAIN + "sanalysis.uncorrelated-q")

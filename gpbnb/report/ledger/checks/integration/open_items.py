@@ -12,12 +12,12 @@ from gpbnb.report.ledger.finding import Finding, answer
 
 
 @cache
-def simulated() -> experiment.Sweep:
+def simulated() -> experiment.WalkSweep:
     """Return a small simulation of the random walk."""
     return experiment.sweep([0.01, 0.1, 1.0, 10.0], 300, 4000, np.random.default_rng(35))
 
 
-def worst(found: experiment.Sweep) -> float:
+def worst(found: experiment.WalkSweep) -> float:
     """Return the largest deviation from the exact variance, in standard errors."""
     return float(np.max(np.abs(found.deviations())))
 

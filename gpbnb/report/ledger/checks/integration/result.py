@@ -14,8 +14,9 @@ from gpbnb.report.ledger.agreement import hold, vanishes
 from gpbnb.report.ledger.checks.integration.cases import Case, Names, cases, constants, steady, walk_rate
 from gpbnb.report.ledger.checks.integration.covariance import if_used
 from gpbnb.report.ledger.checks.integration.registry import CHECKS, MAIN, eq
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
+from gpbnb.report.ledger.formula import Relation
+from gpbnb.report.ledger.statements import Statement, statement
 
 # -- the steady state, (30)-(34) ------------------------------------------------------------------
 
@@ -28,11 +29,6 @@ def steady_covariances(printed: Statement) -> Finding:
         "the steady-state values are $P_{12\\infty}=P_{11\\infty}/\\omega_{bw}$, "
         "$P_{31\\infty}=\\frac12\\frac{1+\\phi_{11}}{1-\\phi_{11}}P_{11\\infty}T$",
     )
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-30")
-def steady_names() -> Finding:
-    return given("names the symbols of (30)")
 
 
 @CHECKS.add(*eq("32"))
@@ -49,6 +45,18 @@ def steady_rate(printed: Statement) -> Finding:
         names["P_dot_ee"] = {names["n"]: walk_rate(case)}
         agrees = agrees and hold(printed.links(names))
     return compare(agrees, "the errors of single cycles give the same result without (10)-(32)")
+
+
+@CHECKS.add(MAIN + "sanalysis.substitution-33")
+def substituted_rate(printed: Statement) -> Finding:
+    number = printed.says("equations").strip("()")
+    relations = [part for part in statement(f"{MAIN}eq{number}").parts if isinstance(part, Relation)]
+    changes = {each.sides[0].value(): each.value() for each in relations}
+    rate, stated = (statement(f"{MAIN}eq{each}").relation().value() for each in ("14", "33"))
+    return compare(
+        bool(sp.simplify(rate.subs(changes) - stated) == 0),
+        "with the three changes of (32), (14) is the last side of (33)",
+    )
 
 
 @CHECKS.add(*eq("34"))
@@ -82,11 +90,6 @@ def random_walk(printed: Statement) -> Finding:
 
 def _with_walk(case: Case) -> Names:
     return {**constants(case), "sigma_e_rw": sp.sqrt(walk_rate(case))}
-
-
-@CHECKS.add(MAIN + "sanalysis.symbols-35")
-def deviations(printed: Statement) -> Finding:
-    return given("names the symbols of (35)")
 
 
 @CHECKS.add(MAIN + "sanalysis.35-exact")

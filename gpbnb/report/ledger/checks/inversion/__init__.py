@@ -5,7 +5,6 @@ from gpbnb.report.ledger.checks.inversion import (
     first_approach,
     numerical_example,
     resultant,
-    sentences,
     triangularization,
 )
 from gpbnb.report.ledger.checks.inversion.registry import CHECKS
@@ -16,6 +15,5 @@ __all__ = [
     "first_approach",
     "numerical_example",
     "resultant",
-    "sentences",
     "triangularization",
 ]

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import itertools
 import operator
+import re
 from fractions import Fraction
 from functools import cache
 
 import numpy as np
+import sympy as sp
 
 from gpbnb.arithmetic.rational import column_sum_norm, inverse_of
 from gpbnb.report.inversion import procedure, theory
@@ -17,8 +19,9 @@ from gpbnb.report.ledger.checks.inversion.judging import Names, corrected, holds
 from gpbnb.report.ledger.checks.inversion.registry import CHECKS
 from gpbnb.report.ledger.checks.inversion.samples import of_example, samples
 from gpbnb.report.ledger.checks.inversion.triangularization import ONE_EPSILON
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
-from gpbnb.report.ledger.formula import Relation, has_dotted_matrix
+from gpbnb.report.ledger.corrections import intended
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
+from gpbnb.report.ledger.formula import Relation
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement
 
@@ -29,22 +32,9 @@ def general() -> tuple[Names, ...]:
     return (*substitutions(4), *substitutions(5))
 
 
-def evaluable(printed: Statement) -> Statement:
-    """Return the statement without matrices that contain dots, which cannot be evaluated."""
-    return corrected(printed, "; ".join(part.text for part in printed.parts if not has_dotted_matrix(part)))
-
-
-@CHECKS.add(
-    *both("eq65"),
-    *both("eq66"),
-    *both("eq67"),
-    *both("eq69"),
-    *both("eq70"),
-    *both("eq83"),
-    *both("eq84"),
-)
-def systems(printed: Statement) -> Finding:
-    return given("states a triangular system, or the perturbed system that the computed solution solves exactly")
+def displayed() -> tuple[Names, ...]:
+    """Return symbols for so many rows that each row and column of a printed matrix with dots is another one."""
+    return (*substitutions(5), *substitutions(6))
 
 
 @CHECKS.add(*both("s11-2.line-before-68"))
@@ -73,9 +63,8 @@ def perturbed_solution(printed: Statement) -> Finding:
 @CHECKS.add(
     *both("eq71"),
     "hung1982.III.s11-2.x-1-line",
-    "hung1984.II.s11-2.x-3-line",
-    "hung1984.II.s11-2.x-2-line",
-    "hung1982.III.s11-2.x-3-x-2-lines",
+    *both("s11-2.x-3-line"),
+    *both("s11-2.x-2-line"),
 )
 def rows(printed: Statement) -> Finding:
     return compare(
@@ -157,6 +146,51 @@ def factored_three(printed: Statement) -> Finding:
         "$A_D\\,\\mathrm{diag}(0,4,3)\\,\\epsilon$",
         "the second form lacks the factor $\\epsilon$ of the first",
     )
+
+
+# -- from line to line ----------------------------------------------------------------------------
+
+
+_UNKNOWN = {"74": 3, "77": 2, "79": 1}
+"""The component of x̂ for which an equation can be solved."""
+
+
+def _numbers(phrase: str) -> list[str]:
+    return re.findall(r"\((\d+)", phrase)
+
+
+def _cited(printed: Statement, number: str, part: int = 1) -> tuple[sp.Expr, sp.Expr]:
+    """Return the left and the last side of an equation of the same document, as it should read."""
+    relation = intended(f"{printed.document}.{printed.chapter}.eq{number}").relation(part)
+    return relation.sides[0].value({"matrix": sp.Matrix}), relation.value({"matrix": sp.Matrix})
+
+
+@CHECKS.add(*(key for number in (74, 77, 79) for key in both(f"s11-2.claim-substitution-{number}")))
+def substitution(printed: Statement) -> Finding:
+    number = printed.id[-2:]
+    replaced = dict(
+        _cited(printed, each) for each in (["73"] if number == "74" else _numbers(printed.says("equations")))
+    )
+    left, right = _cited(printed, "71", "abc".index(printed.says("line")[-2]) + 1)
+    unknown, epsilon = sp.Symbol(f"x_hat[{_UNKNOWN[number]}]"), sp.Symbol("epsilon")
+    by_substitution, stated = (
+        sp.solve(a - b, unknown) for a, b in ((left.subs(replaced), right), _cited(printed, number))
+    )
+    difference = by_substitution[0] - stated[0] if by_substitution else sp.Integer(1)
+    first_order = [difference.subs(epsilon, 0), difference.diff(epsilon).subs(epsilon, 0)]
+    return compare(
+        all(sp.simplify(each) == 0 for each in first_order),
+        f"solved for $\\hat x_{_UNKNOWN[number]}$, the result agrees with ({number}) to first order",
+        note="(77) is meant with $\\hat x_3$" if printed.id == "hung1984.II.s11-2.claim-substitution-77" else "",
+    )
+
+
+@CHECKS.add(*both("s11-2.claim-single-equation"))
+def put_together(printed: Statement) -> Finding:
+    left, right = _cited(printed, "80")
+    rows = {sp.expand(row) for row in left - right}
+    cited = {sp.expand(a - b) for a, b in (_cited(printed, number) for number in _numbers(printed.says("equations")))}
+    return compare(rows == cited, "the three rows of (80) are the three equations")
 
 
 # -- n rows ---------------------------------------------------------------------------------------
@@ -245,11 +279,10 @@ def generalization(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1984.II.eq89")
 def factored(printed: Statement) -> Finding:
-    shown = evaluable(printed)
     return slip(
-        shown,
-        general(),
-        shown.form.replace("A_D*M_A", "A_D*M_A*epsilon"),
+        printed,
+        displayed(),
+        printed.form.replace("A_D*M_A", "A_D*M_A*epsilon"),
         "the first form is (87); the second is $A_DM_A\\,\\epsilon$",
         "the second form lacks the factor $\\epsilon$ of the first; hung1982 has β there",
     )
@@ -257,13 +290,13 @@ def factored(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.eq89-first-form")
 def first_form_1982(printed: Statement) -> Finding:
-    shown = evaluable(printed)
-    three = holds(shown, substitutions(3))
-    four = theory.printed_weights_1982(4)[0, 1:].tolist()
-    right = theory.back_substitution_weights(4)[0, 1:].tolist()
+    (three, right_three), (four, right) = (
+        [weights(n)[0, 1:].tolist() for weights in (theory.printed_weights_1982, theory.back_substitution_weights)]
+        for n in (3, 4)
+    )
     return compare(
-        holds(shown, general()),
-        f"$2n-j$ {'is right for $n=3$ alone' if three else 'is wrong'}; for $n=4$ it gives "
+        holds(printed, displayed()),
+        f"$2n-j$ {'is right for $n=3$ alone' if three == right_three else 'is wrong'}; for $n=4$ it gives "
         f"{', '.join(map(str, four))} in place of {', '.join(map(str, right))}",
         Verdict.INCONSISTENT,
         otherwise_note=(
@@ -275,10 +308,9 @@ def first_form_1982(printed: Statement) -> Finding:
 
 @CHECKS.add("hung1982.III.eq89-factored-form")
 def factored_1982(printed: Statement) -> Finding:
-    shown = evaluable(printed)
-    counted = holds(shown, [names for names in general() if names["epsilon"] == EPSILON])
+    counted = holds(printed, [names for names in displayed() if names["epsilon"] == EPSILON])
     return compare(
-        holds(shown, general()),
+        holds(printed, displayed()),
         "the weights are those of (87), but β stands for $\\epsilon$, so the equation fails where "
         "$\\epsilon$ is negative; $|\\Delta A|\\le|A_D|M_A\\beta$ holds",
         Verdict.WRONG if counted else Verdict.INCONSISTENT,
@@ -290,12 +322,11 @@ def factored_1982(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("eq90"))
 def right_side_inequality(printed: Statement) -> Finding:
-    shown = evaluable(printed)
-    meant = corrected(shown, shown.form.replace("Deltab <= M_b*b*beta", "abs(Deltab) <= M_b*abs(b)*beta"))
+    meant = corrected(printed, printed.form.replace("<= M_b*b*beta", "; abs(Deltab) <= M_b*abs(b)*beta"))
     return compare(
-        holds(shown, general()),
+        holds(printed, displayed()),
         "the inequality fails where $\\epsilon$ or an entry of $b$ is negative; $|\\Delta b|\\le M_b|b|\\beta$ holds",
-        Verdict.WRONG if holds(meant, general()) else Verdict.INCONSISTENT,
+        Verdict.WRONG if holds(meant, displayed()) else Verdict.INCONSISTENT,
         otherwise_note="the absolute-value bars are missing on both sides, and (95) subtracts $\\delta A\\,\\hat x$ "
         "from $\\Delta b$ as if the signs were known",
         root=ONE_EPSILON,

@@ -109,7 +109,7 @@ class Elimination:
     def solution(self) -> list[list[FirstOrder]]:
         """The rows of x̂, with a column for each right-hand side."""
         n, fl = self.n, self.rounded
-        last = entries(self.stages[1][-1])
+        last = self.stages[1][-1].tolist()
         found: list[list[FirstOrder]] = [[] for _ in range(n)]
         for k in reversed(range(n)):
             for column in range(self.b.shape[1]):
@@ -168,7 +168,7 @@ class Elimination:
 
         def fl(value: FirstOrder) -> FirstOrder:
             for k in range(1, self.n):
-                for true, new in zip(entries(exact[k]), entries(computed[k]), strict=True):
+                for true, new in zip(exact[k].tolist(), computed[k].tolist(), strict=True):
                     for t, c in zip(true, new, strict=True):
                         if t.value and t == value:
                             return c
@@ -185,24 +185,19 @@ class Elimination:
             "a_hat": a_computed,
             "b": b_exact,
             "b_hat": b_computed,
-            "a_tilde": lambda i, j, k: entries(self.errors(False)[int(k)])[int(i) - 1][int(j) - 1],
+            "a_tilde": lambda i, j, k: self.errors(False)[int(k)].tolist()[int(i) - 1][int(j) - 1],
             "A": staged(exact, False),
             "A_hat": staged(computed, False),
             "A_tilde": staged(computed, False, errors=True),
             "b_underline": staged(exact, True),
             "b_hat_underline": staged(computed, True),
             "b_tilde_underline": staged(computed, True, errors=True),
-            "A_hat_T": Named(upper, lambda i, j: entries(upper)[i - 1][j - 1]),
+            "A_hat_T": Named(upper, lambda i, j: upper.tolist()[i - 1][j - 1]),
             "b_hat_T_underline": Named(
-                column(self.part(computed[-1], True)), lambda k: entries(computed[-1])[k - 1][self.n]
+                column(self.part(computed[-1], True)), lambda k: computed[-1].tolist()[k - 1][self.n]
             ),
             "fl": fl,
         }
-
-
-def entries(x: FirstOrder) -> list[list[FirstOrder]]:
-    """Return the entries of a matrix by row and column."""
-    return [[FirstOrder(v, s) for v, s in zip(*rows, strict=True)] for rows in zip(x.value, x.slope, strict=True)]
 
 
 def column(x: FirstOrder, j: int = 1) -> FirstOrder:
@@ -306,17 +301,17 @@ def diagonal(numbers: list[Fraction]) -> FirstOrder:
 
 def on_diagonal(x: FirstOrder) -> Named:
     """Return a diagonal matrix whose entries have one index."""
-    return Named(x, known({(k + 1,): row[k] for k, row in enumerate(entries(x))}))
+    return Named(x, known({(k + 1,): row[k] for k, row in enumerate(x.tolist())}))
 
 
 def vector(x: FirstOrder) -> Named:
     """Return a column with its entries."""
-    return Named(x, known({(i + 1,): row[0] for i, row in enumerate(entries(x))}))
+    return Named(x, known({(i + 1,): row[0] for i, row in enumerate(x.tolist())}))
 
 
 def square(x: FirstOrder) -> Named:
     """Return a matrix with its entries."""
-    return Named(x, known({(i + 1, j + 1): c for i, row in enumerate(entries(x)) for j, c in enumerate(row)}))
+    return Named(x, known({(i + 1, j + 1): c for i, row in enumerate(x.tolist()) for j, c in enumerate(row)}))
 
 
 @cache

@@ -15,26 +15,11 @@ from gpbnb.report.ledger.checks.inversion.environments import FORMATS, residues
 from gpbnb.report.ledger.checks.inversion.judging import holds, says, slip
 from gpbnb.report.ledger.checks.inversion.registry import CHECKS
 from gpbnb.report.ledger.checks.inversion.samples import FOUR, Sample, of_example, samples
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement, statement
 
 EXACTLY = "exact for random matrices, however inaccurate the computed inverse is"
-
-
-@CHECKS.add(*both("s10.inverse-definition"))
-def inverse_defined(printed: Statement) -> Finding:
-    return given("defines the inverse and its columns")
-
-
-@CHECKS.add(*both("eq34"), *both("eq36"), *both("eq37"))
-def residue_defined(printed: Statement) -> Finding:
-    return given("defines the residue, the error matrix and the residue matrix of the computed inverse")
-
-
-@CHECKS.add(*both("eq41"), *both("s10.residue-of-41"))
-def changed_residue_defined(printed: Statement) -> Finding:
-    return given("states the system with a perturbed matrix and defines its residue")
 
 
 @CHECKS.add(*both("eq33"), *both("eq35"), *both("eq38"))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
+from gpbnb.report.ledger.dotted import DottedMatrix
 
 
 class FirstOrder:
@@ -73,21 +74,34 @@ class FirstOrder:
         """The transpose."""
         return FirstOrder(self.value.T, self.slope.T)
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The numbers of rows and columns; empty for a number."""
+        return np.shape(self.value)
+
+    def tolist(self) -> list[list[FirstOrder]]:
+        """The entries of a matrix, by row and column."""
+        return [
+            [FirstOrder(v, s) for v, s in zip(*rows, strict=True)] for rows in zip(self.value, self.slope, strict=True)
+        ]
+
     def __abs__(self) -> FirstOrder:
         if np.any(self.slope) and np.any(self.value):
             raise ValueError("got a quantity with a rounding error; needed an exact quantity or a pure error")
         return FirstOrder(abs(self.value), abs(self.slope))
 
     def __eq__(self, other: object) -> bool:
+        if isinstance(other, DottedMatrix):
+            return NotImplemented
         found = quantity(other)
         return bool(
-            np.shape(self.value) == np.shape(found.value)
-            and np.all(self.value == found.value)
-            and np.all(self.slope == found.slope)
+            self.shape == found.shape and np.all(self.value == found.value) and np.all(self.slope == found.slope)
         )
 
     def __le__(self, other: Any) -> bool:
         """Whether no entry is larger for small positive ε: values are compared first, then slopes."""
+        if isinstance(other, DottedMatrix):
+            return NotImplemented
         found = quantity(other)
         equal = self.value == found.value
         return bool(np.all((self.value < found.value) | (equal & (self.slope <= found.slope))))

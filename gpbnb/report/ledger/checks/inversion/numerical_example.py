@@ -10,15 +10,10 @@ from gpbnb.arithmetic.rational import column_sum_norm, exact
 from gpbnb.report.inversion import example, existence
 from gpbnb.report.ledger.checks.inversion.registry import CHECKS
 from gpbnb.report.ledger.checks.inversion.samples import Sample
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.formula import Number
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement, load_statements, statement
-
-
-@CHECKS.add(*both("s11-4.matrix-a"))
-def matrix(printed: Statement) -> Finding:
-    return given("gives the matrix of the example, with entries of four digits")
 
 
 @CHECKS.add(*both("s11-4.reference-to-figure-1"))
@@ -65,7 +60,7 @@ def actual_norms(printed: Statement) -> Finding:
 
 
 @cache
-def readings(column: str) -> tuple[example.Column, ...]:
+def readings(column: str) -> tuple[example.PrintedColumn, ...]:
     """Return every reading of a column of Table 1, "proposed" or "actual"."""
     return tuple(example.bound_readings() if column == "proposed" else example.error_readings())
 
@@ -87,7 +82,7 @@ def _reproduced(printed: Statement, column: str) -> tuple[int, int]:
 
 
 @cache
-def _closest(column: str) -> example.Search:
+def _closest(column: str) -> example.Agreements:
     return example.search("bound" if column == "proposed" else "error")
 
 
@@ -103,9 +98,8 @@ def _proposed(printed: Statement) -> tuple[bool, str]:
     search = _closest("proposed")
     values = [search.closest.values[example.PLACES.index(places)] for places in _numbers(printed, "proposed")]
     return found > 0, (
-        f"the procedure can be read in {count} ways, and {found or 'none'} of them gives all printed "
-        f"digits; the closest result, {', '.join(f'{v:.3e}' for v in values)}, is off by "
-        f"{search.closest.distance - 1:.1%} ({search.closest.wordlength}; {search.closest.detail})"
+        f"of {count} readings of the procedure, {found or 'none'} gives all printed digits; the closest one gives "
+        f"{', '.join(f'{v:.3e}' for v in values)}, which is off by {search.closest.distance - 1:.1%}"
     )
 
 
@@ -113,8 +107,8 @@ def _actual(printed: Statement) -> tuple[bool, str]:
     found, count = _reproduced(printed, "actual")
     can, searches = _possible(tuple(_numbers(printed, "actual")))
     return found > 0, (
-        f"the procedure can be read in {count} ways, and {found or 'none'} of them gives all printed "
-        f"digits; the closest column is off by a factor of {_closest('actual').closest.distance:.2f}; "
+        f"of {count} readings of the procedure, {found or 'none'} gives all printed digits; the closest column is "
+        f"off by a factor of {_closest('actual').closest.distance:.2f}; "
         f"{can or 'none'} of {searches} searches through all matrices with this number of places, or "
         "with one digit more, finds a matrix whose error has the printed norm"
     )
@@ -162,13 +156,13 @@ def table(printed: Statement) -> Finding:
 # -- claims on the table --------------------------------------------------------------------------
 
 
-def _claim(word: str) -> tuple[example.Claim, str]:
+def _claim(word: str) -> tuple[example.SectionClaim, str]:
     (found,) = (claim for claim in _claims() if word in claim.name)
     return found, f"{found.name} in {found.holds} of {found.readings} ways of reading the procedure"
 
 
 @cache
-def _claims() -> tuple[example.Claim, ...]:
+def _claims() -> tuple[example.SectionClaim, ...]:
     return tuple(example.claims())
 
 

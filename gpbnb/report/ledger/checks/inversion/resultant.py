@@ -35,7 +35,7 @@ COUNTEREXAMPLES = {
 
 
 @cache
-def counterexample(form: str) -> tuple[experiment.Trial, str]:
+def counterexample(form: str) -> tuple[experiment.InverseTrial, str]:
     """Return a matrix whose error exceeds one form of the printed bound, and the name of the bound."""
     rows, fmt, pivot = COUNTEREXAMPLES[form]
     name = str(procedure.Reading(form=form))
@@ -156,13 +156,6 @@ def error_norm(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1982.III.eq97")
-def relative_error_norm_1982() -> Finding:
-    return unverifiable(
-        "by (96), the relative error norm is at most $\\|D\\|$", "the scan has lost the sign before $\\|D\\|$"
-    )
-
-
 @CHECKS.add("hung1984.II.eq97")
 def relative_error_norm(printed: Statement) -> Finding:
     return slip(
@@ -236,14 +229,6 @@ def computation(printed: Statement) -> Finding:
         f"for $n=3$ the bound takes {three[1]} multiplications and the inverse {three[0]}; for $n=20$ "
         f"they take {twenty[1]:,} and {twenty[0]:,}",
         note="the bound takes more computation than the inverse itself",
-    )
-
-
-@CHECKS.add("hung1984.II.s11-3.figure-iii-1-flow-chart")
-def flow_chart() -> Finding:
-    return unverifiable(
-        "we implement the procedure from the texts of the boxes in the scan of hung1982",
-        "the scan has lost the picture and keeps only its caption",
     )
 
 

@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 
-from gpbnb.report.ledger.checks.inversion.environments import FORMATS, eliminations, entries, runs
+from gpbnb.report.ledger.checks.inversion.environments import FORMATS, eliminations, runs
 from gpbnb.report.ledger.checks.inversion.first_order import FirstOrder, matrix
 from gpbnb.report.ledger.checks.inversion.judging import COMMON, corrected, holds, says, slip
 from gpbnb.report.ledger.checks.inversion.registry import CHECKS
 from gpbnb.report.ledger.checks.inversion.worst_case import bounds_errors
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given, unverifiable
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.formula import Relation, Undefined
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement
@@ -24,28 +24,12 @@ COUNTED = (
 )
 
 
-@CHECKS.add(*both("eq45"))
-def system(printed: Statement) -> Finding:
-    return given("states the system and names its unknowns")
-
-
 @CHECKS.add(*(key for name in ("a-1", "b-1", "a-2", "b-2") for key in both(f"s11-1.{name}-definition")))
 def blocks(printed: Statement) -> Finding:
     return compare(
         holds(printed, eliminations(3)),
         "the matrices hold exactly the entries that the step changes, and zeros elsewhere",
     )
-
-
-@CHECKS.add(
-    *both("eq55"),
-    *both("eq56"),
-    *both("eq57"),
-    "hung1984.II.s11-1.a-t-a-n-1",
-    "hung1982.III.s11-1.a-t",
-)
-def stages(printed: Statement) -> Finding:
-    return given("names the matrix and its entries after each step")
 
 
 @CHECKS.add(
@@ -99,14 +83,6 @@ def right_side_definition(printed: Statement) -> Finding:
         "$b_i(0)+m_{i1}b_1(0)=b_i(0)-\\frac{a_{i1}(0)}{a_{11}(0)}b_1(0)$",
         "there are two misprints: the sign of $m_{i1}$, which already contains the minus sign of "
         "(46), and $b_i(0)$ for $b_1(0)$ in the product; the last line below is right with $b_1(0)$",
-    )
-
-
-@CHECKS.add("hung1982.III.s11-1.b-i-1-definition")
-def right_side_definition_1982() -> Finding:
-    return unverifiable(
-        "the next line has $b_1(0)$ in the product, without the misprints of hung1984",
-        "the scan has lost the equation, except for a divisor $a_{11}(0)$",
     )
 
 
@@ -309,13 +285,6 @@ def norms(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add("hung1982.III.eq61")
-def illegible_norm() -> Finding:
-    return unverifiable(
-        "(62) adds the norms, as (61) of hung1984 does", "the scan shows no legible part of the equation"
-    )
-
-
 # -- shapes ---------------------------------------------------------------------------------------
 
 
@@ -344,12 +313,12 @@ def partial_matrix(printed: Statement) -> Finding:
 
 @CHECKS.add(*both("eq63"))
 def triangular_matrix(printed: Statement) -> Finding:
-    evaluable = corrected(printed, "; ".join(part.text for part in printed.parts if "..." not in part.text))
+    inside = [{**names, "k": Fraction(k)} for n in (5, 6) for names in eliminations(n) for k in range(3, n)]
+    meant = printed.form.replace("a_hat[2,k](0)", "a_hat[2,k](1)").replace("a_hat[2,n](0)", "a_hat[2,n](1)")
     return slip(
-        evaluable,
-        eliminations(4),
-        "A_hat_T[1,k] == a_hat[1,k](0); A_hat_T[2,2] == a_hat[2,2](1); A_hat_T[2,k] == a_hat[2,k](1); "
-        "A_hat_T[k,k] == a_hat[k,k](k-1); A_hat_T[k,n] == a_hat[k,n](k-1)",
+        printed,
+        inside,
+        meant.replace("a_hat[k,n](0)", "a_hat[k,n](k-1)"),
         "row $k$ of $\\hat A_T$ is row $k$ of $\\hat A(k-1)$, also off the diagonal",
         (
             "to the right of the diagonal, (0) is printed for $(k-1)$; the diagonal is correct, and "
@@ -363,7 +332,7 @@ def triangular_right_side(printed: Statement) -> Finding:
     each = [{**names, "k": Fraction(k)} for names in eliminations(4) for k in (1, 2, 3, 4)]
     whole = all(
         names["b_hat_T_underline"] == names["b_hat_underline"](3)
-        and [row[0] for row in entries(names["b_hat_T_underline"])] == [names["b_hat"](k, k - 1) for k in (1, 2, 3, 4)]
+        and [row[0] for row in names["b_hat_T_underline"].tolist()] == [names["b_hat"](k, k - 1) for k in (1, 2, 3, 4)]
         for names in eliminations(4)
     )
     return compare(whole and holds(printed, each), "for $n=4$, entry $k$ keeps its value from step $k-1$ on")

@@ -30,16 +30,6 @@ def coefficients() -> tuple[int, int]:
     return first, second
 
 
-@CHECKS.add("hung1984.II.s12.example-sampling")
-def sampling(printed: Statement) -> Finding:
-    return given("given data: the interval of the measurements and the duration")
-
-
-@CHECKS.add("hung1984.II.s12.example-n-m", "hung1982.III.s12.example-n-m-and-sampling")
-def dimensions(printed: Statement) -> Finding:
-    return given("assumed dimensions; the report does not say which ten states and which two measurements")
-
-
 @CHECKS.add(*both("s12.example-k"))
 def steps_of_a_year(printed: Statement) -> Finding:
     k = Fraction(YEAR, STEP)

@@ -25,7 +25,7 @@ from gpbnb.report.ledger.statements import Statement
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ChainComparison:
     """How a printed chain compares with the largest errors.
 
     Parameters
@@ -38,7 +38,7 @@ class Outcome:
     times: float
 
 
-def judge(printed: Statement, instances: Iterable[Instance]) -> Outcome:
+def judge(printed: Statement, instances: Iterable[Instance]) -> ChainComparison:
     """Compare each chain of a statement with the largest errors in each instance.
 
     Raises
@@ -60,7 +60,7 @@ def judge(printed: Statement, instances: Iterable[Instance]) -> Outcome:
             right = right and _chain_holds(chain, sides, instance.tight)
     if undefined == count and count:
         raise last
-    return Outcome(right, times)
+    return ChainComparison(right, times)
 
 
 def _allowed(chain: Relation, names: Names) -> Iterator[tuple[Any, Any, Any]]:
@@ -147,4 +147,4 @@ def _right_form(printed: Statement) -> str:
     """Say what the right statement is, if there is one."""
     correction = load_corrections().get(printed.id)
     corrected = correction and correction.applied(printed)
-    return f"; right is {corrected.printed}" if corrected else ""
+    return f"; the correct form is {corrected.printed}" if corrected else ""

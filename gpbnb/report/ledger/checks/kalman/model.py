@@ -15,23 +15,19 @@ from gpbnb.report.ledger.statements import Statement
 _EXACT = f"compared with weighted least squares in exact arithmetic for $n={STATES}$, $m={MEASUREMENTS}$"
 
 
-@CHECKS.add(*both("s12.model-equations"))
-def model_equations(printed: Statement) -> Finding:
+@CHECKS.add(*both("s12.noises-uncorrelated"))
+def uncorrelated(printed: Statement) -> Finding:
     w, v = sp.zeros(STATES, 1), sp.zeros(MEASUREMENTS, 1)
-    names = {"E": lambda product: product, "w": lambda k: w, "v": lambda j: v}
     try:
-        printed.relation(4).links(names)
+        printed.links({"E": lambda product: product, "w": lambda k: w, "v": lambda j: v})
     except Undefined:
         return compare(
             False,
-            (f"for $n={STATES}$, $m={MEASUREMENTS}$ the product $w_kv_j$ is undefined, while $w_kv_j^T$ is defined"),
+            f"for $n={STATES}$, $m={MEASUREMENTS}$ the product $w_kv_j$ is undefined, while $w_kv_j^T$ is defined",
             Verdict.MISPRINT,
-            note=(
-                "a transpose is missing in $E[w_kv_j]$; $\\omega$ and $w$ stand for the same quantity, "
-                "as do $v$ and $V$"
-            ),
+            note="a transpose is missing in $E[w_kv_j]$",
         )
-    return given("states the model that the filter assumes")
+    return given("states that the two noises are independent")
 
 
 @CHECKS.add(*both("s12.claim-asterisk"))

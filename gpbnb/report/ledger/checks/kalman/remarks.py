@@ -13,11 +13,13 @@ from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.arithmetic.rational import exact
 from gpbnb.arithmetic.rounding import Rounding
 from gpbnb.filters import contraction, emulation, forms
+from gpbnb.filters.kalman_step import StepModel
 from gpbnb.report.gravity_probe_b import year
 from gpbnb.report.kalman import derivation, exact_step, report_bounds, smallest
 from gpbnb.report.ledger.checks.kalman.example import GOAL, SIGNAL, STEP, YEAR, M, N, coefficients
-from gpbnb.report.ledger.checks.kalman.registry import CHAPTER, CHECKS, FOUR
-from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.report.ledger.checks.kalman.registry import CHECKS, FOUR
+from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
+from gpbnb.report.ledger.html import chapter
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement
 
@@ -31,8 +33,8 @@ def refined() -> tuple[int, int, float]:
         for _ in range(4):
             Phi, H = exact(rng.integers(-9, 10, (2, 2))) / 20, exact(rng.integers(1, 10, (1, 2)))
             Q, R, P = (exact(np.diag(rng.integers(1, 10, size))) / 8 for size in (2, 1, 2))
-            run = truth = smallest.Case(Phi, H, Q, R, exact(rng.integers(-9, 10, 2)), P, exact([0]))
-            model = [as_float(each) for each in (Phi, H, Q, R)]
+            run = truth = smallest.FilterCase(Phi, H, Q, R, exact(rng.integers(-9, 10, 2)), P, exact([0]))
+            model = StepModel(*map(as_float, (Phi, H, Q, R)))
             bound = contraction.contraction_start(as_float(P), np.zeros(2), np.zeros((2, 2)))
             for _ in range(5):
                 z = exact(rng.integers(-9, 10, 1))
@@ -42,20 +44,9 @@ def refined() -> tuple[int, int, float]:
                 P = (P + P.T) / 2
                 given = [as_float(each) for each in (run.x, run.P, z)]
                 K, S = as_float(here.gain), as_float(here.innovation_covariance)
-                dq, dT, dK, dv = contraction.evaluation_errors(*model, *given, K, S, 2.0**-102)
-                bound = contraction.contraction_step(
-                    bound,
-                    *model,
-                    K,
-                    S,
-                    as_float(here.innovation),
-                    as_float(x - here.x),
-                    as_float(P - here.P),
-                    dq,
-                    dT,
-                    dK,
-                    dv,
-                )
+                off = contraction.evaluation_errors(model, *given, K, S, 2.0**-102)
+                residuals = as_float(here.innovation), as_float(x - here.x), as_float(P - here.P)
+                bound = contraction.contraction_step(bound, model, contraction.Repeated(K, S, *residuals), off)
                 run, truth = run._replace(x=x, P=P), truth._replace(x=true.x, P=true.P)
                 errors = np.abs(np.append(as_float(x - true.x), as_float(P - true.P)))
                 bounds = np.append(contraction.state_error_bound(bound), contraction.covariance_error_bound(bound))
@@ -78,13 +69,8 @@ def remark_1(printed: Statement) -> Finding:
         "(125) is not a bound; the contraction bound is strict, not only valid to first order: "
         f"{violations} violations in {tried} entries of small filters, with a median ratio of bound "
         f"to error of {factor:.2g}",
-        note=f"see the {CHAPTER}, where a companion run makes the bound tight over a year",
+        note=f"see the {chapter('contraction')}, where a companion run makes the bound tight over a year",
     )
-
-
-@CHECKS.add(*both("s13.several-approaches"))
-def several_approaches(printed: Statement) -> Finding:
-    return unverifiable("", "the documents do not describe the other approaches")
 
 
 @cache
@@ -106,7 +92,7 @@ def needed_precision(base: int) -> int | None:
     """Return the fewest stored digits from which on the drift rates meet the tolerance at all checkpoints."""
     needed = None
     for found in sorted(year.load(), key=lambda each: each.case.precision, reverse=True):
-        comparable = found.case._replace(precision=0) == year.Case(
+        comparable = found.case._replace(precision=0) == year.YearCase(
             year.MODELS[0], base, 0, Rounding.NEAREST, forms.Form.HUNG
         )
         if comparable:
@@ -125,7 +111,8 @@ def remark_2(printed: Statement) -> Finding:
         f"we ran a filter of our own with {N} states and {M} measurements for a year: {decimal} "
         f"decimal digits or {binary} bits are the smallest tried precisions that keep the drift rates "
         f"within {GOAL} mas a year; the second term of (125) requires {asked} digits",
-        note=f"see the {CHAPTER}; the reports print no matrices, so the noise and the time constants are our choice",
+        note=f"see the {chapter('year')}; the reports print no matrices, so the noise and the time constants are our "
+        "choice",
     )
 
 
@@ -146,11 +133,6 @@ def remark_4(printed: Statement) -> Finding:
 @CHECKS.add("hung1982.III.s13.remark-5")
 def remark_5(printed: Statement) -> Finding:
     return left_open("the documents do not contain the compensation data")
-
-
-@CHECKS.add("hung1984.II.s14.references")
-def references(printed: Statement) -> Finding:
-    return given("a list of works; the text cites none of them, and only the seventh is among the documents")
 
 
 @CHECKS.add("hung1984.II.s14.reference-1", "hung1984.II.s14.reference-5")
@@ -175,6 +157,6 @@ def reference_7(printed: Statement) -> Finding:
         printed.claims("contract", {"NA58-34426": False, "NAS8-34426": True}),
         "NAS8-34426",
         Verdict.MISPRINT,
-        otherwise_note="a 5 stands for the S of the title page, as in chapter I, due to the author or the scan. The "
+        otherwise_note="the author or the scan put a 5 in place of the S on the title page, as in chapter I. The "
         "date is a month after the end of the period that the report of 1982 covers",
     )

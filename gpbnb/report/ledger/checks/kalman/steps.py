@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 from functools import cache
 
@@ -14,7 +15,7 @@ from gpbnb.report.ledger.checks.kalman.judging import bounded
 from gpbnb.report.ledger.checks.kalman.registry import CHECKS, FOUR
 from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.registry import both
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.statements import Statement, statement
 
 #: Root errors; see roots.csv.
 PRODUCT, DROPPED, EXACT_GAIN, SIGNS, TWICE = (
@@ -141,7 +142,7 @@ def gain_bound(printed: Statement) -> Finding:
     matrices = smallest.ratios(FOUR, smallest.correlated()).gain
     return _gain(
         printed,
-        "the report drops $-m\\epsilon P_{kp}H^TR^{-1}$ as in (105); with the first form of (99) "
+        "the report drops $-m\\epsilon P_{kp}H^TR^{-1}$ as in (105); with the first form of the gain, "
         f"(108) holds for one state in the first step, but the error is {later:.3g} times "
         f"$9\\beta K_k$ in the second step, or {matrices:.3g} times (108) with two states",
         SIGNS,
@@ -206,6 +207,35 @@ def rewritten(printed: Statement) -> Finding:
         algebra.holds(printed, algebra.restated()),
         "(114) with the counts of (115) and (116)",
         note="with these redefined symbols, no further rounding remains to be counted",
+    )
+
+
+def _cited(printed: Statement, place: str, names: dict[str, sp.Expr] | None = None, side: int = -1) -> sp.Expr:
+    """Return a side of an equation of the same document."""
+    return statement(f"{printed.document}.{printed.chapter}.{place}").relation().sides[side].value(names)
+
+
+@CHECKS.add(*both("s12.claim-114-written-as-117"))
+def written_again(printed: Statement) -> Finding:
+    names = {"F_hat_k": _cited(printed, "eq115"), "u_hat_k": _cited(printed, "eq116")}
+    cited = _cited(printed, f"eq{printed.says('equation').strip('()')}")
+    return compare(
+        bool(sp.expand(_cited(printed, "eq117", names) - cited) == 0),
+        "with (115) and (116), (117) is the last line of (114)",
+    )
+
+
+@CHECKS.add(*both("s12.claim-115-and-116-combined"))
+def combined(printed: Statement) -> Finding:
+    loop, entered = (f"eq{number}" for number in re.findall(r"\((\d+)\)", printed.says("equations")))
+    names = {f"F_hat_{i}": _cited(printed, loop, {"F_k": sp.Symbol(f"F_{i}")}) for i in (1, 2, 3)}
+    names |= {f"u_hat_{i}": _cited(printed, entered, {"u_k": sp.Symbol(f"u_{i}")}) for i in (1, 2, 3)}
+    difference = _cited(printed, "s12.unnumbered-x-3", names) - _cited(printed, "eq119", side=1)
+    epsilon = sp.Symbol("epsilon")
+    first_order = [difference.subs(epsilon, 0), difference.diff(epsilon).subs(epsilon, 0)]
+    return compare(
+        all(sp.expand(each) == 0 for each in first_order),
+        "to first order, the counts of the line before (119) and those of (115) and (116) add up to those of (119)",
     )
 
 

@@ -15,14 +15,61 @@ from typing import Any
 
 import numpy as np
 
+from gpbnb.arithmetic.algebra import EXACT, Algebra, rounded_algebra
 from gpbnb.arithmetic.rational import column_sum_norm, exact, inverse_of
+from gpbnb.filters.forms import Form
+from gpbnb.filters.kalman_step import StepModel, gain, predicted, reduction, second_gain, updated
 from gpbnb.report.kalman import report_bounds, smallest
 from gpbnb.report.ledger.checks.inversion.first_order import FirstOrder
 from gpbnb.report.ledger.checks.kalman.registry import FOUR
-from gpbnb.report.ledger.checks.kalman.rounded import Step, predict, reduce, second_gain, take, update
-from gpbnb.report.ledger.tracked import Matrix, largest, product, rounded, tracked
+from gpbnb.report.ledger.tracked import Matrix, largest, rounded, tracked
 
 Names = dict[str, Any]
+
+
+# -- one step with a rounding of every operation --------------------------------------------------
+
+
+@dataclass
+class ComputedStep:
+    """The computed quantities of one step, in one kind of number."""
+
+    P_kp: Matrix
+    K: Matrix
+    P: Matrix
+    K_2: Matrix
+    F: Matrix
+    u: Matrix
+    x: Matrix
+
+
+def take(
+    algebra: Algebra,
+    number: Callable[[Any], Matrix],
+    case: smallest.FilterCase,
+    x: Matrix,
+    P: Matrix,
+    second: bool = True,
+) -> ComputedStep:
+    """Take one step, (100)-(111), of a filter; the estimate uses the second or the first form of (99)."""
+    model = StepModel(*map(number, (case.Phi, case.H, case.Q, case.R)))
+    P_kp = predicted(algebra, model.Phi, P, model.Q)
+    K = gain(algebra, model.H, model.R, P_kp).K
+    P_new = updated(algebra, Form.HUNG, model, P_kp, K)
+    K_2 = second_gain(algebra, model.H, model.R, P_new)
+    used = K_2 if second else K
+    F, u = reduce(algebra, used, model.H, model.Phi), algebra.times(used, number(case.z[:, None]))
+    return ComputedStep(P_kp, K, P_new, K_2, F, u, update(algebra, F, x, u))
+
+
+def reduce(algebra: Algebra, K: Matrix, H: Matrix, right: Matrix) -> Matrix:
+    """Return the rounded (I - KH) times a matrix, as in (101) and (109)."""
+    return np.asarray(algebra.times(reduction(algebra, K, H), right))
+
+
+def update(algebra: Algebra, F: Matrix, x: Matrix, u: Matrix) -> Matrix:
+    """Return the rounded (111)."""
+    return np.asarray(algebra.rounded(algebra.times(F, x) + u))
 
 
 # -- instances ------------------------------------------------------------------------------------
@@ -66,7 +113,7 @@ SCALARS = tuple(
 )
 
 
-def _mixed(seed: int, n: int) -> smallest.Case:
+def _mixed(seed: int, n: int) -> smallest.FilterCase:
     """Return a random filter with one measurement and numbers of either sign."""
     rng = np.random.default_rng(seed)
 
@@ -76,11 +123,11 @@ def _mixed(seed: int, n: int) -> smallest.Case:
     half, noise = numbers(n, n), numbers(n, n)
     one = exact(np.eye(n, dtype=int))
     Q, P = (factor @ factor.T + one / 50 for factor in (noise, half))
-    return smallest.Case(numbers(n, n), numbers(1, n), Q, exact([["1/4"]]), numbers(n), P, numbers(1))
+    return smallest.FilterCase(numbers(n, n), numbers(1, n), Q, exact([["1/4"]]), numbers(n), P, numbers(1))
 
 
 @cache
-def cases() -> tuple[smallest.Case, ...]:
+def cases() -> tuple[smallest.FilterCase, ...]:
     """Return filters with one measurement: scalar ones whose gain almost cancels the state, and random ones."""
     cancelling = smallest.correlated()
     product = cancelling._replace(Phi=exact([["1.001", 1], [1, 0]]))
@@ -105,8 +152,9 @@ def local_gain() -> tuple[Instance, ...]:
     found = []
     for case in cases():
         true, *_ = _steps(case)
-        for fl, number, emulated in KINDS:
-            computed: Any = second_gain(fl, number(true.P), number(case.H), number(inverse_of(case.R)))
+        for algebra, number, emulated in KINDS:
+            of_state = algebra.times(number(true.P), number(case.H).T)
+            computed: Any = algebra.times(of_state, number(inverse_of(case.R)))
             error = abs(computed - true.K) / FOUR.unit_roundoff if emulated else largest(computed)
             none = {name: abs(each) * 0 for name, each in vars(true).items()}
             names = _names_of_a_step(case, true, none | {"K_2": error})
@@ -114,37 +162,35 @@ def local_gain() -> tuple[Instance, ...]:
     return tuple(found)
 
 
-def _errors(computed: Step, true: Step, emulated: bool) -> dict[str, Matrix]:
+def _errors(computed: ComputedStep, true: ComputedStep, emulated: bool) -> dict[str, Matrix]:
     """Return the errors of a step over β: the largest, or those in four digits."""
     if emulated:
         return {name: abs(each - getattr(true, name)) / FOUR.unit_roundoff for name, each in vars(computed).items()}
     return {name: largest(each) for name, each in vars(computed).items()}
 
 
-_FOUR = np.vectorize(FOUR.round, otypes=[object])
-KINDS: tuple[tuple[Callable[[Any], Any], Callable[[Any], Matrix], bool], ...] = (
-    (rounded, tracked, False),
-    (_FOUR, exact, True),
-)
-"""How to round, how to make numbers, and whether the errors are those in four digits instead of the largest ones."""
+_FOUR = rounded_algebra(exact, np.vectorize(FOUR.round, otypes=[object]))
+_TRACKED = rounded_algebra(tracked, rounded)
+KINDS: tuple[tuple[Algebra, Callable[[Any], Matrix], bool], ...] = ((_TRACKED, tracked, False), (_FOUR, exact, True))
+"""How to compute, how to make numbers, and whether the errors are those in four digits instead of the largest ones."""
 
 
 @cache
-def _steps_of(place: int) -> tuple[Step, dict[str, Matrix], dict[str, Matrix]]:
+def _steps_of(place: int) -> tuple[ComputedStep, dict[str, Matrix], dict[str, Matrix]]:
     case = cases()[place]
     x, P = case.x[:, None], case.P
-    true = take(lambda each: each, exact, case, exact(x), exact(P))
-    moved = take(rounded, tracked, case, tracked(x), tracked(P))
+    true = take(EXACT, exact, case, exact(x), exact(P))
+    moved = take(_TRACKED, tracked, case, tracked(x), tracked(P))
     computed = take(_FOUR, exact, case, exact(x), exact(P))
     return true, _errors(moved, true, False), _errors(computed, true, True)
 
 
-def _steps(case: smallest.Case) -> tuple[Step, dict[str, Matrix], dict[str, Matrix]]:
+def _steps(case: smallest.FilterCase) -> tuple[ComputedStep, dict[str, Matrix], dict[str, Matrix]]:
     """Return the exact step of a case, the largest errors, and those in four digits."""
     return _steps_of(next(i for i, each in enumerate(cases()) if each is case))
 
 
-def _names_of_a_step(case: smallest.Case, true: Step, errors: dict[str, Matrix]) -> Names:
+def _names_of_a_step(case: smallest.FilterCase, true: ComputedStep, errors: dict[str, Matrix]) -> Names:
     return letters(len(case.Phi), len(case.H)) | {
         "phi": at(2, case.Phi), "P": at(2, case.P), "Q": at(2, case.Q), "x": at(2, case.x[:, None]),
         "H_k": FirstOrder(case.H), "R_k": FirstOrder(case.R), "z_k": FirstOrder(case.z[:, None]),
@@ -185,7 +231,7 @@ def tight_prediction() -> tuple[Instance, ...]:
     for n, m in SIZES:
         Phi, half, Q = _positive(1, n, n), _positive(2, n, n), _positive(3, n, n)
         P = half + half.T
-        error = largest(predict(rounded, tracked(Phi), tracked(P), tracked(Q)))
+        error = largest(predicted(_TRACKED, tracked(Phi), tracked(P), tracked(Q)))
         value = Phi @ P @ Phi.T + Q
         found.append(
             _tight(
@@ -207,9 +253,9 @@ def tight_covariance() -> tuple[Instance, ...]:
     """Return matrices for (104), (105) and the line before (107), with errors of K_k and P_kp of any size."""
     found = []
     for n, m in SIZES:
-        K, H, P_kp, unit = _positive(4, n, m) / 20, _positive(5, m, n), _alternating(6, n), exact(np.eye(n, dtype=int))
+        K, H, P_kp, unit = _positive(4, n, m) / 20, _positive(5, m, n), _alternating(6, n), EXACT.identity(n)
         of_gain, of_prediction = _positive(7, n, m), _positive(8, n, n)
-        error = largest(reduce(rounded, tracked(K, of_gain), tracked(H), tracked(P_kp, of_prediction), tracked(unit)))
+        error = largest(reduce(_TRACKED, tracked(K, of_gain), tracked(H), tracked(P_kp, of_prediction)))
         value = (unit - K @ H) @ P_kp
         found.append(
             _tight(
@@ -239,7 +285,8 @@ def tight_gain(local: bool = False) -> tuple[Instance, ...]:
         R_inverse = _positive(11, m, m) + 2 * exact(np.eye(m, dtype=int))
         of_covariance = _positive(12, n, n) * (not local)
         inverse = tracked(R_inverse) if local else rounded(tracked(R_inverse))
-        error = largest(second_gain(rounded, tracked(P, of_covariance), tracked(H), inverse))
+        of_state = _TRACKED.times(tracked(P, of_covariance), tracked(H).T)
+        error = largest(_TRACKED.times(of_state, inverse))
         K, R = P @ H.T @ R_inverse, FirstOrder(inverse_of(R_inverse))
         found.append(
             _tight(
@@ -272,11 +319,11 @@ def tight_loop() -> tuple[Instance, ...]:
             exact(np.eye(n, dtype=int)),
         )
         z, of_gain = _positive(16, m, 1), _positive(17, n, m)
-        of_loop = largest(reduce(rounded, tracked(K, of_gain), tracked(H), tracked(Phi), tracked(unit)))
-        of_input = largest(product(rounded, tracked(K, of_gain), tracked(z)))
+        of_loop = largest(reduce(_TRACKED, tracked(K, of_gain), tracked(H), tracked(Phi)))
+        of_input = largest(_TRACKED.times(tracked(K, of_gain), tracked(z)))
         F, u = (unit - K @ H) @ Phi, K @ z
         x = np.sign(F[:1].T.astype(float)).astype(int) * _positive(18, n, 1)
-        error = largest(update(rounded, tracked(F, of_loop), tracked(x), tracked(u, of_input)))
+        error = largest(update(_TRACKED, tracked(F, of_loop), tracked(x), tracked(u, of_input)))
         found.append(
             _tight(
                 n,
@@ -308,20 +355,20 @@ LAST = 5
 
 
 @cache
-def _runs() -> tuple[tuple[smallest.Case, list[Step], list[list[Matrix]], list[list[Matrix]]], ...]:
+def _runs() -> tuple[tuple[smallest.FilterCase, list[ComputedStep], list[list[Matrix]], list[list[Matrix]]], ...]:
     """Return exact runs, and for both kinds of errors in each step: of x, of F, of u, and of x from this step alone."""
     found = []
     for case in cases()[:-1]:
-        exact_steps: list[Step] = []
+        exact_steps: list[ComputedStep] = []
         kinds: list[list[list[Matrix]]] = []
         x, P = exact(case.x)[:, None], exact(case.P)
         for _ in range(LAST):
-            exact_steps.append(take(lambda each: each, exact, case, x, P, second=False))
+            exact_steps.append(take(EXACT, exact, case, x, P, second=False))
             x, P = exact_steps[-1].x, exact_steps[-1].P
-        for fl, number, emulated in KINDS:
+        for algebra, number, emulated in KINDS:
             x, P, errors = number(case.x[:, None]), number(case.P), []
             for true in exact_steps:
-                step = take(fl, number, case, x, P, second=False)
+                step = take(algebra, number, case, x, P, second=False)
                 alone = step.x - (number(true.F) @ x + number(true.u))
                 size = (lambda each: abs(each) / FOUR.unit_roundoff) if emulated else largest
                 pairs = ((step.x, true.x), (step.F, true.F), (step.u, true.u))
@@ -342,12 +389,12 @@ def _named(letter: str, values_of: Iterable[Any], first: int = 1) -> Names:
 
 
 def _names_of_a_run(
-    n: int, m: int, k: int, x_0: Matrix, loops: list[Matrix], inputs: list[Matrix], of_loops: list[Matrix],
+    m: int, k: int, x_0: Matrix, loops: list[Matrix], inputs: list[Matrix], of_loops: list[Matrix],
     of_inputs: list[Matrix], states: list[Matrix], of_states: list[Matrix], e: Fraction,
 ) -> Names:  # fmt: skip
     """Return the names of (119)-(125); the lists have an entry for each step."""
     return (
-        letters(n, m)
+        letters(len(x_0), m)
         | _named("F", map(FirstOrder, loops)) | _named("u", map(FirstOrder, inputs))
         | _named("F_tilde", map(tilde, of_loops)) | _named("u_tilde", map(tilde, of_inputs))
         | _named("x", map(FirstOrder, [x_0, *states]), 0) | _named("x_tilde", map(tilde, of_states))
@@ -371,7 +418,7 @@ def several_steps() -> tuple[Instance, ...]:
             loops, inputs = [step.F for step in steps], [step.u for step in steps]
             for k in (1, LAST):
                 names = _names_of_a_run(
-                    n, m, k, exact(case.x)[:, None], loops, inputs,
+                    m, k, exact(case.x)[:, None], loops, inputs,
                     [error + (n + 1) * abs(F) for error, F in zip(of_loops, loops, strict=True)],
                     [error + abs(u) for error, u in zip(of_inputs, inputs, strict=True)],
                     [step.x for step in steps], list(of_states), max(abs(each).max() for each in alone),
@@ -401,7 +448,7 @@ def tight_steps() -> tuple[Instance, ...]:
             states.append(exact_x)
             of_states.append(largest(x))
             of_norms.append(largest(same))
-        names = _names_of_a_run(n, 1, k, x_0, loops, inputs, of_loops, of_inputs, states, of_states, e)
+        names = _names_of_a_run(1, k, x_0, loops, inputs, of_loops, of_inputs, states, of_states, e)
         alone = _named("x_tilde", map(tilde, of_norms)) | {"x_tilde_k": tilde(of_norms[k - 1])}
         found.append(
             Instance(names | {"norm": lambda each, alone=alone, names=names: _norm(each, names, alone)}, tight=True)

@@ -15,7 +15,7 @@ from gpbnb.report.display.tables import scientific
 from gpbnb.report.ledger.agreement import hold, prints_side
 from gpbnb.report.ledger.checks.rolling.process import fixed, low_frequency, signals
 from gpbnb.report.ledger.checks.rolling.registry import ALLOWED, CHECKS, PRINTED, SIX, TEN, entry
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given, unverifiable
+from gpbnb.report.ledger.finding import Finding, Verdict, compare, unverifiable
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import experiment, theory
@@ -95,16 +95,6 @@ def finite_wordlength(printed: Statement) -> Finding:
 
 
 # -- sample calculation 1 -------------------------------------------------------------------------
-
-
-@CHECKS.add(entry("s4.sample-1-t"))
-def sample_period() -> Finding:
-    return given("the roll period of the sample calculations")
-
-
-@CHECKS.add(entry("s4.sample-1-places"), entry("s4.sample-2-places"))
-def places() -> Finding:
-    return given("the wordlength of a sample calculation")
 
 
 @CHECKS.add(entry("s4.sample-1-omega-r"))

@@ -9,18 +9,12 @@ import scipy
 import sympy as sp
 
 from gpbnb.report.ledger.checks.rolling.material import expected_squares, filter_study, spectra
-from gpbnb.report.ledger.checks.rolling.process import LOST
 from gpbnb.report.ledger.checks.rolling.registry import CHAPTER, CHECKS, entry
-from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import derivation, theory
 from gpbnb.report.rolling.theory import DRIFTS, FLOWN_DENSITY, LEVEL, PERIOD, PERIOD_FLOWN
-
-
-@CHECKS.add(entry("s5.ramp-signal"))
-def ramp_signal() -> Finding:
-    return given("this is the model of the relativistic signal")
 
 
 @CHECKS.add(entry("s5.ramp-transform"))
@@ -77,11 +71,6 @@ def spread(printed: Statement) -> Finding:
         ),
         note="the length of the record thus determines the spread",
     )
-
-
-@CHECKS.add(entry("s5.figure-iii-3-a"), entry("s5.figure-iii-3-b"))
-def pictures() -> Finding:
-    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; see the {CHAPTER}")
 
 
 @CHECKS.add(entry("s5.inphase-noise"))
@@ -145,8 +134,3 @@ def optimum() -> Finding:
         f"{10 * math.log10(snr):.0f} dB at an error of {least:.2f} mas",
         f"see the {CHAPTER}, section on noise within the band",
     )
-
-
-@CHECKS.add(entry("s6.references"))
-def references() -> Finding:
-    return unverifiable("", "the two cited works are not among the documents")

@@ -22,7 +22,7 @@ from gpbnb.report.ledger.checks.rolling.material import (
     walk_errors,
 )
 from gpbnb.report.ledger.checks.rolling.registry import CHAPTER, CHECKS, TEN, entry
-from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, given, unverifiable
+from gpbnb.report.ledger.finding import Finding, Verdict, answer, compare, unverifiable
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.measurement import YEAR
 from gpbnb.report.rolling import derivation, experiment, theory
@@ -162,11 +162,6 @@ def much_less(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(entry("s1.figure-iii-1-a"), entry("s1.figure-iii-1-b"), entry("s1.figure-iii-2"))
-def pictures() -> Finding:
-    return unverifiable("the figure was redrawn from simulated data", f"{LOST}; see the {CHAPTER}")
-
-
 @CHECKS.add(entry("s1.equivalent-modulation"))
 def equivalent(printed: Statement) -> Finding:
     found = stages()
@@ -181,11 +176,6 @@ def equivalent(printed: Statement) -> Finding:
         "rolling is $z\\to ze^{-i\\omega_rt}$ and moves the spectrum of a record of 20 turns to "
         f"{peak:.0f} cycles; derolling moves it back, to twelve digits",
     )
-
-
-@CHECKS.add(entry("s1.carriers"), *(entry(e) for e in ("eq1", "eq9", "eq6")))
-def definitions() -> Finding:
-    return given("states the model: carriers, rolled signal and measured signal")
 
 
 @CHECKS.add(entry("eq2"))
@@ -229,7 +219,7 @@ def best_phase(printed: Statement) -> Finding:
     return compare(
         _ANGLES[printed.says("angle")] == best and printed.says("demodulation") == name,
         "$\\cos\\theta$ is largest at $\\theta=0$",
-        note="this is said of the one signal of (1) to (4); for the pair it holds in the channel of each signal",
+        note="the statement concerns the single signal of (1) to (4); for a pair of signals, it holds in each channel",
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gpbnb.report.ledger.checks.rolling.process import low_frequency, signals
 from gpbnb.report.ledger.checks.rolling.registry import CHECKS, entry
-from gpbnb.report.ledger.finding import Finding, compare, given
+from gpbnb.report.ledger.finding import Finding, compare
 from gpbnb.report.ledger.statements import Statement, load_statements
 from gpbnb.report.measurement import spin_in_readout
 from gpbnb.report.rolling import theory
@@ -61,11 +61,6 @@ def first_three(printed: Statement) -> Finding:
         {"three": 3, "two": 2, "five": 5}[printed.says("sources")] == len(sections),
         f"they are the subjects of sections {', '.join(sections)}",
     )
-
-
-@CHECKS.add(entry("s4.one-dimensional"))
-def one_dimensional() -> Finding:
-    return given("says that section 4 considers one signal, without a phase difference")
 
 
 @CHECKS.add(entry("s4.ideally-zero"))

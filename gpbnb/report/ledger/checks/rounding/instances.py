@@ -35,7 +35,7 @@ ATTAINED = Fraction(99, 100)
 
 
 @dataclass(frozen=True)
-class Judgement:
+class RelationOutcome:
     """The outcome of some relations in all instances.
 
     Parameters
@@ -78,7 +78,7 @@ def relations(printed: Statement) -> tuple[Relation, ...]:
     return tuple(part for part in printed.parts if isinstance(part, Relation) and "*...*" not in part.text)
 
 
-def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bool = False) -> Judgement:
+def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bool = False) -> RelationOutcome:
     """Evaluate relations in all instances.
 
     Parameters
@@ -101,11 +101,11 @@ def judge(found: Iterable[Relation], instances: Iterable[Names], first_order: bo
         if names.get("tight"):
             first = {k: i for i, (k, _) in reversed(bounds.items())}
             missed |= {i for i in first.values() if not bounds[i][1]}
-    return Judgement(count, violated, tuple(i for i, reached in attained.items() if not reached or i in missed))
+    return RelationOutcome(count, violated, tuple(i for i, reached in attained.items() if not reached or i in missed))
 
 
 def link_holds(link: Link, first_order: bool = False) -> bool:
-    """Whether a comparison holds, exactly or up to differences of second order."""
+    """Whether a comparison holds, exactly or to first order; < and > then need a difference of first order."""
     left, right = _entries(link.left), _entries(link.right)
     if left.shape != right.shape:
         return False
@@ -116,10 +116,10 @@ def link_holds(link: Link, first_order: bool = False) -> bool:
             return bool(np.all(abs(difference) <= slack))
         case "!=":
             return bool(np.any(abs(difference) > slack))
-        case "<=" | "<":
-            return bool(np.all(difference <= slack)) and (link.symbol == "<=" or bool(np.all(difference < slack)))
+        case "<=" | ">=":
+            return bool(np.all(difference <= slack if link.symbol == "<=" else difference >= -slack))
         case _:
-            return bool(np.all(difference >= -slack)) and (link.symbol == ">=" or bool(np.all(difference > -slack)))
+            return bool(np.all(difference < -slack if link.symbol == "<" else difference > slack))
 
 
 def _attains(link: Link) -> bool:
@@ -159,7 +159,7 @@ class Matrix:
         return Matrix(abs(self.entries))
 
 
-class Column(dict[int, Fraction]):
+class IndexedVector(dict[int, Fraction]):
     """A vector with indices from 1; ``a.T*b`` is the inner product."""
 
     @property
@@ -169,15 +169,15 @@ class Column(dict[int, Fraction]):
 
 @dataclass(frozen=True)
 class _Row:
-    vector: Column
+    vector: IndexedVector
 
-    def __mul__(self, other: Column) -> Fraction:
+    def __mul__(self, other: IndexedVector) -> Fraction:
         return sum((self.vector[i] * other[i] for i in self.vector), start=Fraction(0))
 
 
-def numbered(values: Sequence[Fraction]) -> Column:
+def numbered(values: Sequence[Fraction]) -> IndexedVector:
     """Return values by their indices from 1."""
-    return Column(enumerate(values, start=1))
+    return IndexedVector(enumerate(values, start=1))
 
 
 def fractions(rng: np.random.Generator, count: int) -> list[Fraction]:

@@ -10,7 +10,7 @@ import numpy as np
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.ledger.checks.rounding.instances import FOUR, FOUR_CHOPPED, samples, surveyed_bounds
 from gpbnb.report.ledger.checks.rounding.registry import CHECKS
-from gpbnb.report.ledger.finding import Finding, compare, unverifiable
+from gpbnb.report.ledger.finding import Finding, compare
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.rounding import experiment
@@ -57,24 +57,6 @@ def not_easy(printed: Statement) -> Finding:
         "a statistical bound for independent rounding errors, designed to fail in 1 % of the sums, "
         f"fails in {varied:.0%} if the terms vary and in {constant:.0%} if they are equal",
         note="the statistics of the errors depend on the data",
-    )
-
-
-@CHECKS.add(*both("s1.claim-only-rounding"))
-def only_rounding() -> Finding:
-    return unverifiable(
-        "",
-        (
-            "the claim is about the computers of 1982, and the report names no source; section 4 "
-            "nevertheless treats chopping"
-        ),
-    )
-
-
-@CHECKS.add(*both("s1.claim-background"), *both("s1.claim-main-activity"))
-def background() -> Finding:
-    return unverifiable(
-        "", "the claim is about the literature or the plans for the mission, and the report names no source"
     )
 
 

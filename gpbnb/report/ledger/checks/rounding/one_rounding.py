@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from gpbnb.arithmetic.formats import FloatFormat
 from gpbnb.report.ledger.checks.rounding.instances import (
@@ -27,10 +28,10 @@ from gpbnb.report.ledger.checks.rounding.instances import (
 )
 from gpbnb.report.ledger.checks.rounding.registry import CHECKS
 from gpbnb.report.ledger.checks.rounding.representation import split_is_printed
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.formula import Relation
 from gpbnb.report.ledger.registry import both
-from gpbnb.report.ledger.statements import Statement
+from gpbnb.report.ledger.statements import Statement, statement
 from gpbnb.report.rounding import derivation
 
 
@@ -51,16 +52,6 @@ def error_defined(printed: Statement) -> Finding:
     )
 
 
-@CHECKS.add(*both("eq9"))
-def chopping_defined() -> Finding:
-    return given("defines a chopped number")
-
-
-@CHECKS.add(*both("eq15"))
-def operation_error_defined() -> Finding:
-    return given("defines the relative error of one operation, which (16) bounds")
-
-
 @CHECKS.add(*both("eq5"), *both("eq6"), *both("eq8"))
 def rounding_bound(printed: Statement) -> Finding:
     found = judge(relations(printed), all_numbers())
@@ -71,6 +62,15 @@ def rounding_bound(printed: Statement) -> Finding:
         if printed.id.endswith("eq8")
         else "",
     )
+
+
+@CHECKS.add("hung1984.II.s3.claim-5-and-6")
+def bounds_combined(printed: Statement) -> Finding:
+    error, number = (statement(f"hung1984.II.eq{k}").relation().value() for k in (5, 6))
+    bound = statement("hung1984.II.eq8").relation().sides[1].value()
+    reasons = {"(5) and (6)": error / number, "(5) alone": error, "(6) alone": 1 / number}
+    agree = {name: bool(sp.simplify(reason - bound) == 0) for name, reason in reasons.items()}
+    return compare(printed.claims("bounds", agree), "bound (5) divided by bound (6) is bound (8)")
 
 
 @CHECKS.add(*both("eq10"), *both("eq11"), *both("eq13"))

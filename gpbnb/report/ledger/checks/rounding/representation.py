@@ -20,7 +20,7 @@ from gpbnb.report.ledger.checks.rounding.instances import (
     split_text,
 )
 from gpbnb.report.ledger.checks.rounding.registry import CHECKS
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.formula import Relation
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement, statement
@@ -33,11 +33,6 @@ def split_is_printed(relation: Relation, names: Names) -> bool:
     b, t, e = names["b"], names["t"], names["e"]
     terms = relation.terms(names, number=lambda q: q)
     return relation.equates and terms == (names["u"] * b**e, names["v"] * b ** (e - t))
-
-
-@CHECKS.add(*both("eq1"))
-def representation() -> Finding:
-    return given("defines the form of a number: sign, digits, base and exponent; zero has no such form with $d_1\\ne0$")
 
 
 RADICANDS = {r"$\sqrt2$": 2, r"$\sqrt4$": 4}

@@ -1,4 +1,4 @@
-"""Sentences between the equations of sections 1 to 9: definitions, and small claims."""
+"""Sentences between the equations of sections 1 to 9: small claims."""
 
 from __future__ import annotations
 
@@ -10,27 +10,9 @@ import numpy as np
 from gpbnb.arithmetic.rational import exact
 from gpbnb.report.ledger.checks.rounding.instances import all_numbers, judge, relations
 from gpbnb.report.ledger.checks.rounding.registry import CHECKS
-from gpbnb.report.ledger.finding import Finding, compare, given
+from gpbnb.report.ledger.finding import Finding, compare
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement
-
-
-@CHECKS.add(*both("s1.claim-two-approaches"))
-def two_approaches() -> Finding:
-    return given("names the two approaches that section 1 compares")
-
-
-@CHECKS.add(
-    *both("s5.four-operations"),
-    *both("s5.two-notations"),
-    *both("s6.division-errors"),
-    "hung1984.II.s6.largest-term",
-    *both("s9-1.epsilons"),
-    "hung1982.III.s9-2.interface-dimension",
-    "hung1982.III.s9-2.matrices-of-sizes",
-)
-def notation() -> Finding:
-    return given("defines a notation")
 
 
 @cache

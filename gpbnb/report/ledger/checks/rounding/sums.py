@@ -22,15 +22,10 @@ from gpbnb.report.ledger.checks.rounding.instances import (
 )
 from gpbnb.report.ledger.checks.rounding.instances import surveyed_bounds as statistics
 from gpbnb.report.ledger.checks.rounding.registry import CHECKS
-from gpbnb.report.ledger.finding import Finding, Verdict, compare, given
+from gpbnb.report.ledger.finding import Finding, Verdict, compare
 from gpbnb.report.ledger.registry import both
 from gpbnb.report.ledger.statements import Statement
 from gpbnb.report.rounding import derivation, experiment, theory
-
-
-@CHECKS.add(*both("eq17"), *both("s6.order-of-4-terms"), *both("eq19"))
-def defined() -> Finding:
-    return given("defines the quantity and the order in which it is computed: from left to right")
 
 
 def _sum_names(x: list[Fraction], epsilon: list[Fraction]) -> dict[str, Any]:
@@ -171,7 +166,7 @@ def quotient_example(printed: Statement) -> Finding:
     return compare(
         found.right and bool(sp.expand(error - sum(eps)) == 0),
         f"{found}; the relative error is ${sp.latex(error)}$, at most $2\\beta$",
-        note="to first order" if printed.document == "hung1984" else "applies to what is legible",
+        note="to first order" if printed.document == "hung1984" else "the verdict covers only what is legible",
     )
 
 

@@ -1,0 +1,108 @@
+"""Evidence for the numbers of the book: what was checked, against what, how often, and how often it disagreed."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import NamedTuple
+
+from gpbnb.report.display.tables import Table
+from gpbnb.report.guarantees import filters, scalar, survey
+from gpbnb.report.ledger.statements import load_statements
+from gpbnb.report.ledger.unjudged import load_unjudged
+
+
+class Checked(NamedTuple):
+    """One kind of evidence: the number of cases that were checked, and of those that disagreed."""
+
+    cases: int
+    wrong: int
+
+
+def operations(file: Path) -> Checked:
+    """Count operations compared with other arithmetic, from the table that ``make exactness`` stores.
+
+    Parameters
+    ----------
+    file : a table as CSV with the columns `compared` and `different`, or as Markdown with the columns `all` and
+        `different`.
+
+    Raises
+    ------
+    ValueError : the table has other columns.
+    """
+    if file.suffix == ".md":
+        rows, compared = _rows(file), "all"
+    else:
+        rows, compared = list(csv.DictReader(file.read_text(encoding="utf-8").splitlines())), "compared"
+    if not rows or not {compared, "different"} <= rows[0].keys():
+        raise ValueError(f"got the table {file.name}; needed the columns {compared!r} and 'different'")
+    numbers = [[int(row[name].replace(",", "")) for row in rows] for name in (compared, "different")]
+    return Checked(sum(numbers[0]), sum(numbers[1]))
+
+
+def _rows(file: Path) -> list[dict[str, str]]:
+    """Return the rows of the table in a Markdown file."""
+    lines = file.read_text(encoding="utf-8").splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    return [dict(zip(cells[0], row, strict=True)) for row in cells[2:]]
+
+
+def compiled(file: Path) -> Checked:
+    """Count builds of generated C code that were compared with the emulation, and those that differ.
+
+    Parameters
+    ----------
+    file : the table that ``make exactness`` stores, with the columns `builds` and `different`.
+
+    Raises
+    ------
+    ValueError : the table has other columns.
+    """
+    rows = _rows(file)
+    if not rows or not {"builds", "different"} <= rows[0].keys():
+        raise ValueError(f"got the table {file.name}; needed the columns 'builds' and 'different'")
+    agree, wrong = (sum(int(row[name].replace(",", "")) for row in rows) for name in ("builds", "different"))
+    return Checked(agree + wrong, wrong)
+
+
+def faults(file: Path) -> Checked:
+    """Count seeded faults that change a result, and those that no test catches, from the record of ``make mutants``."""
+    with file.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    judged = sum(int(row["mutants"]) - int(row["equivalent"]) for row in rows)
+    return Checked(judged, judged - sum(int(row["caught"]) for row in rows))
+
+
+def attacks() -> Checked:
+    """Count emulated runs against guarantees, and those that exceed their bound."""
+    kalman, linear = filters.load(), survey.load()
+    return Checked(
+        sum(row.runs for row in kalman) + sum(row.runs for row in linear),
+        sum(row.wrong for row in kalman)
+        + sum(max(float(row.random), float(row.constant), float(row.chosen)) > 1 for row in linear),
+    )
+
+
+def true_errors() -> Checked:
+    """Count filters whose worst error is known exactly, and those whose bound is smaller."""
+    rows = [row for row in scalar.load() if row.result == "compared"]
+    return Checked(len(rows), sum(float(row.ratio) > 1 for row in rows))
+
+
+def statements() -> int:
+    """Count the printed statements that a check reads, so that an altered one must be rejected."""
+    unjudged = {key for topic in load_unjudged().values() for key in topic}
+    return sum(bool(each.form) and each.id not in unjudged for each in load_statements())
+
+
+def table(found: dict[str, tuple[str, Checked]]) -> Table:
+    """Tabulate evidence.
+
+    Parameters
+    ----------
+    found : for each kind of cases, what they were compared with, and the counts.
+    """
+    header = ("what we checked", "against what", "cases", "disagreements")
+    body = tuple((what, other, f"{each.cases:,}", f"{each.wrong:,}") for what, (other, each) in found.items())
+    return Table(f"{len(body)} kinds of evidence", header, body)

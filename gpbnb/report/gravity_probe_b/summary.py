@@ -1,0 +1,127 @@
+"""The answers at a glance: digits for a year of Gravity Probe B, as printed, observed and guaranteed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from gpbnb.arithmetic.formats import FloatFormat
+from gpbnb.arithmetic.named import BINARY32, BINARY64
+from gpbnb.arithmetic.rounding import Rounding
+from gpbnb.report.display.tables import Table
+from gpbnb.report.gravity_probe_b import answers, horizon, threshold
+from gpbnb.report.gravity_probe_b.threshold import Share
+from gpbnb.report.kalman import report_bounds
+
+DRIFT = 6606
+"""Drift in a year that relativity predicts, in mas; the reports compare errors with an estimate of this size."""
+
+
+class YearAnswer(NamedTuple):
+    """One answer to the question how many digits a year needs.
+
+    Parameters
+    ----------
+    source : who or what gives the answer.
+    decimal : decimal digits, if the answer is in these. bits : bits, if it is in these.
+    deviation : bits if the filter estimates deviations from the predicted drift; None if that was not asked.
+    meaning : what the answer rests on, or allows.
+    """
+
+    source: str
+    meaning: str
+    decimal: tuple[int, ...] = ()
+    bits: int | None = None
+    deviation: int | None = None
+
+
+def find() -> tuple[YearAnswer, ...]:
+    """Collect the answers from the printed example, the stored years and the stored guarantee."""
+    printed = answers.find_answers()
+    formula = report_bounds.coefficients(*report_bounds.EXAMPLE)
+    within = tuple(report_bounds.precision_for_coefficient(each, Fraction(1, DRIFT)) for each in formula)
+    record = answers.find_answers().bits
+    simple = [each for each in threshold.shares(threshold.SWEEP.load()) if _as_in_the_report(each)]
+    real = [each for each in threshold.shares(threshold.MISSION_SWEEP.load()) if _as_in_the_report(each)]
+    absolute, deviation = (_least(simple, "simple", states) for states in threshold.STATES)
+    closer, closer_deviation = (_least(real, "mission", states) for states in threshold.STATES)
+    flown = _least(real, "steps and roll as flown", "deviation")
+    bound = {row.states: horizon.bits(row) for row in horizon.load()}
+    least = min(deviation.fmt.precision, closer_deviation.fmt.precision)
+    sizes = {name: fmt.precision for name, fmt in (("float32", BINARY32), ("double", BINARY64))}
+    verdicts = {
+        name: "too few" if t < least else "ample" if t >= max(bound.values()) else "enough" for name, t in sizes.items()
+    }
+    return (
+        YearAnswer("Report, own criterion", "error equals the drift", printed.printed),
+        YearAnswer("Report, for 1 mas", "(125) is not a bound", within),
+        YearAnswer("One simulated year", "observed", (), record),
+        YearAnswer(
+            f"{absolute.records} simulated years",
+            _passed(absolute, deviation),
+            (),
+            absolute.fmt.precision,
+            deviation.fmt.precision,
+        ),
+        YearAnswer(
+            "Closer to the mission",
+            _passed(closer, closer_deviation),
+            (),
+            closer.fmt.precision,
+            closer_deviation.fmt.precision,
+        ),
+        YearAnswer(
+            "Same, step every 2 s",
+            _passed(flown),
+            deviation=flown.fmt.precision,
+        ),
+        YearAnswer(
+            "Every admissible record",
+            "extrapolated guarantee",
+            (),
+            bound["absolute"],
+            bound["deviation"],
+        ),
+        YearAnswer("binary32 (float32)", verdicts["float32"], (), sizes["float32"]),
+        YearAnswer("binary64 (double)", verdicts["double"], (), sizes["double"]),
+    )
+
+
+def table() -> Table:
+    """Tabulate the answers in bits and in decimal digits, converted by equal unit roundoff."""
+    body = []
+    for each in find():
+        decimal = " or ".join(map(str, each.decimal))
+        bits = " or ".join(f"{binary_digits(t):.1f}" for t in each.decimal)
+        if each.bits is not None:
+            decimal, bits = f"{answers.decimal_digits(FloatFormat(2, each.bits)):.1f}", str(each.bits)
+        deviation = "" if each.deviation is None else str(each.deviation)
+        body.append((each.source, bits or "–", decimal or "–", deviation or "–", each.meaning))
+    header = ("answer", "bits", "decimal digits", "deviations", "basis")
+    return Table("digits for a year of Gravity Probe B", header, tuple(body))
+
+
+def _passed(*found: Share) -> str:
+    """Say how many simulated years stay within the tolerance, in a text that is short if all do."""
+    counts = {(each.within, each.records) for each in found}
+    texts = [f"all {records}" if within == records else f"{within} of {records}" for within, records in sorted(counts)]
+    return f"{' and '.join(texts)} within 1 mas"
+
+
+def binary_digits(decimal: int) -> float:
+    """Return the number of bits with the same unit roundoff as so many decimal digits."""
+    return 1 + (decimal - 1) * math.log2(10)
+
+
+def _as_in_the_report(share: Share) -> bool:
+    fmt = share.fmt
+    return fmt.base == 2 and fmt.rounding is Rounding.NEAREST and share.form == "hung"
+
+
+def _least(found: Sequence[Share], setting: str, states: str) -> Share:
+    """Return the share of the smallest precision with which 99 % of the records stay within a milliarcsecond."""
+    kept = [each for each in found if (each.setting, each.states) == (setting, states)]
+    precision = threshold.needed(kept).observed
+    return next(each for each in kept if each.fmt.precision == precision)

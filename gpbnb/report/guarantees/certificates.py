@@ -1,0 +1,153 @@
+"""Certificates of the guarantees that the book states, and their verdicts.
+
+``python -m gpbnb.report.guarantees.certificates`` writes the certificate of each guarantee in the book to a folder and
+checks it with :mod:`gpbnb.bounds.check`. If words are given, it takes only the filters whose names contain one of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from gpbnb.bounds.check import NotProvedError, prove
+from gpbnb.bounds.guarantee import Guarantee, guarantee, limits
+from gpbnb.filters.forms import Form
+from gpbnb.report.display.tables import Table
+from gpbnb.report.guarantees.table import CASES, FORMAT, case_guarantee
+from gpbnb.sweeps import Column, Sweep, as_computed
+from gpbnb.wordlength.examples import cyclic
+
+COMMAND = "python -m gpbnb.report.guarantees.certificates"
+SLOW = ("altimeter", "tilt filter", "ten states")
+"""Guarantees whose check takes more than some seconds."""
+FILE = Path(__file__).with_name("certificates.csv")
+COLUMNS = (
+    Column("name", "text"),
+    Column("size", "integer", 1),
+    Column("seconds", "number", 0),
+    Column("verdict", "text"),
+)
+"""Columns of the stored table."""
+WITHOUT = {
+    "altimeter": "the intervals that its certificate claims are too wide to be proved",
+    "ten states, UD form": "its certificate keeps too few steps of errors apart to be proved",
+    "ten states, innovation form": "its gain never repeats",
+    "three thousand random Kalman filters": "the tests check the certificates of the first thirty",
+    "two thousand random linear filters": "attacked instead; the tests check certificates of their structure",
+    "filters of one state in three to six bits": "their worst errors are known exactly",
+    "Gravity Probe B over a number of steps": "not tried, because its runs have up to millions of steps",
+    "filters in fixed point with a constant gain": "they are bounded for any measurements, without limits",
+    "inverses of matrices": "they are not filters",
+}
+"""Guarantees in the book or in stored tables that have no certificate of their own, and why."""
+
+
+class CheckedCertificate(NamedTuple):
+    """A certificate, its size in bytes, and what the checker says; `seconds` are those of the processor."""
+
+    name: str
+    size: int
+    seconds: str
+    verdict: str
+
+
+def _cyclic() -> Guarantee:
+    """The filter with ten states of the chapter, in the UD form, whose gain repeats."""
+    return guarantee(cyclic(10, 2, cycle=31, decay=0.8), FORMAT, limits(10, 2, state=100, innovation=10), Form.UD)
+
+
+def guarantees() -> dict[str, Callable[[], Guarantee]]:
+    """Return functions that compute the guarantees of the book, by name."""
+    found = {case.make().name: lambda case=case: case_guarantee(case, case.make(), FORMAT) for case in CASES}
+    return {**found, "ten states": _cyclic}
+
+
+def verdict(name: str, text: str) -> CheckedCertificate:
+    """Check a certificate."""
+    begin = time.process_time()
+    try:
+        prove(json.loads(text))
+        answer = "proved"
+    except NotProvedError as error:
+        answer = f"not proved: {error}"
+    except NotImplementedError as error:
+        answer = f"not covered: {error}"
+    return CheckedCertificate(name, len(text), f"{time.process_time() - begin:.1f}", answer)
+
+
+# -- the stored table -------------------------------------------------------------------------------------------------
+
+
+def _computed(name: str, directory: Path | None = None) -> list[list[str]]:
+    return [[str(each) for each in verdict(name, guarantees()[name]().certificate())]]
+
+
+def _same(stored: Sequence[str], computed: Sequence[str]) -> bool:
+    """Whether two rows agree, apart from the seconds."""
+    return (*stored[:2], *stored[3:]) == (*computed[:2], *computed[3:])
+
+
+SWEEP: Sweep[str] = Sweep(
+    name="guarantees/certificates",
+    file=FILE,
+    columns=COLUMNS,
+    key=1,
+    cells=lambda: tuple(guarantees()),
+    compute=_computed,
+    rows=as_computed,
+    command="python -m gpbnb.report.stored recompute guarantees/certificates",
+    seed=0,
+    same=_same,
+)
+
+
+def load(file: Path = FILE) -> tuple[CheckedCertificate, ...]:
+    """Return the stored rows."""
+    return SWEEP.load(file).tuples(CheckedCertificate)
+
+
+def table(rows: Sequence[CheckedCertificate]) -> Table:
+    """Tabulate the certificates and where they are checked, and what has none."""
+    header = ("guarantee", "bytes", "seconds", "verdict", "checked in")
+    body = [
+        (
+            each.name,
+            f"{each.size:,}",
+            each.seconds,
+            each.verdict,
+            "make certificates" if each.name in SLOW else "make test",
+        )
+        for each in rows
+    ]
+    body += [(name, "", "", f"not covered: {why}", "") for name, why in WITHOUT.items()]
+    return Table("certificates", header, tuple(body))
+
+
+# -- the command ------------------------------------------------------------------------------------------------------
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write and check certificates; return 1 if one is not proved."""
+    parser = argparse.ArgumentParser(prog=COMMAND, description="Write and check certificates of the book's guarantees.")
+    parser.add_argument("words", nargs="*", help="take only the filters whose names contain one of these words")
+    parser.add_argument("--output", type=Path, default=Path(".cache/certificates"), help="folder for the certificates")
+    given = parser.parse_args(arguments)
+    given.output.mkdir(parents=True, exist_ok=True)
+    sound = True
+    for name, compute in guarantees().items():
+        if given.words and not any(word in name for word in given.words):
+            continue
+        text = compute().certificate()
+        (given.output / f"{name.replace(' ', '-').replace(',', '')}.json").write_text(text, encoding="utf-8")
+        found = verdict(name, text)
+        sound = sound and found.verdict == "proved"
+        print(f"{found.name}: {found.size:,d} bytes, {found.seconds} s, {found.verdict}", flush=True)
+    return 0 if sound else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

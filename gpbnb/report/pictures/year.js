@@ -1,0 +1,83 @@
+// The stored run with the most bits that are not more than asked for, and when its error passes the tolerance.
+function compute({ t, chop, quantity }, data) {
+  const runs = data.runs.filter((run) => run.chop === chop);
+  const run = runs.filter((each) => each.t <= t).at(-1) ?? runs[0];
+  const errors = run.errors[quantity];
+  const first = errors.findIndex((error) => error > data.tolerance);
+  const last = errors.findLastIndex((error) => error > data.tolerance);
+  const day = (i) => gpbnbCalculators.show((data.steps[i] * data.interval) / 86400);
+  const ulp = data.angle_bound / 2 ** run.t;
+  const name = quantity ? "drift angle" : "drift rate";
+  const unit = quantity ? "mas" : "mas a year";
+  const stored = run.t === t ? "" : `No run with ${t} bits is stored; this is the one with ${run.t}. `;
+  const when =
+    first < 0
+      ? `stays below ${data.tolerance} ${unit} at every checkpoint`
+      : `exceeds ${data.tolerance} ${unit} ` +
+        (first ? `between day ${day(first - 1)} and day ${day(first)}` : "from the first step") +
+        (last === errors.length - 1 ? ", and still does at the end" : `, for the last time at the checkpoint on day ${day(last)}`);
+  const steps = data.step / ulp;
+  const place =
+    steps >= 1
+      ? `One step adds ${gpbnbCalculators.show(steps)} units in the last place of the angle`
+      : `One step adds less than one unit in the last place of the angle, ${gpbnbCalculators.show(steps)}`;
+  return { t, chop, quantity, bits: run.t, ulp, errors: run.errors, end: errors.at(-1), unit, name, stored, when, place };
+}
+
+function draw({ add, width, values, data, scale, show, superscript }) {
+  const { quantity, bits, chop, ulp } = values;
+  const [left, right, top, bottom] = [58, width - 14, 30, 270];
+  const every = data.runs.flatMap((run) => run.errors[quantity]).filter((error) => error > 0);
+  const y = scale(Math.floor(Math.log10(Math.min(...every))), Math.ceil(Math.log10(Math.max(...every))), bottom, top, true, 30);
+  const days = data.steps.map((step) => (step * data.interval) / 86400);
+  const x = scale(Math.log10(days[0]), Math.log10(days.at(-1)), left, right, true, 60);
+  add("text", { x: 4, y: 14 }, `Error of the ${values.name} (${values.unit})`);
+  for (const [at, label] of x.ticks) {
+    add("line", { class: "grid", x1: at, x2: at, y1: top, y2: bottom });
+    add("text", { x: at, y: bottom + 18, "text-anchor": "middle" }, label);
+  }
+  for (const [at, label] of y.ticks) {
+    add("line", { class: "grid", x1: left, x2: right, y1: at, y2: at });
+    add("text", { x: left - 6, y: at + 4, "text-anchor": "end" }, label);
+  }
+  add("text", { x: right, y: bottom + 36, "text-anchor": "end" }, "days");
+  const curve = (errors) => {
+    let path = "";
+    errors.forEach((error, i) => {
+      if (error > 0) path += `${path ? "L" : "M"}${x.place(days[i]).toFixed(1)} ${y.place(error).toFixed(1)}`;
+    });
+    return path;
+  };
+  for (const run of data.runs) {
+    if (run.chop === chop && run.t !== bits) add("path", { class: "faint", d: curve(run.errors[quantity]) });
+  }
+  const limit = y.place(data.tolerance);
+  add("line", { class: "limit", x1: left, x2: right, y1: limit, y2: limit });
+  add("text", { x: left + 6, y: limit - 6 }, "tolerance");
+  add("path", { class: "curve curve-5 chosen", d: curve(values.errors[quantity]) });
+  values.errors[quantity].forEach((error, i) => {
+    if (error > 0) add("circle", { class: "curve-0", cx: x.place(days[i]), cy: y.place(error), r: 3.5 });
+  });
+
+  // The last place of an angle of a year's drift, beside what one step adds to it.
+  const low = Math.log10(data.angle_bound) - 53 * Math.log10(2);
+  const ladder = scale(Math.floor(low), 0, left, right, true, 60);
+  const line = bottom + 110;
+  add("text", { x: 4, y: line - 46 }, "Last place of 6606 mas, and one step (mas)");
+  add("line", { class: "line", x1: left, x2: right, y1: line, y2: line });
+  for (const [at, label] of ladder.ticks) {
+    add("line", { class: "line", x1: at, x2: at, y1: line, y2: line + 5 });
+    add("text", { x: at, y: line + 22, "text-anchor": "middle" }, label);
+  }
+  for (const run of data.runs.filter((each) => each.chop === chop)) {
+    const at = ladder.place(data.angle_bound / 2 ** run.t);
+    add("line", { class: "faint", x1: at, x2: at, y1: line - 6, y2: line });
+  }
+  const [step, unit] = [ladder.place(data.step), ladder.place(ulp)];
+  add("path", { class: "mark-1 step", d: `M${step.toFixed(1)} ${line}l-6 -13h12z` });
+  add("text", { x: step, y: line - 18, "text-anchor": step > (left + right) / 2 ? "end" : "start", class: "text-1" }, `one step, ${show(data.step)}`);
+  add("path", { class: "mark-0 ulp", d: `M${unit.toFixed(1)} ${line}l-6 13h12z` });
+  const end = unit > (left + right) / 2 ? "end" : "start";
+  add("text", { x: unit, y: line + 40, "text-anchor": end, class: "text-0" }, `last place with ${bits} bits, 2${superscript(data.exponent - bits)}`);
+  return line + 52;
+}
